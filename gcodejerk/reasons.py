@@ -1,0 +1,34 @@
+"""Why a rapid was left alone: the fixed list that reports, `inspect` and the README share.
+
+The text of each member is what the user and the JSON report see; README.md explains each of them,
+and a test keeps the two together. Readers of programs (`nc`) and the planner both assign reasons,
+so the list stands below both.
+"""
+
+from __future__ import annotations
+
+import enum
+
+
+class Reason(enum.StrEnum):
+    """Why a rapid passes through unchanged. The order is the order of precedence."""
+
+    AFTER_END = "after the end of the program"
+    BLOCK_DELETE = "block delete"
+    SUBPROGRAM = "inside a subprogram, loop or conditional block"
+    NOT_UNDERSTOOD = "block not understood"
+    EXPRESSION = "expression or variable"
+    CANNED_CYCLE = "rapid inside a canned cycle"
+    FRAME_CHANGE = "coordinate frame changes in the block"
+    CUTTER_COMPENSATION = "cutter compensation active"
+    ROTATION = "rotation, scaling, mirroring or polar active"
+    NO_MOTION = "no axis moves"
+    DISTANCE_MODE_UNKNOWN = "distance mode unknown"
+    UNITS_UNKNOWN = "units unknown"
+    START_UNKNOWN = "start unknown"
+    OTHER_WORDS = "other words of the block cannot keep their order"
+    FEED_UNKNOWN = "feed to restore unknown"
+    AXIS_UNKNOWN = "axis not in the machine file"
+    TOO_SHORT = "shorter than minimum_length"
+    BEYOND_TRAVEL = "beyond travel"
+    LIMITS = "limits cannot be met"
