@@ -1,0 +1,21 @@
+"""The machine: a YAML file read into axes, limits and modes."""
+
+from gcodejerk.machine.find import find_machine
+from gcodejerk.machine.model import AXES, Axis, Design, Limits, Machine, Mode, ProgramStart
+from gcodejerk.machine.problems import MachineFileError
+from gcodejerk.machine.schema import machine_schema
+from gcodejerk.machine.writer import machine_yaml
+
+__all__ = [
+    "AXES",
+    "Axis",
+    "Design",
+    "Limits",
+    "Machine",
+    "MachineFileError",
+    "Mode",
+    "ProgramStart",
+    "find_machine",
+    "machine_schema",
+    "machine_yaml",
+]

@@ -1,0 +1,337 @@
+"""Nodes held against the table of keys: plain values come out, problems are collected.
+
+Rule: what is wrong is left out of the result. So whatever comes out is of the kind that the table
+says, converted to mm, and later steps check only what one key alone cannot show.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import yaml
+
+from gcodejerk.errors import Place
+from gcodejerk.machine import table
+from gcodejerk.machine.document import Document
+from gcodejerk.machine.problems import Problems, nearest
+from gcodejerk.units import mm_from_inch
+
+KeyPath = tuple[str | int, ...]
+
+_DECIMAL = re.compile(r"[-+]?(?P<whole>\d[\d_]*(\.\d*)?|\.\d+)(?P<exponent>[eE][-+]?\d+)?")
+_MISSING = object()
+
+
+class Checker:
+    """Reads a document by the table.
+
+    Parameters
+    ----------
+    document : Document
+        The machine file.
+    problems : Problems
+        Takes what is wrong.
+    """
+
+    def __init__(self, document: Document, problems: Problems) -> None:
+        self.document = document
+        self.problems = problems
+        self.inch = False
+        self.axes: frozenset[str] = frozenset()
+        self.rotary: frozenset[str] = frozenset()
+        self._nodes: dict[KeyPath, yaml.Node] = {}
+        self._keys: dict[KeyPath, yaml.Node] = {}
+
+    def read(self) -> dict[str, Any]:
+        """Give the values of the file by key; those that are wrong are absent.
+
+        A list comes as a dict from its indices, so that each entry keeps its path.
+        """
+        self._look_ahead()
+        values = self._read(self.document.root, table.MACHINE, ())
+        return values if isinstance(values, dict) else {}
+
+    def place(self, path: KeyPath) -> Place:
+        """Where the value of a key stands."""
+        return self.document.place(self._nodes[path])
+
+    def key_place(self, path: KeyPath) -> Place:
+        """Where a key itself stands."""
+        return self.document.place(self._keys[path])
+
+    def unit(self, unit: str, path: KeyPath) -> str:
+        """Name the unit in which the file gives a number."""
+        if not unit.startswith("mm"):
+            return unit
+        length = "deg" if self.rotary.intersection(map(str, path)) else "mm"
+        return unit.replace("mm", "inch" if self.inch and length == "mm" else length)
+
+    def _look_ahead(self) -> None:
+        """Find out what the unit of a number depends on, and which axes the file is about."""
+        top = self._peek(self.document.root)
+        units = top.get("units")
+        self.inch = isinstance(units, yaml.ScalarNode) and units.value == "inch"
+        axes = self._peek(top.get("axes"))
+        self.axes = frozenset(axes)
+        rotary = set()
+        for name, axis in axes.items():
+            kind = self._peek(axis).get("type")
+            given = kind.value if isinstance(kind, yaml.ScalarNode) else None
+            if given == "rotary" or (given is None and name in set("ABC")):
+                rotary.add(name)
+        self.rotary = frozenset(rotary)
+
+    def _peek(self, node: yaml.Node | None) -> dict[str, yaml.Node]:
+        if not isinstance(node, yaml.MappingNode):
+            return {}
+        return {key: value for key, _, value in self.document.entries(node, "", Problems())}
+
+    def _read(self, node: yaml.Node, kind: table.Kind, path: KeyPath) -> Any:
+        """Give the value of one node, or `_MISSING` after telling what is wrong with it."""
+        self._nodes[path] = node
+        match kind:
+            case table.Section():
+                return self._section(node, kind, path)
+            case table.Table():
+                return self._table(node, kind, path)
+            case table.ListOf():
+                return self._list(node, kind, path)
+            case table.Pair():
+                return self._pair(node, kind, path)
+            case table.Number():
+                return self._number(node, kind, path)
+            case table.Flag():
+                return self._flag(node, path)
+            case table.Choice() | table.Text():
+                return self._words(node, kind, path)
+
+    def _section(self, node: yaml.Node, kind: table.Section, path: KeyPath) -> Any:
+        what = f"a mapping with the keys {', '.join(kind.names)}"
+        if not isinstance(node, yaml.MappingNode):
+            return self._wrong(node, path, what)
+        keys = {key.name: key for key in kind.keys}
+        values: dict[str, Any] = {}
+        given = set()
+        for name, key_node, value_node in self._entries(node, path):
+            if name in keys:
+                if not keys[name].required and _is_left_empty(value_node, keys[name].kind):
+                    continue
+                given.add(name)
+                value = self._read(value_node, keys[name].kind, (*path, name))
+                if value is not _MISSING:
+                    values[name] = value
+            else:
+                self._unknown(key_node, name, path, kind.names, f"known keys: {', '.join(keys)}")
+        for key in kind.keys:
+            if key.required and key.name not in given:
+                self._missing(node, key, path)
+            elif key.name not in given:
+                values |= _default(key)
+        return values
+
+    def _table(self, node: yaml.Node, kind: table.Table, path: KeyPath) -> Any:
+        if not isinstance(node, yaml.MappingNode):
+            return self._wrong(node, path, f"a mapping; its keys: {kind.expected}")
+        values: dict[str, Any] = {}
+        entries = self._entries(node, path)
+        if len(entries) < kind.at_least:
+            return self._wrong(node, path, f"at least one key: {kind.expected}")
+        for name, key_node, value_node in entries:
+            of = kind.kind_of(name)
+            if of is None:
+                self._unknown(key_node, name, path, kind.known, f"expected {kind.expected}")
+                continue
+            self._keys[*path, name] = key_node
+            value = self._read(value_node, of, (*path, name))
+            if value is not _MISSING:
+                values[name] = value
+        return values
+
+    def _list(self, node: yaml.Node, kind: table.ListOf, path: KeyPath) -> Any:
+        if not isinstance(node, yaml.SequenceNode) or len(node.value) > kind.at_most:
+            what = f"a list of at most {kind.at_most} entries, each in braces or after a dash"
+            return self._wrong(node, path, what)
+        values = [self._read(n, kind.of, (*path, i)) for i, n in enumerate(node.value)]
+        return {i: value for i, value in enumerate(values) if value is not _MISSING}
+
+    def _pair(self, node: yaml.Node, kind: table.Pair, path: KeyPath) -> Any:
+        what = f"a list of two numbers, the lower first [{self.unit(kind.of.unit, path)}]"
+        if not isinstance(node, yaml.SequenceNode) or len(node.value) != 2:
+            return self._wrong(node, path, what, "for example [-400, 50]")
+        low, high = (self._read(n, kind.of, (*path, i)) for i, n in enumerate(node.value))
+        if low is _MISSING or high is _MISSING:
+            return _MISSING
+        if low >= high:
+            return self._wrong(node, path, what, "swap the two ends, or leave travel out")
+        return low, high
+
+    def _number(self, node: yaml.Node, kind: table.Number, path: KeyPath) -> Any:
+        unit = self.unit(kind.unit, path)
+        expected = kind.expected(unit)
+        if not isinstance(node, yaml.ScalarNode):
+            return self._wrong(node, path, expected)
+        text = node.value
+        remedy = _number_remedy(node)
+        if remedy is not None:
+            return self._wrong(node, path, expected, remedy)
+        value = float(text.replace("_", ""))
+        if unit.startswith("inch"):
+            value = mm_from_inch(value)
+        if abs(value) > kind.at_most:
+            own = kind.unit if unit.startswith("inch") else unit
+            return self._wrong(
+                node, path, f"at most {kind.at_most:g} [{own}]", f"check the unit: {unit}"
+            )
+        if not kind.holds(value):
+            return self._wrong(node, path, expected)
+        return value
+
+    def _flag(self, node: yaml.Node, path: KeyPath) -> Any:
+        text = node.value if isinstance(node, yaml.ScalarNode) else None
+        if isinstance(text, str) and node.tag.endswith(":bool"):
+            return text.lower() in {"true", "yes", "on"}
+        return self._wrong(node, path, "true or false")
+
+    def _words(self, node: yaml.Node, kind: table.Choice | table.Text, path: KeyPath) -> Any:
+        if not isinstance(node, yaml.ScalarNode) or _is_empty(node):
+            expected = kind.expected if isinstance(kind, table.Text) else _one_of(kind.words)
+            return self._wrong(node, path, expected)
+        text: str = node.value
+        if isinstance(kind, table.Text):
+            if re.fullmatch(kind.pattern, text):
+                return text
+            return self._wrong(node, path, kind.expected)
+        if text in kind.words:
+            return text
+        close = nearest(text, kind.words)
+        return self._wrong(
+            node, path, _one_of(kind.words), f"did you mean {close!r}?" if close else None
+        )
+
+    def _entries(
+        self, node: yaml.MappingNode, path: KeyPath
+    ) -> list[tuple[str, yaml.Node, yaml.Node]]:
+        return self.document.entries(node, f"{dotted(path)}." if path else "", self.problems)
+
+    def _wrong(
+        self, node: yaml.Node, path: KeyPath, expected: str, remedy: str | None = None
+    ) -> Any:
+        what = dotted(path) or "the file"
+        self.problems.add(
+            self.document.place(node), f"{what} is {_shown(node)}, expected {expected}",
+            remedy or _example(path),
+        )  # fmt: skip
+        return _MISSING
+
+    def _unknown(
+        self, node: yaml.Node, name: str, path: KeyPath, known: tuple[str, ...], remedy: str
+    ) -> None:
+        close = nearest(name, known)
+        hint = f", the nearest known key is {close!r}" if close else ""
+        label = dotted((*path, name[:80]))
+        self.problems.add(self.document.place(node), f"{label} is not a known key{hint}", remedy)
+
+    def _missing(self, node: yaml.Node, key: table.Key, path: KeyPath) -> None:
+        match key.kind:
+            case table.Number(unit=unit):
+                expected = key.kind.expected(self.unit(unit, (*path, key.name)))
+            case table.Choice(words=words):
+                expected = _one_of(words)
+            case _:
+                expected = "a mapping"
+        remedy = f"add {key.name}: {key.example}" if key.example else key.doc
+        self.problems.add(
+            self.document.place(node),
+            f"{dotted((*path, key.name))} is missing, expected {expected}",
+            remedy,
+        )
+
+
+def dotted(path: KeyPath) -> str:
+    """Path as messages show it: `axes.Z.modes[0].frequency`."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def _default(key: table.Key) -> dict[str, Any]:
+    """Entry that stands for an absent key; none for a key without a default."""
+    if isinstance(key.kind, table.Section) and not key.required:
+        return {key.name: {k: v for part in key.kind.keys for k, v in _default(part).items()}}
+    return {} if key.default is None else {key.name: key.default}
+
+
+def _is_left_empty(node: yaml.Node, kind: table.Kind) -> bool:
+    """Whether all entries of a key like `modes:` have been deleted or commented out."""
+    collection = isinstance(kind, table.Section | table.Table | table.ListOf)
+    return collection and _is_empty(node)
+
+
+def _is_empty(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.ScalarNode) and node.value == "" and not node.style
+
+
+def _number_remedy(node: yaml.ScalarNode) -> str | None:
+    """Remedy for a scalar that is not a decimal number; None for one that is."""
+    text: str = node.value
+    match = _DECIMAL.fullmatch(text)
+    if node.style:  # quoted, or a block of text
+        return "leave the quotes out" if match else "write a plain number"
+    if match is not None:
+        if not math.isfinite(float(text.replace("_", ""))):
+            return "write a number that a machine can have"
+        # YAML 1.1 reads a leading zero as octal; nobody who writes 010 means 8.
+        if re.fullmatch(r"[-+]?0[\d_]+", text):
+            return "leave the leading zero out"
+        return None
+    if node.tag.endswith(":float") and text.lower().lstrip("+-") in {".inf", ".nan"}:
+        return "leave the key out where there is no limit" if "inf" in text.lower() else (
+            "write the number, or leave the key out where it is optional"
+        )  # fmt: skip
+    if re.fullmatch(r"[-+]?\d+,\d+", text):
+        return "write a decimal point"
+    if text == "":
+        return "write the number after the colon, or leave the key out where it is optional"
+    return "write a plain decimal number without its unit, for example 5.0e+5"
+
+
+def _shown(node: yaml.Node) -> str:
+    """Value as messages show it: numbers as they are, words in quotes, all of it short."""
+    if isinstance(node, yaml.MappingNode):
+        return "an empty mapping" if not node.value else "a mapping"
+    if isinstance(node, yaml.SequenceNode):
+        parts = [n.value for n in node.value[:4] if isinstance(n, yaml.ScalarNode)]
+        if len(parts) == len(node.value):
+            return f"[{', '.join(str(part)[:20] for part in parts)}]"
+        return f"a list of {len(node.value)}"
+    text = str(node.value)
+    if _is_empty(node):
+        return "empty"
+    if not getattr(node, "style", None) and (
+        _DECIMAL.fullmatch(text) or not node.tag.endswith(":str")
+    ):
+        return text[:60]
+    return repr(text if len(text) <= 60 else text[:57] + "...")
+
+
+def _one_of(words: tuple[str, ...]) -> str:
+    return words[0] if len(words) == 1 else f"one of {', '.join(words)}"
+
+
+def _example(path: KeyPath) -> str | None:
+    """Remedy from the table's own example for a key."""
+    kind: table.Kind | None = table.MACHINE
+    key: table.Key | None = None
+    for part in path:
+        match kind:
+            case table.Section():
+                key = next((k for k in kind.keys if k.name == part), None)
+                kind = key.kind if key else None
+            case table.Table():
+                kind = kind.kind_of(str(part))
+            case table.ListOf() | table.Pair():
+                kind = kind.of
+    if key is None:
+        return "start from machines/vmc.yaml"
+    return f"for example {key.name}: {key.example}" if key.example else key.doc

@@ -1,0 +1,179 @@
+"""From the text of a machine file to a Machine.
+
+Rule: here stands only what involves several keys: defaults that depend on other keys, and what does
+not fit together. What a single key may hold is the table's.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import PurePath
+from typing import Any
+
+from gcodejerk.machine.checker import Checker, KeyPath, dotted
+from gcodejerk.machine.document import Document
+from gcodejerk.machine.model import AXES, Axis, Design, Limits, Machine, Mode, ProgramStart
+from gcodejerk.machine.problems import Problems
+from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
+
+JERK_OVER_RAPID = 10.0
+"""`limit.jerk` where only `rapid.jerk` is given, as a multiple of that (contract, section 2)."""
+
+
+def load_text(text: str, name: str) -> Machine:
+    """Machine that a text describes.
+
+    Parameters
+    ----------
+    text : str
+        YAML.
+    name : str
+        What messages call the file.
+
+    Returns
+    -------
+    Machine
+        The machine, every default filled in.
+
+    Raises
+    ------
+    MachineFileError
+        Everything that is wrong with the text.
+    """
+    problems = Problems()
+    checker = Checker(Document(text, name), problems)
+    values = checker.read()
+    _check_axis_types(values, checker)
+    _check_frequencies(values, checker)
+    _check_axes_exist(values, checker)
+    problems.raise_any()
+    return _machine(values, name, checker)
+
+
+def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
+    for name, axis in values.get("axes", {}).items():
+        if axis.get("type") == "rotary" and name not in "ABC":
+            checker.problems.add(
+                checker.place(("axes", name, "type")),
+                f"axes.{name}.type is 'rotary', expected linear: {name} is measured in mm",
+                "call a rotary axis A, B or C",
+            )
+        if axis.get("diameter") and name != "X":
+            checker.problems.add(
+                checker.place(("axes", name, "diameter")),
+                f"axes.{name}.diameter is true, expected false: only X is given as a diameter",
+                "leave diameter out",
+            )
+
+
+def _check_frequencies(values: dict[str, Any], checker: Checker) -> None:
+    """Refuse a mode that the interval is too long for: samples cannot tell it from a slower one."""
+    if "interval" not in values:
+        return
+    highest = 0.5 / values["interval"]
+    for path, mode in _modes(values):
+        if mode.get("frequency", 0.0) >= highest:
+            checker.problems.add(
+                checker.place((*path, "frequency")),
+                f"{dotted((*path, 'frequency'))} is {mode['frequency']:g}, expected a number "
+                f"below {highest:g} [Hz], half the sampling rate 1/interval",
+                "leave the mode out, or set a shorter interval if the controller has one",
+            )
+
+
+def _modes(values: dict[str, Any]) -> list[tuple[KeyPath, dict[str, Any]]]:
+    """Every mode of the file with its path."""
+    found: list[tuple[KeyPath, dict[str, Any]]] = []
+    for name, axis in values.get("axes", {}).items():
+        found += [(("axes", name, "modes", i), mode) for i, mode in axis.get("modes", {}).items()]
+    return found + [(("modes", i), mode) for i, mode in values.get("modes", {}).items()]
+
+
+def _check_axes_exist(values: dict[str, Any], checker: Checker) -> None:
+    """Whatever is said of an axis must be said of one that the machine has."""
+    if "axes" not in values:
+        return
+    program = values.get("program", {})
+    named: list[KeyPath] = [("program", "start", axis) for axis in program.get("start", ())]
+    for offset, value in program.get("offsets", {}).items():
+        if isinstance(value, dict):
+            named += [("program", "offsets", offset, axis) for axis in value]
+    for i, mode in values.get("modes", {}).items():
+        named += [("modes", i, "participation", axis) for axis in mode.get("participation", ())]
+    has = [axis for axis in AXES if axis in checker.axes]
+    for path in named:
+        if path[-1] not in has:
+            checker.problems.add(
+                checker.key_place(path),
+                f"{dotted(path)} is about axis {path[-1]}, which the machine does not have; "
+                f"it has {', '.join(has)}",
+                f"leave it out, or add axes.{path[-1]}",
+            )
+
+
+def _machine(values: dict[str, Any], name: str, checker: Checker) -> Machine:
+    controller = values["controller"]
+    axes = values["axes"]
+    return Machine(
+        name=values.get("name", PurePath(name).stem),
+        controller=controller,
+        dialect=values.get("dialect", DIALECT_OF_CONTROLLER.get(controller, "auto")),
+        interval=values["interval"],
+        positioning=values["positioning"],
+        axes=tuple(_axis(a, axes[a], a in checker.rotary) for a in AXES if a in axes),
+        modes=tuple(
+            _mode(mode, mode["participation"]) for mode in values.get("modes", {}).values()
+        ),
+        design=Design(**values["design"]),
+        program=_program(values["program"]),
+        inch=checker.inch,
+        source=name,
+    )
+
+
+def _axis(name: str, values: dict[str, Any], rotary: bool) -> Axis:
+    return Axis(
+        name=name,
+        rotary=rotary,
+        diameter=values["diameter"],
+        resolution=values["resolution"],
+        rapid=(rapid := _rapid(values["rapid"])),
+        limit=_limit(values.get("limit", {}), rapid),
+        travel=values.get("travel"),
+        modes=tuple(
+            _mode(mode, {name: mode["participation"]}) for mode in values.get("modes", {}).values()
+        ),
+    )
+
+
+def _rapid(values: dict[str, float]) -> Limits:
+    return Limits(values["velocity"], values["acceleration"], values.get("jerk", math.inf))
+
+
+def _limit(values: dict[str, float], rapid: Limits) -> Limits:
+    return Limits(
+        values.get("velocity", rapid.velocity),
+        values.get("acceleration", rapid.acceleration),
+        values.get("jerk", JERK_OVER_RAPID * rapid.jerk),
+    )
+
+
+def _mode(values: dict[str, Any], participation: dict[str, float]) -> Mode:
+    return Mode(
+        name=values.get("name", f"{values['frequency']:g} Hz"),
+        frequency=values["frequency"],
+        damping=values["damping"],
+        participation=tuple((a, participation[a]) for a in AXES if a in participation),
+    )
+
+
+def _program(values: dict[str, Any]) -> ProgramStart:
+    offsets = values.get("offsets", {})
+    return ProgramStart(
+        start=values.get("start", {}),
+        offsets={key: value for key, value in offsets.items() if isinstance(value, dict)},
+        tool_lengths={
+            int(key[1:]): value for key, value in offsets.items() if not isinstance(value, dict)
+        },
+        startup=values["startup"],
+    )

@@ -1,0 +1,236 @@
+"""A machine: its axes, what they may do, and the modes in which it shakes.
+
+Rule: a Machine is complete and legal. Every default has been filled in, every number is in mm (or
+deg), s and Hz, and whatever a machine cannot be was refused with its place in the file; so no user
+of these classes checks anything again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gcodejerk.errors import MachineError
+
+AXES = "XYZABCUVW"
+"""Every axis letter, in the order in which axes are listed, written and reported."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one axis may do at most."""
+
+    velocity: float
+    """[mm/s] or [deg/s]"""
+    acceleration: float
+    """[mm/s^2] or [deg/s^2]"""
+    jerk: float
+    """[mm/s^3] or [deg/s^3]; infinite where no jerk limit is given"""
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One way in which the machine vibrates, as an oscillator driven by the axes' acceleration."""
+
+    name: str
+    frequency: float
+    """Undamped natural frequency. [Hz]"""
+    damping: float
+    """Damping ratio, at least 0 and below 1. [-]"""
+    participation: tuple[tuple[str, float], ...]
+    """How strongly each axis excites it, pairs in the order of `AXES`. [-]"""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that excite this mode."""
+        return tuple(axis for axis, _ in self.participation)
+
+    def participation_of(self, axis: str) -> float:
+        """How strongly an axis excites this mode [-], 0 for an axis that does not."""
+        return next((amount for name, amount in self.participation if name == axis), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One axis of a machine; lengths are degrees if it is rotary."""
+
+    name: str
+    rotary: bool
+    diameter: bool
+    """The program's numbers are diameters (a lathe's X); everything in here is of the radius."""
+    resolution: float
+    """The smallest step that is written. [mm] or [deg]"""
+    rapid: Limits
+    """What the controller's own G0 does: this sets the conventional time."""
+    limit: Limits
+    """What a designed profile may use."""
+    travel: tuple[float, float] | None
+    """Lowest and highest machine coordinate, where they are known. [mm] or [deg]"""
+    modes: tuple[Mode, ...]
+    """Modes that this axis alone excites."""
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """How profiles are chosen, unless the command line says otherwise."""
+
+    profile: str
+    band: float
+    """Relative frequency error to be robust to. [-]"""
+    tolerance: float
+    """Residual displacement that counts as settled. [mm]"""
+    minimum_length: float
+    """Shorter rapids are left alone. [mm]"""
+    max_extension: float
+    """How much longer a move may take where the limits do not allow its conventional time. [-]"""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramStart:
+    """What a program may assume when it starts; all of it unknown unless the file says so."""
+
+    start: Mapping[str, float] = field(hash=False)
+    """Axis -> position in program coordinates. [mm] or [deg]"""
+    offsets: Mapping[str, Mapping[str, float]] = field(hash=False)
+    """Work offset (`G54`) -> axis -> its value. [mm] or [deg]"""
+    tool_lengths: Mapping[int, float] = field(hash=False)
+    """Number of the length offset (1 for `H1`) -> its value. [mm]"""
+    startup: str
+    """The codes in force, as a line of G-code; empty for the dialect's own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A machine as its YAML file describes it, in mm (or deg), s and Hz.
+
+    `source` and `inch` tell how it was written and take no part in comparisons: the same machine
+    in inches is the same machine.
+    """
+
+    name: str
+    controller: str
+    """Name of the emitter that is used by default."""
+    dialect: str
+    """How programs are read."""
+    interval: float
+    """Time from one commanded position to the next. [s]"""
+    positioning: str
+    """`linear`: G0 is a straight line; `independent`: every axis runs on its own."""
+    axes: tuple[Axis, ...]
+    """In the order of `AXES`."""
+    modes: tuple[Mode, ...]
+    """Structure modes, which several axes excite together."""
+    design: Design
+    program: ProgramStart
+    inch: bool = field(default=False, compare=False)
+    """The file's lengths are inches."""
+    source: str = field(default="<machine>", compare=False)
+    """The file, as it was named."""
+
+    @classmethod
+    def load(cls, path: str | Path) -> Machine:
+        """Read a machine file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; `find_machine` turns the name of a shipped machine into its path.
+
+        Returns
+        -------
+        Machine
+            What it describes.
+
+        Raises
+        ------
+        MachineFileError
+            The file cannot be read or is wrong; lists everything that is.
+        """
+        from gcodejerk.machine.document import read_text
+
+        return cls.loads(read_text(path), str(path))
+
+    @classmethod
+    def loads(cls, text: str, name: str = "<machine>") -> Machine:
+        """Read a machine from the text of its file.
+
+        Parameters
+        ----------
+        text : str
+            YAML.
+        name : str
+            What messages call the file.
+
+        Returns
+        -------
+        Machine
+            What it describes.
+
+        Raises
+        ------
+        MachineFileError
+            The text is wrong; lists everything that is.
+
+        Examples
+        --------
+        >>> machine = Machine.loads('''
+        ... interval: 0.001
+        ... positioning: linear
+        ... axes:
+        ...   Z:
+        ...     rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}
+        ...     modes: [{frequency: 30, damping: 0.02}]
+        ... ''')
+        >>> machine.axis("Z").limit.jerk
+        5000000.0
+        >>> machine.all_modes()[0][1].name
+        '30 Hz'
+        """
+        from gcodejerk.machine.loader import load_text
+
+        return load_text(text, name)
+
+    @property
+    def axis_names(self) -> tuple[str, ...]:
+        """Letters of the axes, in the order of `AXES`."""
+        return tuple(axis.name for axis in self.axes)
+
+    @property
+    def settings_hash(self) -> str:
+        """Eight hex digits that change with anything that a machine file can say."""
+        from gcodejerk.machine.writer import machine_yaml
+
+        return hashlib.sha256(machine_yaml(self).encode()).hexdigest()[:8]
+
+    def axis(self, name: str) -> Axis:
+        """Find the axis of that letter.
+
+        Parameters
+        ----------
+        name : str
+            One of the machine's axes.
+
+        Returns
+        -------
+        Axis
+            That axis.
+
+        Raises
+        ------
+        MachineError
+            The machine has no such axis.
+        """
+        for axis in self.axes:
+            if axis.name == name:
+                return axis
+        raise MachineError(
+            f"machine {self.name!r} has no axis {name!r}, it has {', '.join(self.axis_names)}",
+            "name one of these, or describe the axis in the machine file",
+        )
+
+    def all_modes(self) -> tuple[tuple[str, Mode], ...]:
+        """Every mode with the axes that excite it as a label: `Z`, or `Y+Z` for the structure's."""
+        own = tuple((axis.name, mode) for axis in self.axes for mode in axis.modes)
+        return own + tuple(("+".join(mode.axes), mode) for mode in self.modes)

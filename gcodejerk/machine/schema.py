@@ -1,0 +1,101 @@
+"""The machine file as JSON Schema, for editors that complete and check while one types.
+
+Rule: generated from the table of keys and nothing else. What involves several keys (a mode above
+half the sampling rate, an offset of an axis that is not there) no schema can say; `machine check`
+does.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from gcodejerk.machine import table
+
+
+def machine_schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) of a machine file.
+
+    Returns
+    -------
+    dict
+        The schema, ready for `json.dumps`.
+
+    Examples
+    --------
+    >>> schema = machine_schema()
+    >>> schema["required"]
+    ['interval', 'positioning', 'axes']
+    >>> schema["properties"]["interval"]["description"]
+    'The control command interval. [s]'
+    """
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "gcodejerk machine file",
+        "description": "A machine: its axes, their limits, and the modes in which it vibrates.",
+        **_of(table.MACHINE),
+    }
+
+
+def _of(kind: table.Kind) -> dict[str, Any]:
+    match kind:
+        case table.Section(keys=keys):
+            return {
+                "type": "object",
+                "properties": {key.name: _key(key) for key in keys},
+                "required": [key.name for key in keys if key.required],
+                "additionalProperties": False,
+            }
+        case table.Table(entries=entries, at_least=at_least):
+            return {
+                "type": "object",
+                "patternProperties": {f"^({pattern})$": _of(of) for pattern, of in entries},
+                "minProperties": at_least,
+                "additionalProperties": False,
+            }
+        case table.ListOf(of=of, at_most=at_most):
+            return {"type": "array", "items": _of(of), "maxItems": at_most}
+        case table.Pair(of=of):
+            return {"type": "array", "items": _of(of), "minItems": 2, "maxItems": 2}
+        case table.Number():
+            return _number(kind)
+        case table.Text(pattern=pattern):
+            return {"type": "string", "pattern": f"^({pattern})$"}
+        case table.Choice(words=words):
+            return {"enum": [int(word) if word.isdecimal() else word for word in words]}
+        case table.Flag():
+            return {"type": "boolean"}
+
+
+def _number(kind: table.Number) -> dict[str, Any]:
+    bounds = {
+        "exclusiveMinimum": kind.above,
+        "minimum": kind.at_least,
+        "exclusiveMaximum": kind.below,
+        # The bound of a length is one in mm, whatever the file's unit is.
+        "maximum": None if kind.unit.startswith("mm") else kind.at_most,
+    }
+    return {"type": "number"} | {key: value for key, value in bounds.items() if value is not None}
+
+
+def _key(key: table.Key) -> dict[str, Any]:
+    schema = {"title": key.name, "description": key.doc} | _of(key.kind)
+    unit = getattr(getattr(key.kind, "of", key.kind), "unit", None)
+    if unit is not None:
+        schema["description"] += f" [{_units(unit)}]"
+    if key.default is not None:
+        schema["default"] = 1 if key.name == "schema" else key.default
+    if key.example is not None:
+        schema["examples"] = [yaml.safe_load(key.example)]
+    if not key.required and schema.get("type") in ("object", "array") and not unit:
+        schema["type"] = [schema["type"], "null"]
+    return schema
+
+
+def _units(unit: str) -> str:
+    """Name the unit of a number for every kind of file and axis."""
+    if not unit.startswith("mm"):
+        return unit
+    inch, degrees = unit.replace("mm", "inch"), unit.replace("mm", "deg")
+    return f"{unit}; {inch} with units: inch; {degrees} on a rotary axis"

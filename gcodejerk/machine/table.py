@@ -1,0 +1,275 @@
+"""Every key of a machine file: what it holds, in which unit, within which bounds, and why.
+
+Rule: this table is the only place that knows a key. The checker, the conversion of units and the
+JSON Schema for editors all read it, so a key that is added here exists everywhere.
+
+Rule: defaults and bounds are in the package's own units (mm or deg, s, Hz). A unit that begins with
+`mm` is a length's: it reads `inch` under `units: inch`, and `deg` on a rotary axis.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from gcodejerk.machine.model import AXES
+
+SCHEMA_VERSION = 1
+
+PROFILES = (
+    "conventional", "condition1", "condition2", "condition3", "cascade", "optimal", "shortest",
+    "zv", "zvd", "ei", "mzv", "fir", "posicast",
+)  # fmt: skip
+
+DIALECT_OF_CONTROLLER = {
+    "csv": "linuxcnc",
+    "linuxcnc": "linuxcnc",
+    "fanuc": "fanuc",
+    "haas": "haas",
+    "siemens": "siemens",
+    "heidenhain": "heidenhain-iso",
+    "grbl": "grbl",
+    "mach": "mach",
+    "marlin": "marlin",
+    "klipper": "klipper",
+}
+"""How programs are read where the file does not say; `auto` for a controller that is not here."""
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number within bounds; `above` and `below` are themselves excluded."""
+
+    unit: str
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float = 1e15
+    """Nothing on a machine is larger, and products of such numbers stay finite."""
+
+    def holds(self, value: float) -> bool:
+        """Whether a number lies within the bounds."""
+        return (
+            abs(value) <= self.at_most
+            and (self.above is None or value > self.above)
+            and (self.at_least is None or value >= self.at_least)
+            and (self.below is None or value < self.below)
+        )
+
+    def expected(self, unit: str) -> str:
+        """Words of a message for what should stand there."""
+        bounds = []
+        if self.above is not None:
+            bounds.append("above zero" if self.above == 0.0 else f"above {self.above:g}")
+        if self.at_least is not None:
+            bounds.append(f"of at least {self.at_least:g}")
+        if self.below is not None:
+            bounds.append(f"below {self.below:g}")
+        return " ".join(filter(None, ["a number", " and ".join(bounds), f"[{unit}]"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """One line of text, taken as written."""
+
+    pattern: str
+    expected: str
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of a few words."""
+
+    words: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """True or false."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A low and a high end, as a list of two numbers."""
+
+    of: Number
+
+
+@dataclass(frozen=True, slots=True)
+class ListOf:
+    """A list."""
+
+    of: Section
+    at_most: int
+    """More make no sense on a machine, and aliases could stand for very many."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A mapping whose keys are names from a set, such as axes."""
+
+    entries: tuple[tuple[str, Kind], ...]
+    """Pattern of the name, and what stands under such a name."""
+    expected: str
+    known: tuple[str, ...]
+    """Names, or examples of names, that a misspelt one is compared with."""
+    at_least: int = 0
+
+    def kind_of(self, name: str) -> Kind | None:
+        """Give what stands under a name; None for a name that is not one of these."""
+        for pattern, kind in self.entries:
+            if re.fullmatch(pattern, name):
+                return kind
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One key of a section."""
+
+    name: str
+    kind: Kind
+    doc: str
+    required: bool = False
+    default: float | str | bool | None = None
+    """What a missing key counts as; None where that depends on other keys or means `unknown`."""
+    example: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A mapping with fixed keys."""
+
+    keys: tuple[Key, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its keys."""
+        return tuple(key.name for key in self.keys)
+
+
+Kind = Number | Text | Choice | Flag | Pair | ListOf | Table | Section
+
+_NAME = Text(r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,200}", "a name of at most 200 characters")
+_WORD = Text(r"[a-z][a-z0-9_.+-]*", "a name in lower case")
+_LENGTH = Number("mm")
+_LETTERS = f"[{AXES}]"
+_AXIS_NAMES = f"an axis: {', '.join(AXES)}"
+_POSITIONS = Table(((_LETTERS, _LENGTH),), _AXIS_NAMES, tuple(AXES))
+
+
+def _limits(required: bool, doc: str) -> Section:
+    """Keys of `rapid` (required) and of `limit`, which falls back on it."""
+    return Section(
+        (
+            Key("velocity", Number("mm/s", above=0.0), f"Velocity {doc}.", required,
+                example="600"),
+            Key("acceleration", Number("mm/s^2", above=0.0), f"Acceleration {doc}.", required,
+                example="5000"),
+            Key("jerk", Number("mm/s^3", above=0.0), f"Jerk {doc}. " + (
+                "Left out: the controller moves with trapezoidal velocity." if required else
+                "Left out: ten times that of rapid, or no limit where rapid has none."),
+                example="5.0e+5"),
+        )
+    )  # fmt: skip
+
+
+def _mode(participation: Kind, doc: str, required: bool) -> Section:
+    return Section(
+        (
+            Key("name", _NAME, "What reports call the mode. Left out: its frequency."),
+            Key("frequency", Number("Hz", above=0.0),
+                "Natural frequency, below half the sampling rate 1/interval.",
+                required=True, example="30"),
+            Key("damping", Number("-", at_least=0.0, below=1.0),
+                "Damping ratio: 0 rings for ever, machine tools have 0.01 to 0.1.",
+                default=0.0, example="0.02"),
+            Key("participation", participation, doc, required,
+                None if required else 1.0, example="{Y: 0.4, Z: 1.0}" if required else "1.0"),
+        )
+    )  # fmt: skip
+
+
+_AXIS = Section(
+    (
+        Key("type", Choice(("linear", "rotary")),
+            "Whether the axis slides [mm] or turns [deg]. Left out: A, B and C turn."),
+        Key("diameter", Flag(), "Programs give diameters of this axis (a lathe's X).",
+            default=False),
+        Key("resolution", Number("mm", above=0.0), "The smallest step that is written.",
+            default=1e-4, example="1.0e-4"),
+        Key("rapid", _limits(True, "of the controller's own G0"),
+            "What the controller's own G0 does today: this sets the conventional time.",
+            required=True, example="{velocity: 600, acceleration: 5000, jerk: 5.0e+5}"),
+        Key("limit", _limits(False, "that a designed profile may use"),
+            "What a designed profile may use; what is left out is as in rapid."),
+        Key("travel", Pair(_LENGTH), "Lowest and highest machine coordinate.",
+            example="[-400, 50]"),
+        Key("modes", ListOf(
+            _mode(Number("-", at_least=0.0), "How strongly the axis excites the mode.", False),
+            at_most=100), "Modes that this axis alone excites."),
+    )
+)  # fmt: skip
+
+_DESIGN = Section(
+    (
+        Key("profile", Choice(PROFILES), "How a rapid moves.", default="condition3"),
+        Key("band", Number("-", at_least=0.0, below=1.0),
+            "Relative frequency error to be robust to, for the profiles that can.",
+            default=0.05, example="0.05"),
+        Key("tolerance", Number("mm", above=0.0), "Residual that counts as settled.",
+            default=0.001, example="0.001"),
+        Key("minimum_length", Number("mm", at_least=0.0), "Shorter rapids are left alone.",
+            default=0.05, example="0.05"),
+        Key("max_extension", Number("-", at_least=0.0),
+            "How much longer a move may take where the limits make its conventional time "
+            "impossible, as a part of that time.", default=0.10, example="0.10"),
+    )
+)  # fmt: skip
+
+_PROGRAM = Section(
+    (
+        Key("start", _POSITIONS, "Where the axes are, in program coordinates.",
+            example="{X: 0, Y: 0, Z: 100}"),
+        Key("offsets", Table(
+            (
+                (r"G5[4-9](\.[1-9])?|G54\.1 ?P[1-9][0-9]{0,2}|G5(0[5-9]|[1-9][0-9])", _POSITIONS),
+                (r"H[0-9]{1,4}", _LENGTH),
+            ),
+            "a work offset such as G54 or a tool length such as H1",
+            ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3", "H1")),
+            "Work offsets, and tool lengths, that are known.",
+            example="{G54: {X: 10}, H1: 87.2}"),
+        Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*", "G-code words"),
+            "The codes in force when a program starts (LinuxCNC: RS274NGC_STARTUP_CODE).",
+            default="", example='"G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"'),
+    )
+)  # fmt: skip
+
+MACHINE: Final = Section(
+    (
+        Key("schema", Choice((str(SCHEMA_VERSION),)), "Version of this format.",
+            default=str(SCHEMA_VERSION), example="1"),
+        Key("name", _NAME, "What reports call the machine. Left out: the name of the file."),
+        Key("controller", _WORD, "What output is written for.", default="linuxcnc",
+            example="linuxcnc"),
+        Key("dialect", _WORD, "How programs are read: linuxcnc, fanuc, haas, siemens, "
+            "heidenhain-iso, grbl, mach, marlin, klipper or auto. Left out: the controller's own.",
+            example="linuxcnc"),
+        Key("units", Choice(("mm", "inch")), "Unit of the lengths in this file.", default="mm"),
+        Key("interval", Number("s", above=0.0, at_most=1.0), "The control command interval.",
+            required=True, example="0.001"),
+        Key("positioning", Choice(("linear", "independent")),
+            "linear: G0 is a straight line, all axes together; independent: each axis on its own.",
+            required=True),
+        Key("axes", Table(((_LETTERS, _AXIS),), _AXIS_NAMES, tuple(AXES), at_least=1),
+            "The axes.", required=True),
+        Key("modes", ListOf(
+            _mode(Table(((_LETTERS, Number("-")),), _AXIS_NAMES, tuple(AXES), at_least=1),
+                  "How strongly each axis excites the mode.", True), at_most=100),
+            "Structure modes, which several axes excite together."),
+        Key("design", _DESIGN, "How profiles are chosen."),
+        Key("program", _PROGRAM, "What a program may assume when it starts."),
+    )
+)  # fmt: skip

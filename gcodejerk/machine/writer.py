@@ -1,0 +1,118 @@
+"""A Machine as the text of a machine file.
+
+Rule: what is written reads back as an equal Machine. Everything is spelled out, defaults too, in
+mm; so the text is also the canonical form whose hash names a machine's settings.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+
+from gcodejerk.machine.model import Axis, Limits, Machine, Mode
+from gcodejerk.machine.table import SCHEMA_VERSION
+
+
+def machine_yaml(machine: Machine) -> str:
+    """Text that `Machine.loads` reads as the same machine.
+
+    Parameters
+    ----------
+    machine : Machine
+        As loaded; one made by hand must be one that a file could describe.
+
+    Returns
+    -------
+    str
+        YAML, in mm whatever the unit of the file was.
+    """
+    design, program = machine.design, machine.program
+    offsets = {name: _flow(values) for name, values in program.offsets.items()}
+    lengths = {f"H{number}": _number(value) for number, value in program.tool_lengths.items()}
+    return "\n".join(
+        [
+            f"schema: {SCHEMA_VERSION}",
+            f"name: {_text(machine.name)}",
+            f"controller: {_text(machine.controller)}",
+            f"dialect: {_text(machine.dialect)}",
+            "units: mm",
+            f"interval: {_number(machine.interval)}",
+            f"positioning: {machine.positioning}",
+            "axes:",
+            *(line for axis in machine.axes for line in _axis(axis)),
+            *_modes(machine.modes, ""),
+            "design:",
+            f"  profile: {design.profile}",
+            f"  band: {_number(design.band)}",
+            f"  tolerance: {_number(design.tolerance)}",
+            f"  minimum_length: {_number(design.minimum_length)}",
+            f"  max_extension: {_number(design.max_extension)}",
+            "program:",
+            f"  start: {_flow(program.start)}",
+            f"  offsets: {_braces(offsets | lengths)}",
+            f"  startup: {_text(program.startup)}",
+            "",
+        ]
+    )
+
+
+def _axis(axis: Axis) -> list[str]:
+    lines = [
+        f"  {axis.name}:",
+        f"    type: {'rotary' if axis.rotary else 'linear'}",
+        f"    diameter: {'true' if axis.diameter else 'false'}",
+        f"    resolution: {_number(axis.resolution)}",
+        f"    rapid: {_limits(axis.rapid)}",
+        f"    limit: {_limits(axis.limit)}",
+    ]
+    if axis.travel is not None:
+        lines.append(f"    travel: [{', '.join(map(_number, axis.travel))}]")
+    return lines + _modes(axis.modes, "    ", axis.name)
+
+
+def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> list[str]:
+    """Lines of the key `modes`; an axis's own modes give a number as participation."""
+    if not modes:
+        return [f"{indent}modes: []"]
+    lines = [f"{indent}modes:"]
+    for mode in modes:
+        values = {
+            "name": _text(mode.name),
+            "frequency": _number(mode.frequency),
+            "damping": _number(mode.damping),
+            "participation": _number(mode.participation_of(axis))
+            if axis
+            else _flow(dict(mode.participation)),
+        }
+        lines.append(f"{indent}  - {_braces(values)}")
+    return lines
+
+
+def _limits(limits: Limits) -> str:
+    """Limits in braces; an infinite jerk is written by leaving it out."""
+    values = {"velocity": limits.velocity, "acceleration": limits.acceleration}
+    if math.isfinite(limits.jerk):
+        values["jerk"] = limits.jerk
+    return _flow(values)
+
+
+def _flow(values: Mapping[str, float]) -> str:
+    return _braces({key: _number(value) for key, value in values.items()})
+
+
+def _braces(values: dict[str, str]) -> str:
+    return "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
+
+
+def _number(value: float) -> str:
+    """Shortest text that reads back as the same number, also for readers of YAML 1.1."""
+    return re.sub(r"^(-?\d+)e", r"\1.0e", repr(float(value)))
+
+
+def _text(text: str) -> str:
+    """Double-quoted scalar, which JSON and YAML write alike; simple words go without quotes."""
+    if re.fullmatch(r"(?!(true|false|yes|no|on|off|null)$)[a-z][a-z0-9_-]*", text):
+        return text
+    return json.dumps(text, ensure_ascii=False)
