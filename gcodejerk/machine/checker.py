@@ -75,7 +75,7 @@ class Checker:
         self.inch = isinstance(units, yaml.ScalarNode) and units.value == "inch"
         axes = self._peek(top.get("axes"))
         self.axes = frozenset(axes)
-        rotary = set()
+        rotary = set("ABC") - self.axes
         for name, axis in axes.items():
             kind = self._peek(axis).get("type")
             given = kind.value if isinstance(kind, yaml.ScalarNode) else None
@@ -113,7 +113,7 @@ class Checker:
             return self._wrong(node, path, what)
         keys = {key.name: key for key in kind.keys}
         values: dict[str, Any] = {}
-        given = set()
+        given: set[str] = set()
         for name, key_node, value_node in self._entries(node, path):
             if name in keys:
                 if not keys[name].required and _is_left_empty(value_node, keys[name].kind):
@@ -123,7 +123,10 @@ class Checker:
                 if value is not _MISSING:
                     values[name] = value
             else:
-                self._unknown(key_node, name, path, kind.names, f"known keys: {', '.join(keys)}")
+                known = f"known keys: {', '.join(keys)}"
+                meant = self._unknown(key_node, name, path, kind.names, known)
+                # Whoever misspells a key did not forget it.
+                given.update(filter(None, [meant]))
         for key in kind.keys:
             if key.required and key.name not in given:
                 self._missing(node, key, path)
@@ -179,13 +182,12 @@ class Checker:
         value = float(text.replace("_", ""))
         if unit.startswith("inch"):
             value = mm_from_inch(value)
-        if abs(value) > kind.at_most:
-            own = kind.unit if unit.startswith("inch") else unit
-            return self._wrong(
-                node, path, f"at most {kind.at_most:g} [{own}]", f"check the unit: {unit}"
-            )
         if not kind.holds(value):
             return self._wrong(node, path, expected)
+        plausible = kind.plausible(value)
+        if plausible is not None:
+            own = kind.unit if unit.startswith("inch") else unit
+            return self._wrong(node, path, f"{plausible} [{own}]", f"the unit here is {unit}")
         return value
 
     def _flag(self, node: yaml.Node, path: KeyPath) -> Any:
@@ -227,11 +229,13 @@ class Checker:
 
     def _unknown(
         self, node: yaml.Node, name: str, path: KeyPath, known: tuple[str, ...], remedy: str
-    ) -> None:
+    ) -> str | None:
+        """Tell of an unknown key; gives the known one that was probably meant."""
         close = nearest(name, known)
         hint = f", the nearest known key is {close!r}" if close else ""
         label = dotted((*path, name[:80]))
         self.problems.add(self.document.place(node), f"{label} is not a known key{hint}", remedy)
+        return close
 
     def _missing(self, node: yaml.Node, key: table.Key, path: KeyPath) -> None:
         match key.kind:

@@ -45,7 +45,7 @@ def load_text(text: str, name: str) -> Machine:
     values = checker.read()
     _check_axis_types(values, checker)
     _check_frequencies(values, checker)
-    _check_axes_exist(values, checker)
+    _check_participations(values, checker)
     problems.raise_any()
     return _machine(values, name, checker)
 
@@ -89,26 +89,23 @@ def _modes(values: dict[str, Any]) -> list[tuple[KeyPath, dict[str, Any]]]:
     return found + [(("modes", i), mode) for i, mode in values.get("modes", {}).items()]
 
 
-def _check_axes_exist(values: dict[str, Any], checker: Checker) -> None:
-    """Whatever is said of an axis must be said of one that the machine has."""
+def _check_participations(values: dict[str, Any], checker: Checker) -> None:
+    """Refuse structure modes that an axis excites which is not there."""
+    # program.start and program.offsets may name any axis: the program may move one that the file
+    # does not describe, and where it stands is still worth knowing.
     if "axes" not in values:
         return
-    program = values.get("program", {})
-    named: list[KeyPath] = [("program", "start", axis) for axis in program.get("start", ())]
-    for offset, value in program.get("offsets", {}).items():
-        if isinstance(value, dict):
-            named += [("program", "offsets", offset, axis) for axis in value]
-    for i, mode in values.get("modes", {}).items():
-        named += [("modes", i, "participation", axis) for axis in mode.get("participation", ())]
     has = [axis for axis in AXES if axis in checker.axes]
-    for path in named:
-        if path[-1] not in has:
-            checker.problems.add(
-                checker.key_place(path),
-                f"{dotted(path)} is about axis {path[-1]}, which the machine does not have; "
-                f"it has {', '.join(has)}",
-                f"leave it out, or add axes.{path[-1]}",
-            )
+    for i, mode in values.get("modes", {}).items():
+        path: KeyPath = ("modes", i, "participation")
+        for axis in mode.get("participation", ()):
+            if axis not in has:
+                checker.problems.add(
+                    checker.key_place((*path, axis)),
+                    f"{dotted((*path, axis))} is about axis {axis}, which the machine does not "
+                    f"have; it has {', '.join(has)}",
+                    f"leave it out, or describe axes.{axis}",
+                )
 
 
 def _machine(values: dict[str, Any], name: str, checker: Checker) -> Machine:

@@ -45,17 +45,26 @@ class Number:
     above: float | None = None
     at_least: float | None = None
     below: float | None = None
+    smallest: float = 1e-9
+    """Nothing on a machine is smaller, where zero is excluded: a slip in the exponent."""
     at_most: float = 1e15
-    """Nothing on a machine is larger, and products of such numbers stay finite."""
+    """Nothing on a machine is larger."""
 
     def holds(self, value: float) -> bool:
         """Whether a number lies within the bounds."""
         return (
-            abs(value) <= self.at_most
-            and (self.above is None or value > self.above)
+            (self.above is None or value > self.above)
             and (self.at_least is None or value >= self.at_least)
             and (self.below is None or value < self.below)
         )
+
+    def plausible(self, value: float) -> str | None:
+        """Words for the end that a number is beyond though it is within the bounds, if any."""
+        if abs(value) > self.at_most:
+            return f"at most {self.at_most:g}"
+        if self.above == 0.0 and 0.0 < value < self.smallest:
+            return f"at least {self.smallest:g}"
+        return None
 
     def expected(self, unit: str) -> str:
         """Words of a message for what should stand there."""
@@ -195,7 +204,7 @@ _AXIS = Section(
     (
         Key("type", Choice(("linear", "rotary")),
             "Whether the axis slides [mm] or turns [deg]. Left out: A, B and C turn."),
-        Key("diameter", Flag(), "Programs give diameters of this axis (a lathe's X).",
+        Key("diameter", Flag(), "Programs give diameters of this axis (a lathe's X); this file always gives radii.",
             default=False),
         Key("resolution", Number("mm", above=0.0), "The smallest step that is written.",
             default=1e-4, example="1.0e-4"),
@@ -258,13 +267,14 @@ MACHINE: Final = Section(
             "heidenhain-iso, grbl, mach, marlin, klipper or auto. Left out: the controller's own.",
             example="linuxcnc"),
         Key("units", Choice(("mm", "inch")), "Unit of the lengths in this file.", default="mm"),
-        Key("interval", Number("s", above=0.0, at_most=1.0), "The control command interval.",
+        Key("interval", Number("s", above=0.0, smallest=1e-6, at_most=1.0), "The control command interval.",
             required=True, example="0.001"),
         Key("positioning", Choice(("linear", "independent")),
             "linear: G0 is a straight line, all axes together; independent: each axis on its own.",
             required=True),
         Key("axes", Table(((_LETTERS, _AXIS),), _AXIS_NAMES, tuple(AXES), at_least=1),
-            "The axes.", required=True),
+            "The axes that the machine has.", required=True,
+            example="{Z: {rapid: {velocity: 600, acceleration: 5000}}}"),
         Key("modes", ListOf(
             _mode(Table(((_LETTERS, Number("-")),), _AXIS_NAMES, tuple(AXES), at_least=1),
                   "How strongly each axis excites the mode.", True), at_most=100),
