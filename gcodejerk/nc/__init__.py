@@ -1,0 +1,25 @@
+"""The program as written: words, blocks, modal groups, rapids. Knows no physics and no machine."""
+
+from __future__ import annotations
+
+from gcodejerk.nc.block import Block, Word
+from gcodejerk.nc.dialect import AXES, DIALECTS, Dialect
+from gcodejerk.nc.program import Finding, Program, Start, parse_block, read_program, trace
+from gcodejerk.nc.rapids import CERTAIN, REASONS, Rapids
+
+__all__ = [
+    "AXES",
+    "CERTAIN",
+    "DIALECTS",
+    "REASONS",
+    "Block",
+    "Dialect",
+    "Finding",
+    "Program",
+    "Rapids",
+    "Start",
+    "Word",
+    "parse_block",
+    "read_program",
+    "trace",
+]

@@ -1,0 +1,49 @@
+"""One line of a program as seen by the careful tokenizer: its words, comments and oddities.
+
+Rule: a block is what is written, not what it means. Meaning needs the modal state (`modal.py`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A letter with its number, for example ``X-1.5``."""
+
+    letter: str
+    """Address, upper case."""
+    value: float | None
+    """None where the number is an expression or a variable."""
+    begin: int
+    """The word is ``line[begin:end]``."""
+    end: int
+    text: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A line: its words in the order written, and what else stands on it."""
+
+    words: tuple[Word, ...] = ()
+    comments: tuple[tuple[int, int], ...] = ()
+    """Spans of the comments, brackets or semicolon included."""
+    block_delete: bool = False
+    o_word: str | None = None
+    """What follows an O number or name, for example ``endif``; empty after a bare one."""
+    o_name: str = ""
+    percent: bool = False
+    """The line is a lone ``%``."""
+    assigns: tuple[str, ...] = ()
+    """Targets of assignments, for example ``1`` or ``<depth>``; empty text where computed."""
+    rest: bytes = b""
+    """What follows the place of the problem, unread."""
+    problem: str | None = None
+    column: int | None = None
+    """Where the problem is, counted from 1."""
+
+    @property
+    def o_word_flag(self) -> bool:
+        """Whether the line is an O-word line."""
+        return self.o_word is not None

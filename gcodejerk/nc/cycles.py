@@ -1,0 +1,72 @@
+"""Where a canned cycle leaves the tool: G73, G74, G76 and G81 to G89.
+
+Rule: only the end matters here; what a cycle does on the way down belongs to the controller. As
+in LinuxCNC: the tool goes to the hole, then to R, drills to Z, and comes back to R (G99) or to where
+the series of cycles began, if that is higher (G98). In G91, R counts from where the tool stands, Z
+from R, and every repeat (L) moves on by the same increments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gcodejerk.nc.dialect import AXES, PLANES
+from gcodejerk.nc.modal import NAN, State
+
+
+def run_cycle(state: State, code: int, values: Mapping[str, float]) -> bool:
+    """Execute one block of a cycle.
+
+    Returns
+    -------
+    bool
+        Whether the block is complete; False where the controller would refuse it.
+    """
+    if state.plane is None or code == 760:
+        state.forget_positions()
+        state.put("cycle", None)
+        return True
+    plane = PLANES[state.plane]
+    first, second, along = (AXES.index(axis) for axis in plane)
+    series = state.cycle is not None
+    sticky = state.cycle if state.cycle is not None and state.cycle[0] == code else None
+    if sticky is None and not ("R" in values and plane[2] in values):
+        if state.cycle is not None or state.motion not in (code, None):
+            return False
+        sticky = (code, NAN, NAN)  # in force since somewhere that we could not follow
+    depth = values.get(plane[2], sticky[1] if sticky else NAN)
+    clearance = values.get("R", sticky[2] if sticky else NAN)
+    repeats = values.get("L", 1.0)
+    if repeats <= 0 or any(axis in values for axis in AXES if axis not in plane):
+        return False
+    state.put("cycle", (code, depth, clearance))
+
+    here = state.position[along]
+    if not series:
+        state.put("cycle_level", here)
+    scale = state.scale(along)
+    incremental = state.distance == 910
+    r = clearance * scale + (here if incremental else 0.0)
+    if state.distance is None:
+        r = NAN
+    level = state.cycle_level
+    if series and incremental:
+        level = NAN  # not measured: where a series in G91 takes its level from
+    # max() with a NaN would return either operand
+    above = NAN if level != level or r != r else max(level, r)
+    end = r if state.retract == 990 else above if state.retract == 980 else NAN
+    for axis in (first, second):
+        if AXES[axis] in values:
+            value = values[AXES[axis]] * state.scale(axis)
+            if state.distance == 900:
+                state.move(axis, value)
+            elif incremental:
+                state.move(axis, state.position[axis] + repeats * value)
+            else:
+                state.move(axis, NAN)
+    if series and state.cycle_level != state.cycle_level:
+        end = end if state.retract == 990 else NAN
+    if not series and here < r:
+        state.put("cycle_level", r)
+    state.move(along, end)
+    return True

@@ -1,0 +1,110 @@
+"""Coordinate frames: G43/G49, G54 to G59.3, G92 and its kin, G52 and G10.
+
+Rule: program = machine - (system + G92 + tool length). A change of one of the three moves no axis
+but renames where it stands, by exactly the change; where the change is not known, neither is the
+new name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gcodejerk.nc.dialect import AXES
+from gcodejerk.nc.modal import NAN, State
+
+Values = Mapping[str, float]
+"""Letter -> value of the words of a block; NaN for an expression."""
+
+
+def _rename(state: State, field: str, after: list[float]) -> None:
+    """Give one of the three offsets new values and every axis its new name."""
+    before = getattr(state, field)
+    state.put(field, after)
+    for axis, (old, new) in enumerate(zip(before, after, strict=True)):
+        if old != new:
+            state.move(axis, state.position[axis] + (old - new))
+
+
+def tool_length(state: State, code: int, values: Values, lengths: Mapping[int, float]) -> None:
+    """G43, G43.1, G43.2 and G49."""
+    unknown = [NAN] * len(AXES)
+    if code == 490:
+        _rename(state, "tool", [0.0] * len(AXES))
+    elif code == 430:
+        number = values.get("H", NAN)
+        length = lengths.get(int(number)) if number == number else None
+        # A table may hold offsets of every axis; a length that the user states is all there is.
+        after = unknown if length is None else [0.0] * len(AXES)
+        if length is not None:
+            after[AXES.index("Z")] = length
+        _rename(state, "tool", after)
+    else:
+        _rename(state, "tool", unknown)
+
+
+def select_system(state: State, code: int) -> None:
+    """G54 to G59.3."""
+    if state.system == code:
+        return
+    state.put("system", code)
+    if state.rotates:
+        state.put("rotated", None)
+        state.forget_positions()
+    _rename(state, "g5x", state.offsets.get(code, [NAN] * len(AXES)))
+
+
+def set_g92(state: State, code: int, values: Values) -> None:
+    """G92, G92.1, G92.2 and G92.3."""
+    if code in (921, 922):
+        _rename(state, "g92", [0.0] * len(AXES))
+    elif code == 923:
+        _rename(state, "g92", [NAN] * len(AXES))
+    else:
+        after = list(state.g92)
+        for axis, letter in enumerate(AXES):
+            if letter in values:
+                named = values[letter] * state.scale(axis)
+                after[axis] += state.position[axis] - named
+                state.move(axis, named)
+        state.put("g92", after)
+        if state.rotates:
+            state.forget_positions()
+
+
+def set_local(state: State, values: Values) -> None:
+    """G52: an offset given outright, kept where G92 keeps its own."""
+    after = list(state.g92)
+    for axis, letter in enumerate(AXES):
+        if letter in values:
+            after[axis] = values[letter] * state.scale(axis)
+            if state.g92[axis] != state.g92[axis]:
+                state.move(axis, NAN)
+    _rename(state, "g92", after)
+    if state.rotates:
+        state.forget_positions()
+
+
+def write_table(state: State, values: Values, lengths: dict[int, float]) -> None:
+    """G10: data of a tool or of a coordinate system."""
+    kind, number = values.get("L", NAN), values.get("P", NAN)
+    if kind in (1, 10, 11):
+        lengths.clear()
+        return
+    code = 530 + int(number) * 10 if 1 <= number <= 6 else 584 + int(number) if number >= 7 else 0
+    if code:
+        state.offsets.pop(code, None)
+    else:
+        state.offsets = {}
+    if code and state.system is not None and code != state.system:
+        if "R" in values:
+            state.put("rotates", True)
+        return
+    state.put("g5x", [NAN] * len(AXES))
+    state.forget_positions(
+        range(len(AXES))
+        if "R" in values or state.rotates or kind not in (2, 20)
+        else [axis for axis, letter in enumerate(AXES) if letter in values]
+    )
+    if "R" in values:
+        state.put("rotates", True)
+        state.put("rotated", False if values["R"] == 0 and kind == 2 else None)

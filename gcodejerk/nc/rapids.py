@@ -1,0 +1,186 @@
+"""The rapids of a program as columns, and the log that they are collected in.
+
+Rule: a rapid's F word matters only if a later block uses it before a new one is certain to come.
+That is known only later, so the log keeps the rapids since the last such block waiting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.nc.dialect import AXES
+from gcodejerk.nc.modal import State
+from gcodejerk.reasons import Reason
+
+REASONS = tuple(Reason)
+CERTAIN = 255
+"""Entry of `Rapids.reason` for a rapid whose start, end and path are known."""
+_INDEX = {reason: index for index, reason in enumerate(REASONS)}
+FEED_UNKNOWN = _INDEX[Reason.FEED_UNKNOWN]
+NO_FEED, USES_FEED, GIVES_FEED = 0, 1, 2
+"""What a block means for an F word in front of it: nothing, it may be used, it is replaced."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rapids:
+    """The rapids of a program; entry i of every array is rapid i, in the order of the file."""
+
+    line: NDArray[np.int64]
+    """Of the block, counted from 1."""
+    begin: NDArray[np.int64]
+    """The block is the file's bytes begin:end, without its line end."""
+    end: NDArray[np.int64]
+    terminator: NDArray[np.uint8]
+    """0 none (last line), 1 LF, 2 CR LF, 3 CR."""
+    start: NDArray[np.float64]
+    """Shape (n, 9), program coordinates [mm, deg]; NaN where unknown."""
+    target: NDArray[np.float64]
+    """Shape (n, 9), program coordinates [mm, deg]; the start's value where no axis moves."""
+    words: NDArray[np.uint16]
+    """Bit k set: a word for AXES[k] stands in the block."""
+    reason: NDArray[np.uint8]
+    """255 certain, else an index into tuple(Reason)."""
+    inch: NDArray[np.bool_]
+    incremental: NDArray[np.bool_]
+    diameter: NDArray[np.bool_]
+    distance_stated: NDArray[np.bool_]
+    """G90 or G91 was stated, not taken from the dialect's default."""
+    feed_mode: NDArray[np.uint8]
+    """93, 94, 95, or 0 unknown; after the block's own words."""
+    feed_mode_stated: NDArray[np.bool_]
+    feed: NDArray[np.float64]
+    """F in force after the block, in the program's own unit; NaN unknown."""
+    feed_needed: NDArray[np.bool_]
+    """A later block may use F before a new one is certain to be given."""
+    path: NDArray[np.uint8]
+    """61, 62 (G61.1), 64, or 0 unknown; after the block's own words."""
+    path_p: NDArray[np.float64]
+    """P and Q of G64 in the program's own unit, NaN absent."""
+    path_q: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    """Shape (n, 9): machine = program + offset [mm, deg]; NaN where unknown."""
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+_TYPES: dict[str, tuple[type, int]] = {
+    **{name: (np.int64, 0) for name in ("line", "begin", "end")},
+    **{name: (np.uint8, 0) for name in ("terminator", "reason", "feed_mode", "path")},
+    **{name: (np.float64, len(AXES)) for name in ("start", "target", "offset")},
+    **{name: (np.float64, 0) for name in ("feed", "path_p", "path_q")},
+    "words": (np.uint16, 0),
+    **{
+        name: (np.bool_, 0)
+        for name in (
+            *("inch", "incremental", "diameter", "distance_stated"),
+            *("feed_mode_stated", "feed_needed"),
+        )
+    },
+}
+
+
+def common_columns(state: State) -> dict[str, object]:
+    """Fill the columns that depend on the modal state alone."""
+    unknown: list[float] = [state.shift(axis) for axis in range(len(AXES))]
+    return {
+        "inch": state.unit is not None and state.unit != 1.0,
+        "incremental": state.distance == 910,
+        "diameter": bool(state.diameter),
+        "distance_stated": state.distance_stated,
+        "feed_mode": state.feed_mode or 0,
+        "feed_mode_stated": state.feed_mode_stated,
+        "path": state.path or 0,
+        "path_p": state.path_p,
+        "path_q": state.path_q,
+        "offset": unknown,
+    }
+
+
+class RapidLog:
+    """Collects rapids in the order of the file."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, list[NDArray[np.generic]]] = {name: [] for name in _TYPES}
+        self._rows: list[dict[str, object]] = []
+        self._needed: list[NDArray[np.bool_]] = []
+        self._waiting = 0
+        self.count = 0
+
+    def feed_event(self, event: int) -> None:
+        """Settle the rapids that wait for a block that uses or replaces F."""
+        if event and self._waiting:
+            self._needed.append(np.full(self._waiting, event == USES_FEED))
+            self._waiting = 0
+
+    def add(self, reason: Reason | None, row: dict[str, object]) -> None:
+        """Add one rapid."""
+        row["reason"] = CERTAIN if reason is None else _INDEX[reason]
+        self._rows.append(row)
+        self._waiting += 1
+        self.count += 1
+        if len(self._rows) >= 4096:
+            self._flush()
+
+    def add_many(
+        self, columns: dict[str, object], events: NDArray[np.uint8], lines: NDArray[np.intp]
+    ) -> None:
+        """Add the rapids of a run of lines.
+
+        Parameters
+        ----------
+        columns : dict
+            Per column an array, or one value for all.
+        events : ndarray
+            What each line of the run means for F.
+        lines : ndarray
+            Index into the run of each rapid.
+        """
+        at = np.flatnonzero(events)
+        if len(at):
+            self.feed_event(int(events[at[0]]))
+            following = np.searchsorted(at, lines, side="right")
+            settled = following[following < len(at)]
+            self._needed.append(events[at[settled]] == USES_FEED)
+            self._waiting = len(lines) - len(settled)
+        else:
+            self._waiting += len(lines)
+        if not len(lines):
+            return
+        self.count += len(lines)
+        self._flush()
+        for name, value in columns.items():
+            dtype, width = _TYPES[name]
+            shape = (len(lines), width) if width else (len(lines),)
+            self._parts[name].append(np.broadcast_to(np.asarray(value, dtype=dtype), shape))
+
+    def _flush(self) -> None:
+        if not self._rows:
+            return
+        for name in self._parts:
+            if name != "feed_needed":
+                dtype, _ = _TYPES[name]
+                self._parts[name].append(np.array([row[name] for row in self._rows], dtype=dtype))
+        self._rows = []
+
+    def finish(self) -> Rapids:
+        """All rapids, with what only the whole program tells."""
+        self._flush()
+        self._needed.append(np.zeros(self._waiting, dtype=np.bool_))
+        self._parts["feed_needed"] = list(self._needed)
+        columns: dict[str, NDArray[Any]] = {}
+        for name, (dtype, width) in _TYPES.items():
+            parts = self._parts.pop(name)
+            empty: NDArray[np.generic] = np.empty((0, width) if width else 0, dtype=dtype)
+            columns[name] = np.concatenate([empty, *parts]).astype(dtype, copy=False)
+        # In G93 every feed move carries its own F.
+        mode, feed = columns["feed_mode"], columns["feed"]
+        unknown = (mode == 0) | ((mode != 93) & columns["feed_needed"] & np.isnan(feed))
+        reason = columns["reason"]
+        reason[(reason == CERTAIN) & unknown] = FEED_UNKNOWN
+        assert set(columns) == {f.name for f in fields(Rapids)}
+        return Rapids(**columns)
