@@ -204,8 +204,8 @@ _AXIS = Section(
     (
         Key("type", Choice(("linear", "rotary")),
             "Whether the axis slides [mm] or turns [deg]. Left out: A, B and C turn."),
-        Key("diameter", Flag(), "Programs give diameters of this axis (a lathe's X); this file always gives radii.",
-            default=False),
+        Key("diameter", Flag(), "Programs give diameters of this axis (a lathe's X). "
+            "This file gives radii all the same.", default=False),
         Key("resolution", Number("mm", above=0.0), "The smallest step that is written.",
             default=1e-4, example="1.0e-4"),
         Key("rapid", _limits(True, "of the controller's own G0"),
@@ -267,8 +267,8 @@ MACHINE: Final = Section(
             "heidenhain-iso, grbl, mach, marlin, klipper or auto. Left out: the controller's own.",
             example="linuxcnc"),
         Key("units", Choice(("mm", "inch")), "Unit of the lengths in this file.", default="mm"),
-        Key("interval", Number("s", above=0.0, smallest=1e-6, at_most=1.0), "The control command interval.",
-            required=True, example="0.001"),
+        Key("interval", Number("s", above=0.0, smallest=1e-6, at_most=1.0),
+            "The control command interval.", required=True, example="0.001"),
         Key("positioning", Choice(("linear", "independent")),
             "linear: G0 is a straight line, all axes together; independent: each axis on its own.",
             required=True),

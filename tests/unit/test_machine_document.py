@@ -1,0 +1,131 @@
+import os
+
+import pytest
+
+from gcodejerk.machine import Machine, MachineFileError
+from gcodejerk.machine.document import MOST_BYTES
+
+
+def first_line(text):
+    with pytest.raises(MachineFileError) as caught:
+        Machine.loads(text, "mill.yaml")
+    return str(caught.value).splitlines()[0]
+
+
+def refusal_of(path):
+    with pytest.raises(MachineFileError) as caught:
+        Machine.load(path)
+    return str(caught.value).replace(str(path), "mill.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("", "mill.yaml:1:1: is empty, expected a machine"),
+        ("# nothing but a comment\n", "mill.yaml:1:1: is empty, expected a machine"),
+        ("- a\n", "mill.yaml:1:1: the file is [a], expected a mapping with the keys schema, "),
+        ("G0 X1\n", "mill.yaml:1:1: the file is 'G0 X1', expected a mapping with the keys "),
+        ("a: 1\nb: [1, 2\n", "mill.yaml:3:1: is not YAML: did not find expected ',' or ']'"),
+        ("a: b: c\n", "mill.yaml:1:5: is not YAML: mapping values are not allowed"),
+        ("a: *b\n", "mill.yaml:1:4: is not YAML: found undefined alias"),
+        ("---\na: 1\n---\nb: 2\n", "mill.yaml:3:1: is not YAML: but found another document"),
+        ("a: 1\nb: x\0y\n", "mill.yaml:2:5: holds the control character 0x00"),
+        ("a: \ufffe\n", "mill.yaml:1:4: holds the character"),
+        ("a: !!python/object/apply:os.system [ls]\n",
+         "mill.yaml:1:4: the tag '!!python/object/apply:os.system' is not allowed"),
+        ("a: !secret x\n", "mill.yaml:1:4: the tag '!secret' is not allowed"),
+        ("axes:\n  <<: 5\n", "mill.yaml:2:7: a merge key (<<) stands before something that"),
+        ("axes: &a {<<: *a}\n", "mill.yaml:1:7: merge keys (<<) expand to more than"),
+        ("a: " + "[" * 100_000, "mill.yaml:1:23: holds more than 20000 values, 1000 aliases or"),
+        ("a: [" + "1," * 30_000 + "]", "mill.yaml:1:"),
+    ],
+)  # fmt: skip
+def test_a_text_that_is_no_machine_file_is_refused_at_its_place(text, line):
+    assert first_line(text).startswith(line)
+
+
+def test_a_tab_is_named_in_the_remedy():
+    with pytest.raises(MachineFileError) as caught:
+        Machine.loads("axes:\n\tX: 1\n", "mill.yaml")
+    assert caught.value.place.line == 2
+    assert caught.value.remedy == "this line holds a tab; indent with spaces"
+
+
+LAUGHS = "a0: &a0 [lol, lol]\n" + "".join(
+    f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 30)
+)
+MERGED_LAUGHS = "a0: &a0 {x: 1}\n" + "".join(
+    f"a{n}: &a{n}\n  <<: [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 15)
+)
+MANY_MODES = "modes: [" + "&m {frequency: 5}, " + "*m, " * 900 + "]\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        LAUGHS,
+        MERGED_LAUGHS,
+        MERGED_LAUGHS + "<<: *a14\n",
+        "axes: *x\n" + LAUGHS,
+        MANY_MODES,
+        "? " * 300_000,
+        "- " * 300_000,
+        "{a: " * 200_000,
+        "a: &b [*b]\naxes: *b\n",
+        "".join(f"k{n}: 1\n" for n in range(9_000)),
+        "a: '" + "x" * 900_000,
+        "9" * 900_000,
+        "interval: " + "9" * 900_000,
+        "interval: " + "1e" * 400_000,
+        "name: " + "x" * 900_000,
+        "x" * 500_000 + ": 1",
+        "&" * 900_000,
+        ":" * 900_000,
+        "\n" * 900_000,
+        "#" * 900_000,
+    ],
+    ids=lambda text: text[:12].strip(),
+)
+def test_a_hostile_text_is_refused_without_being_expanded(text):
+    # Without the bounds some of these take hours and all memory: this test would not end.
+    message = first_line(text)
+    assert message.startswith("mill.yaml")
+    assert len(message) < 1000
+
+
+def test_a_file_that_is_missing_is_refused(tmp_path):
+    path = tmp_path / "none.yaml"
+    assert refusal_of(path).startswith("mill.yaml: there is no such file\n")
+
+
+def test_a_directory_is_refused(tmp_path):
+    assert refusal_of(tmp_path).startswith("mill.yaml: is a directory, expected a machine file\n")
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0, reason="everything is readable for root"
+)
+def test_an_unreadable_file_is_refused(tmp_path):
+    path = tmp_path / "secret.yaml"
+    path.write_text("axes: {}\n")
+    path.chmod(0)
+    assert refusal_of(path).startswith("mill.yaml: cannot be read: Permission denied\n")
+
+
+@pytest.mark.parametrize(
+    ("data", "start"),
+    [
+        (b"", "mill.yaml:1:1: is empty"),
+        (b"\xef\xbb\xbf", "mill.yaml:1:1: is empty"),
+        (b"\xff\xfea\x00:\x00", "mill.yaml:1:1: is UTF-16 or UTF-32 text"),
+        ("axes: {}".encode("utf-16-be"), "mill.yaml:1:1: holds the control character 0x00"),
+        (b"a: 1\nname: M\xfcller\n", "mill.yaml:2:8: byte 0xFC is not UTF-8 text"),
+        (b"\x7fELF\x02\x01\x01", "mill.yaml:1:1: holds the control character 0x7F"),
+        (b"\x89PNG\r\n\x1a\n", "mill.yaml:1:1: byte 0x89 is not UTF-8 text"),
+        (b"#" * (MOST_BYTES + 1), "mill.yaml: is larger than 1 MiB"),
+    ],
+)
+def test_a_file_that_is_no_text_is_refused(tmp_path, data, start):
+    path = tmp_path / "mill.yaml"
+    path.write_bytes(data)
+    assert refusal_of(path).startswith(start)
