@@ -32,3 +32,4 @@ class Reason(enum.StrEnum):
     TOO_SHORT = "shorter than minimum_length"
     BEYOND_TRAVEL = "beyond travel"
     LIMITS = "limits cannot be met"
+    NOT_BETTER = "no profile within the limits is better"

@@ -1,0 +1,37 @@
+"""Motion: profiles, residual vibration, the design of Condition III, sampling and rounding.
+
+Numbers in, arrays out: nothing here knows a file, a machine or a program. A move is described by its
+*unit law*, a rest-to-rest motion from 0 to 1; an axis sees it scaled by its own displacement, so
+that limits divided by displacements are the limits of the law, and one design serves all axes of a
+straight line.
+"""
+
+from gcodejerk.motion.condition3 import design_condition3, design_four_segments, four_segment_range
+from gcodejerk.motion.laws import Laws, conventional_laws
+from gcodejerk.motion.residual import (
+    laws_response,
+    mode_poles,
+    polyline_response,
+    residual_acceleration,
+    residual_displacement,
+)
+from gcodejerk.motion.rounding import round_positions
+from gcodejerk.motion.sampling import Grid, knots_response, sample_laws, sampled_response
+
+__all__ = [
+    "Grid",
+    "Laws",
+    "conventional_laws",
+    "design_condition3",
+    "design_four_segments",
+    "four_segment_range",
+    "knots_response",
+    "laws_response",
+    "mode_poles",
+    "polyline_response",
+    "residual_acceleration",
+    "residual_displacement",
+    "round_positions",
+    "sample_laws",
+    "sampled_response",
+]

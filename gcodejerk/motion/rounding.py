@@ -1,0 +1,104 @@
+r"""Rounding of positions to the machine's resolution, without shaking it.
+
+Plain rounding adds noise of all frequencies, the modes' own among them. Here each rounding error is
+fed back: a running sum per mode says how the errors made so far will still ring at this moment,
+and the next position is rounded so that the sum shrinks. It is a noise shaper whose loop filter is the
+modes themselves, so it has its zeros at their poles, damping included, for any number of modes.
+
+Rule 1: a rounded position is one of the two neighbours of the exact one: the error stays below one
+step, whatever the modes.
+Rule 2: a rounded move never goes backwards and never passes its end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gcodejerk.motion.laws import Array
+from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.sampling import Counts, Grid
+
+MINIMUM_STEPS = 4.0
+"""A move of fewer steps than this has no room between its ends."""
+
+
+def round_positions(
+    positions: Array, grid: Grid, step: Array, origin: Array, poles: Complex, weights: Array
+) -> Counts:
+    r"""Positions as whole steps from an origin, their noise kept away from the modes.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n, k)
+        Exact positions of one axis at the grid's knots, monotone in each row. [mm]
+    grid : Grid
+        When they are written.
+    step : ndarray, shape (n,)
+        The smallest step that is written. [mm]
+    origin : ndarray, shape (n,)
+        Where the steps are counted from. [mm]
+    poles : ndarray of complex, shape (m,)
+        Of the modes that the axis excites. [rad/s]
+    weights : ndarray, shape (m,)
+        Their participation. [-]
+
+    Returns
+    -------
+    ndarray of int, shape (n, k)
+        Whole steps. The first and last column are the nearest to the exact ends, which are
+        written as the program gave them, not from here.
+
+    Notes
+    -----
+    With :math:`z = e^{\lambda \tau}` for the time :math:`\tau` between two knots and e the errors, a
+    mode keeps :math:`R = \sum_i e_i z^{k-i}`, times a constant. Choosing between the two neighbours the one
+    with the smaller weighted sum of :math:`|R|^2` is rounding of :math:`x - \mathrm{Re}\,\overline{z R}`.
+    """
+    n, k = positions.shape
+    # Rows in order of length, so that those under way in a column are the first ones.
+    order = np.argsort(-grid.blocks, kind="stable")
+    direction = np.where(positions[order, -1] >= positions[order, 0], 1.0, -1.0)
+    scale = direction / step[order]
+    x = (positions[order] - origin[order, np.newaxis]) * scale[:, np.newaxis]
+    tolerance = 1e-6
+    previous = np.ceil(x[:, 0] - tolerance)
+    last = np.floor(x[:, -1] + tolerance)
+    share = _shares(poles, weights)
+    running = np.zeros((n, len(poles)), dtype=np.complex128)
+    out = np.rint(x)
+    blocks = grid.blocks[order]
+    duration = np.diff(grid.knots, axis=1)[order]
+    usual = int(np.median(duration[:, -1])) if n else 1
+    step_phase = np.exp(poles * usual * grid.interval)
+    under_way = np.searchsorted(-blocks, -np.arange(k - 1, 0, -1), side="right")
+    for column in range(1, k - 1):
+        m = under_way[column - 1]
+        if m == 0:
+            continue
+        exact = x[:m, column]
+        ringing = running[:m] * step_phase
+        long = duration[:m, column - 1] != usual
+        if long.any():
+            phase = poles * (duration[:m, column - 1][long, np.newaxis] - usual) * grid.interval
+            ringing[long] *= np.exp(phase)
+        below = np.floor(exact + tolerance)
+        rounded = np.floor(exact + 0.5 - ringing.real @ share)
+        rounded = np.minimum(np.maximum(rounded, below), np.ceil(exact - tolerance))
+        rounded = np.minimum(np.maximum(rounded, previous[:m]), last[:m])
+        running[:m] = ringing + (rounded - exact)[:, np.newaxis]
+        previous[:m] = rounded
+        out[:m, column] = rounded
+    whole = np.empty((n, k), dtype=np.int64)
+    whole[order] = (out * direction[:, np.newaxis]).astype(np.int64)
+    return whole
+
+
+def _shares(poles: Complex, weights: Array) -> Array:
+    """What each mode has to say, as shares of 1: the square of what an error does to it.
+
+    An error of the position is a second difference of the acceleration's integral, so it moves a
+    mode by a part that grows with the frequency.
+    """
+    say: Array = (np.abs(weights) * np.abs(poles)) ** 2
+    total = say.sum()
+    return say / total if total > 0.0 else say

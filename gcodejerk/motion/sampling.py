@@ -1,0 +1,162 @@
+"""Samples of laws at the command interval, many laws at once.
+
+This module owns the layout of sampled moves: a matrix with one move a row, *aligned at its end*, so
+that the last column is every move's arrival, the column before it one step earlier, and a short
+move begins far to the right. What counts is the time that is left for a vibration until arrival, and
+that is the same in a whole column: a residual is one product of matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.residual import Complex
+
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """The moments at which moves are written, as whole intervals since each move's start.
+
+    Attributes
+    ----------
+    counts : ndarray of int, shape (n,)
+        Duration of each move. [intervals]
+    knots : ndarray of int, shape (n, k)
+        Written moments, aligned at the end: ``knots[i, -1] == counts[i]``. A row with fewer than k
+        moments has zeros in front: the move has not begun. [intervals]
+    interval : float
+        Command interval. [s]
+    """
+
+    counts: Counts
+    knots: Counts
+    interval: float
+
+    @classmethod
+    def every(cls, counts: Counts, stride: int, interval: float) -> Grid:
+        """Moments `stride` intervals apart.
+
+        What the division leaves over lengthens the block in the middle of the move, where the
+        velocity is nearly constant.
+
+        Examples
+        --------
+        >>> Grid.every(np.array([4, 7]), 2, 0.001).knots.tolist()
+        [[0, 0, 2, 4], [0, 2, 5, 7]]
+        """
+        blocks = np.maximum(counts // stride, 1)
+        rest = counts - blocks * stride
+        width = int(blocks.max(initial=1)) + 1
+        block = np.arange(width) - (width - 1) + blocks[:, np.newaxis]
+        late = np.where(block > (blocks // 2)[:, np.newaxis], rest[:, np.newaxis], 0)
+        knots = np.where(block > 0, block * stride + late, 0)
+        return cls(counts, knots.astype(np.int64), interval)
+
+    @property
+    def blocks(self) -> Counts:
+        """Number of written points of each move, the start not counted."""
+        return np.count_nonzero(self.knots, axis=1)
+
+
+def sample_laws(laws: Laws, moments: Counts, interval: float) -> tuple[Array, Array]:
+    """Position and velocity of unit laws at whole intervals.
+
+    Parameters
+    ----------
+    laws : Laws
+        n laws.
+    moments : ndarray of int, shape (n, k)
+        Intervals since the start of each; the law rests at 0 before it begins and at 1 after.
+    interval : float
+        Command interval. [s]
+
+    Returns
+    -------
+    tuple of ndarray, shape (n, k)
+        Position [-] and velocity [1/s]. The position is 1 exactly from the law's end on.
+    """
+    total = laws.total[:, np.newaxis]
+    t = np.clip(moments * interval, 0.0, total)
+    late = t > 0.5 * total
+    t = np.where(late, total - t, t)
+    A = laws.acceleration[:, np.newaxis]
+    T1, Ta, T2 = (column[:, np.newaxis] for column in (laws.T1, laws.Ta, laws.T2))
+    # The time spent in each of the phases so far; each phase adds its part to what came before.
+    in_1 = np.minimum(t, T1)
+    in_a = np.clip(t - T1, 0.0, Ta)
+    in_2 = np.clip(t - T1 - Ta, 0.0, T2)
+    in_v = np.maximum(t - T1 - Ta - T2, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        J1 = np.where(T1 > 0.0, A / T1, 0.0)
+        J2 = np.where(T2 > 0.0, A / T2, 0.0)
+    a1 = np.where(T1 > 0.0, J1 * in_1, A)
+    v1 = 0.5 * J1 * in_1 * in_1
+    s1 = v1 * in_1 / 3.0
+    va = v1 + a1 * in_a
+    sa = s1 + (v1 + 0.5 * a1 * in_a) * in_a
+    v2 = va + (a1 - 0.5 * J2 * in_2) * in_2
+    s2 = sa + (va + (0.5 * a1 - J2 * in_2 / 6.0) * in_2) * in_2
+    position = s2 + v2 * in_v
+    position = np.where(late, 1.0 - position, position)
+    return position, v2
+
+
+def sampled_response(positions: Array, interval: float, poles: Complex) -> Complex:
+    """Response of modes to moves sampled at every interval, straight lines between the samples.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n, k)
+        Positions at every interval, aligned at the end; rest before the first column.
+    interval : float
+        Command interval. [s]
+    poles : ndarray of complex, shape (m,)
+        Of the modes. [rad/s]
+
+    Returns
+    -------
+    ndarray of complex, shape (n, m)
+        The same as `polyline_response` of each row.
+    """
+    k = positions.shape[1]
+    velocity = np.diff(positions, axis=1, prepend=positions[:, :1], append=positions[:, -1:])
+    steps = np.diff(velocity, axis=1) / interval
+    left = np.arange(k - 1, -1, -1) * interval
+    decay = np.exp(poles[np.newaxis, :] * left[:, np.newaxis])
+    # Two real products are several times faster than one of mixed type.
+    response: Complex = steps @ decay.real + 1j * (steps @ decay.imag)
+    return response
+
+
+def knots_response(values: Array, grid: Grid, poles: Complex) -> Complex:
+    """Response of modes to moves given at the grid's knots, straight lines between them.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, k)
+        Positions at the knots.
+    grid : Grid
+        The knots.
+    poles : ndarray of complex, shape (m,)
+        Of the modes. [rad/s]
+
+    Returns
+    -------
+    ndarray of complex, shape (n, m)
+    """
+    duration = np.diff(grid.knots, axis=1) * grid.interval
+    with np.errstate(invalid="ignore", divide="ignore"):
+        velocity = np.where(duration > 0.0, np.diff(values, axis=1) / duration, 0.0)
+    steps = np.diff(velocity, axis=1, prepend=0.0, append=0.0)
+    left = grid.counts[:, np.newaxis] - grid.knots
+    response = np.empty((len(values), len(poles)), dtype=np.complex128)
+    table = np.arange(int(grid.counts.max(initial=0)) + 1) * grid.interval
+    for m, pole in enumerate(poles):
+        response[:, m] = np.einsum("ij,ij->i", steps, np.exp(pole * table)[left])
+    return response

@@ -1,0 +1,274 @@
+"""Streams: planned moves as the points that are written, and what these leave in the modes.
+
+This module owns the step from laws to written numbers: sampling at the interval, rounding to whole
+steps, and the residual of exactly what was rounded. It works on batches, so that a program with a
+hundred thousand rapids needs no more memory than one with a thousand.
+
+Rule: a report speaks of the stream as written. Where rounding has made a design worse than the
+conventional law, the conventional law is written instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.machine import AXES
+from gcodejerk.motion import (
+    Grid,
+    Laws,
+    knots_response,
+    residual_displacement,
+    round_positions,
+    sample_laws,
+    sampled_response,
+)
+from gcodejerk.motion.laws import Array
+from gcodejerk.motion.residual import Complex
+from gcodejerk.plan import Plans
+
+BATCH_SAMPLES = 400_000
+"""Samples of a batch, about; each needs some 100 bytes while it is worked on."""
+FINE = 1000
+"""How much finer than the resolution an axis is written that moves a few steps only."""
+FEW_STEPS = 8.0
+"""An axis that moves less than this many steps is written finer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spelling:
+    """How positions are to be rounded: columns of n moves.
+
+    Attributes
+    ----------
+    start : ndarray, shape (n, 9)
+        Position before the move. [mm] or [deg]
+    step : ndarray, shape (n, 9)
+        Smallest step that is written. [mm] or [deg]
+    origin : ndarray, shape (n, 9)
+        Where the steps are counted from: 0, or the start for increments. [mm] or [deg]
+    """
+
+    start: Array
+    step: Array
+    origin: Array
+
+    def take(self, index: NDArray[np.int64]) -> Spelling:
+        """Some of the moves."""
+        return Spelling(self.start[index], self.step[index], self.origin[index])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """The streams of some planned moves, columns of b moves, aligned at the end like `Grid`.
+
+    Attributes
+    ----------
+    moves : ndarray of int, shape (b,)
+        Which moves of the plans.
+    plans : Plans
+        The plans; the laws of this batch are in `laws`, which may have fallen back.
+    grid : Grid
+        The moments that are written, k columns.
+    whole : dict of int to ndarray of int, shape (b, k)
+        For each axis (index in `AXES`) that any of the moves uses: position in whole steps from
+        the origin. The first and the last column stand for the exact start and end.
+    exact : dict of int to ndarray, shape (b, k)
+        The positions before rounding. [mm] or [deg]
+    spelling : Spelling
+        The steps and origins of these moves; the step of an axis may be finer than asked for.
+    speed : ndarray, shape (b, k)
+        Velocity of each unit law, the fastest of a move's. [1/s]
+    velocity : dict of int to ndarray, shape (b, k)
+        Velocity of each axis. [mm/s] or [deg/s]
+    residual, conventional_residual : ndarray, shape (b, m)
+        Displacement envelope of each mode at arrival, of the stream as written and of the
+        controller's own rapid sampled at the interval. [mm]
+    kept : ndarray of bool, shape (b,)
+        The stream is the conventional law.
+    """
+
+    moves: NDArray[np.int64]
+    plans: Plans
+    grid: Grid
+    whole: dict[int, NDArray[np.int64]]
+    exact: dict[int, Array]
+    spelling: Spelling
+    velocity: dict[int, Array]
+    residual: Array
+    conventional_residual: Array
+    kept: NDArray[np.bool_]
+    laws: Laws
+
+    def __len__(self) -> int:
+        return len(self.moves)
+
+    def positions(self, row: int) -> tuple[Array, Array]:
+        """Moments [s] and positions [mm], shape (k, 9), of one move as written; ends exact."""
+        knots = self.grid.knots[row]
+        begin = len(knots) - 1 - int(np.count_nonzero(knots))
+        start = self.spelling.start[row]
+        out = np.tile(start, (len(knots) - begin, 1))
+        for axis, whole in self.whole.items():
+            written = self.spelling.origin[row, axis] + whole[row, begin:] * self.spelling.step[row, axis]
+            displacement = self.plans.displacement[self.moves[row], axis]
+            if displacement:
+                out[:, axis] = written
+                out[0, axis], out[-1, axis] = start[axis], start[axis] + displacement
+        return knots[begin:] * self.grid.interval, out
+
+
+def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[Batch]:
+    """Streams of all planned moves, batch by batch, in the order of the moves.
+
+    Parameters
+    ----------
+    plans : Plans
+        n moves.
+    spelling : Spelling
+        Columns of the same n moves.
+    stride : int
+        Intervals from one written point to the next.
+
+    Yields
+    ------
+    Batch
+        Together they hold each planned move once.
+    """
+    planned = np.nonzero(plans.planned)[0]
+    begin = 0
+    while begin < len(planned):
+        # A batch is a matrix: as wide as its longest move.
+        widest = np.maximum.accumulate(plans.counts[planned[begin : begin + BATCH_SAMPLES]])
+        cells = widest * np.arange(1, len(widest) + 1)
+        end = begin + max(1, int(np.searchsorted(cells, BATCH_SAMPLES, side="right")))
+        yield _make_batch(plans, planned[begin:end], spelling.take(planned[begin:end]), stride)
+        begin = end
+
+
+def _make_batch(plans: Plans, moves: NDArray[np.int64], spelling: Spelling, stride: int) -> Batch:
+    """One batch; moves that rounding made worse than the conventional law are made again with it."""
+    rows = np.concatenate([np.arange(*_bounds(plans, move)) for move in moves]).astype(np.int64)
+    row_of = np.searchsorted(moves, plans.move[rows])
+    kept = np.zeros(len(moves), dtype=bool)
+    np.logical_or.at(kept, row_of, plans.kept[rows])
+    made = _Maker(plans, moves, rows, row_of, spelling, stride)
+    conventional = made.conventional_residual()
+    batch = made.batch(plans.laws.take(rows), kept, conventional)
+    worst = batch.residual.max(axis=1, initial=0.0)
+    reference = conventional.max(axis=1, initial=0.0)
+    worse = (worst > reference) & made.writable(plans.conventional.take(rows)) & ~kept
+    if worse.any():
+        laws = plans.laws.take(rows)
+        again = worse[row_of]
+        laws = laws.replaced(again, plans.conventional.take(rows[again]))
+        batch = made.batch(laws, kept | worse, conventional)
+    # What is written as the conventional law is the conventional law, rounding included.
+    same = batch.kept[:, np.newaxis]
+    return replace(batch, conventional_residual=np.where(same, batch.residual, conventional))
+
+
+def _bounds(plans: Plans, move: int) -> tuple[int, int]:
+    """First law of a move, and the one behind its last."""
+    laws = plans.laws_of(int(move))
+    return laws.start, laws.stop
+
+
+class _Maker:
+    """The parts of a batch that do not depend on which law is written."""
+
+    def __init__(
+        self,
+        plans: Plans,
+        moves: NDArray[np.int64],
+        rows: NDArray[np.int64],
+        row_of: NDArray[np.int64],
+        spelling: Spelling,
+        stride: int,
+    ) -> None:
+        self.plans, self.moves, self.rows, self.row_of = plans, moves, rows, row_of
+        self.share = plans.share[rows]
+        self.axes = [a for a in range(len(AXES)) if self.share[:, a].any()]
+        self.modes = plans.modes
+        self.interval = plans.machine.interval
+        self.grid = Grid.every(plans.counts[moves], stride, self.interval)
+        size = np.abs(plans.displacement[moves])
+        fine = (size > 0.0) & (size < FEW_STEPS * spelling.step)
+        self.spelling = Spelling(
+            spelling.start, np.where(fine, spelling.step / FINE, spelling.step), spelling.origin
+        )
+
+    def writable(self, laws: Laws) -> NDArray[np.bool_]:
+        """Whether the moves' laws, all of them, have finite jerk within the limits."""
+        out = np.ones(len(self.moves), dtype=bool)
+        np.logical_and.at(out, self.row_of, np.isfinite(laws.jerk))
+        for axis in self.plans.machine.axes:
+            jerk = laws.jerk * np.abs(self.share[:, AXES.index(axis.name)])
+            still = self.share[:, AXES.index(axis.name)] == 0.0
+            np.logical_and.at(out, self.row_of, still | (jerk <= axis.limit.jerk * (1.0 + 1e-9)))
+        return out
+
+    def conventional_residual(self) -> Array:
+        """Of the controller's own rapid, sampled at the interval, shape (b, m). [mm]"""
+        laws = self.plans.conventional.take(self.rows)
+        counts = np.ceil(laws.total / self.interval - 1e-6).astype(np.int64)
+        longest = np.zeros(len(self.moves), dtype=np.int64)
+        np.maximum.at(longest, self.row_of, counts)
+        return residual_displacement(self._response(laws, longest), self.modes.poles)
+
+    def batch(self, laws: Laws, kept: NDArray[np.bool_], conventional: Array) -> Batch:
+        """Sample, round, and see what is left in the modes."""
+        moments = self.grid.knots[self.row_of]
+        unit, speed = sample_laws(laws, moments, self.interval)
+        exact: dict[int, Array] = {}
+        whole: dict[int, NDArray[np.int64]] = {}
+        velocity: dict[int, Array] = {}
+        response = self._response(laws, self.grid.counts)
+        for axis in self.axes:
+            exact[axis] = self.spelling.start[:, axis, np.newaxis] + self._gather(unit, axis)
+            velocity[axis] = self._gather(speed, axis)
+            active = np.abs(self.modes.participation[:, axis]) > 0.0
+            step, origin = self.spelling.step[:, axis], self.spelling.origin[:, axis]
+            whole[axis] = round_positions(
+                exact[axis], self.grid, step, origin,
+                self.modes.poles[active], self.modes.participation[active, axis],
+            )  # fmt: skip
+            error = origin[:, np.newaxis] + whole[axis] * step[:, np.newaxis] - exact[axis]
+            begun = self.grid.knots > 0
+            error = np.where(begun & (self.grid.knots < self.grid.counts[:, np.newaxis]), error, 0.0)
+            moving = self.plans.displacement[self.moves, axis] != 0.0
+            noise = knots_response(error * moving[:, np.newaxis], self.grid, self.modes.poles)
+            response = response + noise * self.modes.participation[:, axis]
+        return Batch(
+            moves=self.moves,
+            plans=self.plans,
+            grid=self.grid,
+            whole=whole,
+            exact=exact,
+            spelling=self.spelling,
+            velocity=velocity,
+            residual=residual_displacement(response, self.modes.poles),
+            conventional_residual=conventional,
+            kept=kept,
+            laws=laws,
+        )
+
+    def _gather(self, unit: Array, axis: int) -> Array:
+        """Sum of an axis's laws times its share of each, shape (b, k)."""
+        out = np.zeros((len(self.moves), unit.shape[1]))
+        used = self.share[:, axis] != 0.0
+        np.add.at(out, self.row_of[used], unit[used] * self.share[used, axis, np.newaxis])
+        return out
+
+    def _response(self, laws: Laws, counts: NDArray[np.int64]) -> Complex:
+        """Response of the modes to moves sampled at every interval, before rounding, shape (b, m)."""
+        every = Grid.every(counts, 1, self.interval)
+        unit, _ = sample_laws(laws, every.knots[self.row_of], self.interval)
+        each = sampled_response(unit, self.interval, self.modes.poles)
+        weights = self.share @ self.modes.participation.T
+        response = np.zeros((len(self.moves), len(self.modes.poles)), dtype=np.complex128)
+        np.add.at(response, self.row_of, each * weights)
+        return response
