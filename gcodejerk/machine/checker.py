@@ -6,7 +6,6 @@ says, converted to mm, and later steps check only what one key alone cannot show
 
 from __future__ import annotations
 
-import math
 import re
 from typing import Any
 
@@ -16,11 +15,11 @@ from gcodejerk.errors import Place
 from gcodejerk.machine import table
 from gcodejerk.machine.document import Document
 from gcodejerk.machine.problems import Problems, nearest
+from gcodejerk.machine.scalars import is_empty, number_remedy, number_value, shown
 from gcodejerk.units import mm_from_inch
 
 KeyPath = tuple[str | int, ...]
 
-_DECIMAL = re.compile(r"[-+]?(?P<whole>\d[\d_]*(\.\d*)?|\.\d+)(?P<exponent>[eE][-+]?\d+)?")
 _MISSING = object()
 
 
@@ -175,11 +174,10 @@ class Checker:
         expected = kind.expected(unit)
         if not isinstance(node, yaml.ScalarNode):
             return self._wrong(node, path, expected)
-        text = node.value
-        remedy = _number_remedy(node)
+        remedy = number_remedy(node)
         if remedy is not None:
             return self._wrong(node, path, expected, remedy)
-        value = float(text.replace("_", ""))
+        value = number_value(node)
         if unit.startswith("inch"):
             value = mm_from_inch(value)
         if not kind.holds(value):
@@ -197,7 +195,7 @@ class Checker:
         return self._wrong(node, path, "true or false")
 
     def _words(self, node: yaml.Node, kind: table.Choice | table.Text, path: KeyPath) -> Any:
-        if not isinstance(node, yaml.ScalarNode) or _is_empty(node):
+        if not isinstance(node, yaml.ScalarNode) or is_empty(node):
             expected = kind.expected if isinstance(kind, table.Text) else _one_of(kind.words)
             return self._wrong(node, path, expected)
         text: str = node.value
@@ -222,7 +220,7 @@ class Checker:
     ) -> Any:
         what = dotted(path) or "the file"
         self.problems.add(
-            self.document.place(node), f"{what} is {_shown(node)}, expected {expected}",
+            self.document.place(node), f"{what} is {shown(node)}, expected {expected}",
             remedy or _example(path),
         )  # fmt: skip
         return _MISSING
@@ -269,54 +267,7 @@ def _default(key: table.Key) -> dict[str, Any]:
 def _is_left_empty(node: yaml.Node, kind: table.Kind) -> bool:
     """Whether all entries of a key like `modes:` have been deleted or commented out."""
     collection = isinstance(kind, table.Section | table.Table | table.ListOf)
-    return collection and _is_empty(node)
-
-
-def _is_empty(node: yaml.Node) -> bool:
-    return isinstance(node, yaml.ScalarNode) and node.value == "" and not node.style
-
-
-def _number_remedy(node: yaml.ScalarNode) -> str | None:
-    """Remedy for a scalar that is not a decimal number; None for one that is."""
-    text: str = node.value
-    match = _DECIMAL.fullmatch(text)
-    if node.style:  # quoted, or a block of text
-        return "leave the quotes out" if match else "write a plain number"
-    if match is not None:
-        if not math.isfinite(float(text.replace("_", ""))):
-            return "write a number that a machine can have"
-        # YAML 1.1 reads a leading zero as octal; nobody who writes 010 means 8.
-        if re.fullmatch(r"[-+]?0[\d_]+", text):
-            return "leave the leading zero out"
-        return None
-    if node.tag.endswith(":float") and text.lower().lstrip("+-") in {".inf", ".nan"}:
-        return "leave the key out where there is no limit" if "inf" in text.lower() else (
-            "write the number, or leave the key out where it is optional"
-        )  # fmt: skip
-    if re.fullmatch(r"[-+]?\d+,\d+", text):
-        return "write a decimal point"
-    if text == "":
-        return "write the number after the colon, or leave the key out where it is optional"
-    return "write a plain decimal number without its unit, for example 5.0e+5"
-
-
-def _shown(node: yaml.Node) -> str:
-    """Value as messages show it: numbers as they are, words in quotes, all of it short."""
-    if isinstance(node, yaml.MappingNode):
-        return "an empty mapping" if not node.value else "a mapping"
-    if isinstance(node, yaml.SequenceNode):
-        parts = [n.value for n in node.value[:4] if isinstance(n, yaml.ScalarNode)]
-        if len(parts) == len(node.value):
-            return f"[{', '.join(str(part)[:20] for part in parts)}]"
-        return f"a list of {len(node.value)}"
-    text = str(node.value)
-    if _is_empty(node):
-        return "empty"
-    if not getattr(node, "style", None) and (
-        _DECIMAL.fullmatch(text) or not node.tag.endswith(":str")
-    ):
-        return text[:60]
-    return repr(text if len(text) <= 60 else text[:57] + "...")
+    return collection and is_empty(node)
 
 
 def _one_of(words: tuple[str, ...]) -> str:

@@ -30,7 +30,7 @@ MOST_ALIASES = 1_000
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _YAML = "tag:yaml.org,2002:"
 _PLAIN_TAGS = {_YAML + word for word in ("str", "int", "float", "bool", "null", "map", "seq")}
-_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
 _WRITE_TEXT = "write the machine file as UTF-8 text; machines/vmc.yaml is an example"
 
 

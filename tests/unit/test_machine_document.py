@@ -30,6 +30,7 @@ def refusal_of(path):
         ("a: *b\n", "mill.yaml:1:4: is not YAML: found undefined alias"),
         ("---\na: 1\n---\nb: 2\n", "mill.yaml:3:1: is not YAML: but found another document"),
         ("a: 1\nb: x\0y\n", "mill.yaml:2:5: holds the control character 0x00"),
+        ("a: \udc80\n", "mill.yaml:1:4: holds the control character 0xDC80"),
         ("a: \ufffe\n", "mill.yaml:1:4: holds the character"),
         ("a: !!python/object/apply:os.system [ls]\n",
          "mill.yaml:1:4: the tag '!!python/object/apply:os.system' is not allowed"),
