@@ -220,7 +220,7 @@ def test_message_shows_place_path_value_unit_line_and_remedy():
         ("0600", "0600", "leading zero"),
         ("0x10", "0x10", "plain decimal number"),
         ("1:30", "1:30", "plain decimal number"),
-        ("٥", "'٥'", "plain decimal number"),
+        ("\u0665", "'\u0665'", "plain decimal number"),
         ("2001-01-01", "2001-01-01", "plain decimal number"),
         ("[600]", "[600]", "for example velocity: 600"),
         ("{a: 1}", "a mapping", "for example velocity: 600"),
