@@ -12,12 +12,15 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
+import numpy as np
+
 from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.block import Block
 from gcodejerk.nc.chunks import Chunk, read_chunks
 from gcodejerk.nc.dialect import AXES, DIALECTS, Dialect
 from gcodejerk.nc.execute import Executor, Step
 from gcodejerk.nc.flow import Flow
+from gcodejerk.nc.lexer import read_lines
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State, join
 from gcodejerk.nc.rapids import (
     GIVES_FEED,
@@ -26,13 +29,17 @@ from gcodejerk.nc.rapids import (
     Rapids,
     common_columns,
 )
+from gcodejerk.nc.runs import can_run, run_plain
 from gcodejerk.nc.tokenizer import parse_line
+from gcodejerk.nc.words import Lines
 from gcodejerk.reasons import Reason
 from gcodejerk.units import MM_PER_INCH
 
 STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""
 _STAMP = re.compile(rb"[(;][ \t]*gcodejerk stamp", re.IGNORECASE)
+SHORT_RUN = 24
+"""Fewer plain lines than this between odd ones go the careful way; arrays would not pay."""
 _SHOWN = 20
 """Lines not understood that get a finding of their own."""
 
@@ -194,6 +201,18 @@ class Reader:
             self._o_word(block, first)
             return
         self._run(block, text, begin, number, terminator)
+
+    def can_run(self) -> bool:
+        """Whether the lines that follow may be taken as a run."""
+        return self.started and not self.flow.inside and can_run(self.state)
+
+    def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
+        """Take plain lines of a chunk as arrays; the first that was not taken."""
+        stop, certain = run_plain(self.state, self.log, lines, first, last, place)
+        self.blocks += int(np.count_nonzero(lines.letters[first:stop]))
+        if certain is not None:
+            self._ask(certain)
+        return stop
 
     def _run(self, block: Block, text: bytes, begin: int, number: int, terminator: int) -> None:
         """Execute a block and enter what it did."""
@@ -358,8 +377,8 @@ def read_program(
     >>> program = read_program(io.BytesIO(b"G21 G90 G0 X1 Y2\nX3\nM2\n"))
     >>> program.rapids.line
     array([1, 2])
-    >>> [REASONS[r] if r != CERTAIN else "certain" for r in program.rapids.reason]
-    [<Reason.START_UNKNOWN: 'start unknown'>, 'certain']
+    >>> program.rapids.reason == 255
+    array([False,  True])
     """
     chosen = find_dialect(dialect)
     reader = Reader(name, chosen, start)
@@ -395,8 +414,34 @@ def read_program(
 
 def read_chunk(reader: Reader, chunk: Chunk, fast: bool) -> None:
     """Take the lines of one chunk."""
-    for line in split_lines(chunk):
-        reader.read_line(*line)
+    if not fast:
+        for line in split_lines(chunk):
+            reader.read_line(*line)
+        return
+    lines = read_lines(chunk.data, reader.dialect.line_limit)
+    complete = chunk.data.endswith(b"\n")
+    begins = lines.begin.tolist()
+    ends = [begin - 1 for begin in begins[1:]] + [len(chunk.data) - complete]
+    odd = [*np.flatnonzero(lines.odd).tolist(), len(lines)]
+    place = (chunk.line, chunk.offset)
+    at = following = by_hand = 0
+    patience = SHORT_RUN
+    while at < len(lines):
+        while odd[following] < at:
+            following += 1
+        stop = odd[following]
+        if stop - at >= SHORT_RUN and at >= by_hand and reader.can_run():
+            at = reader.read_run(lines, at, stop, place)
+            if at < stop:
+                # A line that is not sure. Were every other line so, looking at the whole rest of
+                # the run each time would take quadratic time: double the distance instead.
+                by_hand = at + patience
+                patience *= 2
+        else:
+            text = chunk.data[begins[at] : ends[at]]
+            ended = at + 1 < len(lines) or complete
+            reader.read_line(text, chunk.offset + begins[at], chunk.line + at, int(ended))
+            at += 1
 
 
 def trace(
