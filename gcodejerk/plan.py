@@ -29,14 +29,11 @@ from gcodejerk.motion import (
 )
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.residual import Complex
-from gcodejerk.reasons import Reason
+from gcodejerk.nc import Rapids
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 PROFILES = ("condition3", "conventional")
 """The profiles that this version designs."""
-CERTAIN = 255
-"""In a column of reasons: none, the rapid is planned."""
-REASONS = tuple(Reason)
-
 STANDSTILL = 1e-9
 """An axis that moves less than this does not move. [mm] or [deg]"""
 GRID_TOLERANCE = 1e-6
@@ -140,21 +137,22 @@ class Plans:
         return range(int(begin), int(end))
 
 
-def path_length(displacement: Array, rotary: NDArray[np.bool_]) -> Array:
+def path_length(displacement: Array, machine: Machine) -> Array:
     """Length of straight moves: of the linear axes, or of the rotary ones where only they move.
 
     Parameters
     ----------
     displacement : ndarray, shape (n, 9)
         Of each axis. [mm] or [deg]
-    rotary : ndarray of bool, shape (9,)
-        Which axes are rotary.
+    machine : Machine
+        Tells which axes are rotary.
 
     Returns
     -------
     ndarray, shape (n,)
         [mm] or [deg]
     """
+    rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
     linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
     turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
     return np.where(linear > STANDSTILL, linear, turning)
@@ -188,7 +186,7 @@ def plan_moves(
     Returns
     -------
     Plans
-        With the reasons of this module added: too short, axis unknown, limits.
+        With the reasons of this module added.
 
     Raises
     ------
@@ -201,17 +199,57 @@ def plan_moves(
             f"profile {profile!r} is not available in this version",
             f"choose one of {', '.join(PROFILES)} (--profile, or design.profile in the machine file)",
         )
-    rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
     reason = np.full(len(displacement), CERTAIN, np.uint8) if reason is None else reason.copy()
     out = reason != CERTAIN
     displacement = np.where(out[:, np.newaxis], 0.0, displacement)
     displacement = np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0)
-    length = path_length(displacement, rotary)
+    length = path_length(displacement, machine)
     known = np.array([axis in machine.axis_names for axis in AXES])
     _rule_out(reason, (length == 0.0), Reason.NO_MOTION)
     _rule_out(reason, (displacement[:, ~known] != 0.0).any(axis=1), Reason.AXIS_UNKNOWN)
-    _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
     return _Planner(machine, profile, displacement, length, reason, time, T1).run()
+
+
+def plan_rapids(rapids: Rapids, machine: Machine, profile: str | None = None) -> Plans:
+    """Plan the rapids of a program, all of them together.
+
+    Parameters
+    ----------
+    rapids : Rapids
+        As `nc.read_program` finds them.
+    machine : Machine
+        Limits, modes, travel and interval.
+    profile : str, optional
+        The machine's own by default.
+
+    Returns
+    -------
+    Plans
+        Row i is rapid i.
+
+    Raises
+    ------
+    PlanError
+        The profile is unknown.
+    """
+    reason = rapids.reason.copy()
+    known = sum(1 << AXES.index(name) for name in machine.axis_names)
+    _rule_out(reason, (rapids.words & ~np.uint16(known)) != 0, Reason.AXIS_UNKNOWN)
+    for axis in machine.axes:
+        if axis.travel is None:
+            continue
+        k = AXES.index(axis.name)
+        low, high = axis.travel[0] - axis.resolution, axis.travel[1] + axis.resolution
+        # Unknown offsets give NaN, and NaN is beyond nothing.
+        for position in (rapids.start[:, k], rapids.target[:, k]):
+            where = position + rapids.offset[:, k]
+            named = (rapids.words >> k & 1) != 0
+            _rule_out(reason, named & ((where < low) | (where > high)), Reason.BEYOND_TRAVEL)
+    displacement = np.where((reason == CERTAIN)[:, np.newaxis], rapids.target - rapids.start, 0.0)
+    length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
+    _rule_out(reason, length == 0.0, Reason.NO_MOTION)
+    _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
+    return plan_moves(displacement, machine, profile, reason)
 
 
 def _is_rotary(machine: Machine, axis: str) -> bool:

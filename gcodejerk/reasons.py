@@ -33,3 +33,9 @@ class Reason(enum.StrEnum):
     BEYOND_TRAVEL = "beyond travel"
     LIMITS = "limits cannot be met"
     NOT_BETTER = "no profile within the limits is better"
+
+
+REASONS = tuple(Reason)
+"""The reasons by index, as columns of reasons hold them."""
+CERTAIN = 255
+"""In a column of reasons: none, the rapid can be rewritten."""

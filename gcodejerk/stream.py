@@ -32,8 +32,8 @@ from gcodejerk.plan import Plans
 
 BATCH_SAMPLES = 400_000
 """Samples of a batch, about; each needs some 100 bytes while it is worked on."""
-FINE = 1000
-"""How much finer than the resolution an axis is written that moves a few steps only."""
+FINE_DECIMALS = 3
+"""Decimals more than the resolution's for an axis that moves a few steps only."""
 FEW_STEPS = 8.0
 """An axis that moves less than this many steps is written finer."""
 
@@ -70,7 +70,7 @@ class Batch:
     moves : ndarray of int, shape (b,)
         Which moves of the plans.
     plans : Plans
-        The plans; the laws of this batch are in `laws`, which may have fallen back.
+        The plans that they belong to.
     grid : Grid
         The moments that are written, k columns.
     whole : dict of int to ndarray of int, shape (b, k)
@@ -79,9 +79,9 @@ class Batch:
     exact : dict of int to ndarray, shape (b, k)
         The positions before rounding. [mm] or [deg]
     spelling : Spelling
-        The steps and origins of these moves; the step of an axis may be finer than asked for.
-    speed : ndarray, shape (b, k)
-        Velocity of each unit law, the fastest of a move's. [1/s]
+        The steps and origins of these moves.
+    fine : ndarray of bool, shape (b, 9)
+        The step is FINE_DECIMALS finer than asked for, since the axis moves a few steps only.
     velocity : dict of int to ndarray, shape (b, k)
         Velocity of each axis. [mm/s] or [deg/s]
     residual, conventional_residual : ndarray, shape (b, m)
@@ -89,6 +89,8 @@ class Batch:
         controller's own rapid sampled at the interval. [mm]
     kept : ndarray of bool, shape (b,)
         The stream is the conventional law.
+    laws : Laws
+        The laws that are written, one for each of the plans' laws of these moves.
     """
 
     moves: NDArray[np.int64]
@@ -97,6 +99,7 @@ class Batch:
     whole: dict[int, NDArray[np.int64]]
     exact: dict[int, Array]
     spelling: Spelling
+    fine: NDArray[np.bool_]
     velocity: dict[int, Array]
     residual: Array
     conventional_residual: Array
@@ -197,8 +200,9 @@ class _Maker:
         self.grid = Grid.every(plans.counts[moves], stride, self.interval)
         size = np.abs(plans.displacement[moves])
         fine = (size > 0.0) & (size < FEW_STEPS * spelling.step)
+        self.fine = fine
         self.spelling = Spelling(
-            spelling.start, np.where(fine, spelling.step / FINE, spelling.step), spelling.origin
+            spelling.start, np.where(fine, spelling.step / 10.0**FINE_DECIMALS, spelling.step), spelling.origin
         )
 
     def writable(self, laws: Laws) -> NDArray[np.bool_]:
@@ -249,6 +253,7 @@ class _Maker:
             whole=whole,
             exact=exact,
             spelling=self.spelling,
+            fine=self.fine,
             velocity=velocity,
             residual=residual_displacement(response, self.modes.poles),
             conventional_residual=conventional,

@@ -1,0 +1,190 @@
+"""What a controller's emitter is, and how emitters are found.
+
+An emitter turns streams into text. It knows the controller's language and nothing of how a law was
+designed. Emitters are found through the entry points `gcodejerk.controllers`, ours and those of other
+packages alike; listing them loads none.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.errors import EmitError
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.nc import Rapids
+from gcodejerk.stream import Batch, Spelling
+from gcodejerk.units import MM_PER_INCH
+
+GROUP = "gcodejerk.controllers"
+API = 1
+MOST_DECIMALS = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """One way in which an emitter can write, and how far its facts can be trusted."""
+
+    name: str
+    """stream, pvt or parameters"""
+    confidence: str
+    """measured, documented or unverified"""
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a user may choose about the text."""
+
+    comments: bool = True
+    """Name the original block in a comment in front of its stream."""
+
+
+class Controller(Protocol):
+    """An emitter; `name` is its entry point's, `api` is 1."""
+
+    name: str
+    api: int
+    in_place: bool
+    """The streams replace blocks of the program; otherwise they are a file of their own."""
+    suffix: str
+    """Of the output's name; empty for that of the input."""
+    forms: tuple[Form, ...]
+
+    def stride(self, interval: float) -> int:
+        """Intervals from one written point to the next."""
+        ...
+
+    def spelling(self, rapids: Rapids, machine: Machine) -> Spelling:
+        """Steps and origins for all rapids of a program."""
+        ...
+
+    def notes(self, machine: Machine) -> list[str]:
+        """What a user of this machine file has to know."""
+        ...
+
+    def header(self, machine: Machine) -> bytes:
+        """First lines of a file of its own; empty for streams in place."""
+        ...
+
+    def render(
+        self, batch: Batch, rapids: Rapids, blocks: Sequence[bytes], newline: bytes, options: Options
+    ) -> list[bytes]:
+        """Text of each move of a batch.
+
+        Parameters
+        ----------
+        batch : Batch
+            b moves.
+        rapids : Rapids
+            The program's; row i of the plans is rapid i.
+        blocks : sequence of bytes
+            The b original blocks, without line ends.
+        newline : bytes
+            Line end where a block has none of its own.
+        options : Options
+            The user's choices.
+
+        Returns
+        -------
+        list of bytes
+            b texts, each with its line end.
+        """
+        ...
+
+
+def controllers() -> dict[str, EntryPoint]:
+    """Every emitter that is installed, by name; none is loaded."""
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def load_controller(name: str) -> Controller:
+    """Load an emitter.
+
+    Parameters
+    ----------
+    name : str
+        Of its entry point.
+
+    Returns
+    -------
+    Controller
+
+    Raises
+    ------
+    EmitError
+        There is none of that name, it cannot be loaded, or it was written for another version.
+    """
+    found = controllers()
+    if name not in found:
+        near = difflib.get_close_matches(name, found, n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise EmitError(
+            f"there is no controller {name!r}",
+            f"{hint}available: {', '.join(sorted(found)) or 'none (gcodejerk is not installed)'}",
+        )
+    entry = found[name]
+    origin = f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
+    try:
+        made = entry.load()()
+    except Exception as error:
+        raise EmitError(
+            f"controller {name!r} of {origin} cannot be loaded: {type(error).__name__}: {error}",
+            "repair or remove that package",
+        ) from error
+    if getattr(made, "api", None) != API:
+        raise EmitError(
+            f"controller {name!r} of {origin} has api {getattr(made, 'api', None)}, expected {API}",
+            "install a version of it that fits this gcodejerk",
+        )
+    return cast(Controller, made)
+
+
+def decimal_step(resolution: float) -> tuple[int, int]:
+    """A resolution as (whole number, decimals): 0.0005 is 5 with 4 decimals.
+
+    A resolution that no nine decimals can write becomes the next finer power of ten.
+
+    Examples
+    --------
+    >>> decimal_step(0.0005), decimal_step(1 / 3200), decimal_step(0.0001 / 25.4)
+    ((5, 4), (3125, 7), (1, 6))
+    """
+    for decimals in range(MOST_DECIMALS + 1):
+        whole = resolution * 10**decimals
+        if whole >= 1.0 - 1e-9 and abs(whole - round(whole)) < 1e-6 * whole:
+            return round(whole), decimals
+    return 1, min(MOST_DECIMALS, math.ceil(-math.log10(resolution) - 1e-9))
+
+
+def axis_steps(machine: Machine, inch: bool) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Step of every axis of `AXES` as whole numbers and decimals, in the program's unit.
+
+    In inches a step is a power of ten, since the resolution in mm has no short form there.
+    """
+    whole, decimals = np.ones(len(AXES), dtype=np.int64), np.zeros(len(AXES), dtype=np.int64)
+    for axis in machine.axes:
+        k = AXES.index(axis.name)
+        if inch and not axis.rotary:
+            decimals[k] = math.ceil(-math.log10(axis.resolution / MM_PER_INCH) - 1e-9)
+        else:
+            whole[k], decimals[k] = decimal_step(axis.resolution)
+    return whole, decimals
+
+
+def step_sizes(machine: Machine, inch: bool) -> NDArray[np.float64]:
+    """The same steps in mm and degrees."""
+    whole, decimals = axis_steps(machine, inch)
+    size = whole / 10.0**decimals
+    if inch:
+        for axis in machine.axes:
+            if not axis.rotary:
+                size[AXES.index(axis.name)] *= MM_PER_INCH
+    return np.asarray(size, dtype=np.float64)

@@ -1,0 +1,306 @@
+"""Controller `linuxcnc`: each stream as G1 blocks in the place of the rapid's block.
+
+The form is the one that was measured to follow a profile best (LinuxCNC 2.9, servo period 1 ms): blocks of
+2 ms under G94 and G64, each with F = the larger of the profile's speeds at the block's two ends,
+since LinuxCNC reaches F at the end of a servo period, and ends a block with the smaller of its own F and
+the next one's. Blocks of 1 ms would be stretched by 2 % (TP_MIN_SEGMENT_CYCLES).
+
+A replaced block becomes, each line only where it is needed::
+
+    (gcodejerk: G0 X10. Y5.)     names the original
+    N120 G0 M8 (go)              what else the block says, byte for byte
+    G4 P0                        the feed before ends here: a stream begins at rest
+    G94 G64                      modes of the stream that are not in force, or not stated
+    G1 X0.0012 Y0.0006 F38.4     the points, the last with the words of the block itself
+    G0 F600. G61                 the modal values that the program relies on
+    M0                           what takes effect after motion
+
+Rule: the last point repeats the block's own words, so the end is exactly the programmed one, whatever
+was rounded before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.emit.base import Form, Options, axis_steps, step_sizes
+from gcodejerk.emit.digits import Column, format_lines
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.nc import Block, Rapids, parse_block
+from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
+from gcodejerk.units import MM_PER_INCH, per_minute
+
+BLOCK_TIME = 0.002
+"""Duration of a block, measured as the best; whole intervals, at least one. [s]"""
+FEED_DECIMALS = 4
+"""Of F in units per minute."""
+COMMENT_LENGTH = 69
+"""Controllers and senders with short lines choke on longer comments."""
+STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)
+"""M words that take effect after the block's motion."""
+FEED_GROUPS = ("XYZ", "UVW", "ABC")
+"""F is the speed along the first of these groups that moves (LinuxCNC, G94)."""
+LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
+
+
+class LinuxcncController:
+    """Writes G1 blocks of 2 ms with end-point speeds."""
+
+    name = "linuxcnc"
+    api = 1
+    in_place = True
+    suffix = ""
+    forms = (
+        Form(
+            "stream",
+            "measured",
+            "LinuxCNC 2.9: follows within 0.02 mm and 3 ms; needs G64, ARC_BLEND_ENABLE = 1 and "
+            "MAX_ACCELERATION 1.3 to 2 times the axis's limit.acceleration",
+        ),
+    )
+
+    def stride(self, interval: float) -> int:
+        """About 2 ms."""
+        return max(1, round(BLOCK_TIME / interval))
+
+    def spelling(self, rapids: Rapids, machine: Machine) -> Spelling:
+        """Steps in the program's own unit; increments are counted from the start."""
+        mm, inch = step_sizes(machine, inch=False), step_sizes(machine, inch=True)
+        step = np.where(rapids.inch[:, np.newaxis], inch, mm)
+        origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
+        return Spelling(rapids.start, step, origin)
+
+    def notes(self, machine: Machine) -> list[str]:
+        """Where the machine file contradicts how LinuxCNC moves."""
+        if machine.positioning == "linear":
+            return []
+        return [
+            "LinuxCNC itself moves G0 in a straight line, but the machine file says positioning: "
+            "independent; rapids of several axes are written as the dogleg of the machine file"
+        ]
+
+    def header(self, machine: Machine) -> bytes:
+        """Nothing: the streams stand in the program."""
+        return b""
+
+    def render(
+        self, batch: Batch, rapids: Rapids, blocks: Sequence[bytes], newline: bytes, options: Options
+    ) -> list[bytes]:
+        """Text of each move."""
+        moves = batch.moves
+        line_ends = [LINE_ENDS[t] or newline for t in rapids.terminator[moves]]
+        parsed = [parse_block(block) for block in blocks]
+        feed = _feed(_path_speed(batch, rapids))
+        points = self._points(batch, rapids, line_ends, feed)
+        out = []
+        for row, move in enumerate(moves):
+            frame = _Frame(rapids, int(move), parsed[row], blocks[row])
+            last = frame.last_point(points[row].before_end, int(feed[row, -1]))
+            follows = row > 0 and _adjacent(batch, rapids, row)
+            lines = [
+                *frame.head(options.comments),
+                *frame.setup(follows),
+                points[row].text,
+                last,
+                *frame.tail(),
+            ]
+            text = line_ends[row].join(line for line in lines if line) + line_ends[row]
+            if rapids.terminator[move] == 0:
+                text = text[: -len(line_ends[row])]
+            out.append(text)
+        return out
+
+    def _points(
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        line_ends: Sequence[bytes],
+        feed: NDArray[np.int64],
+    ) -> list[_Points]:
+        """The points of every move but its last, formatted for all moves of one kind together."""
+        moving = batch.plans.displacement[batch.moves] != 0.0
+        kinds: dict[_Kind, list[int]] = {}
+        for row, move in enumerate(batch.moves):
+            kind = _Kind(
+                axes=tuple(np.nonzero(moving[row])[0].tolist()),
+                fine=tuple(np.nonzero(batch.fine[row])[0].tolist()),
+                inch=bool(rapids.inch[move]),
+                incremental=bool(rapids.incremental[move]),
+                diameter=bool(rapids.diameter[move]),
+                line_end=line_ends[row],
+            )
+            kinds.setdefault(kind, []).append(row)
+        out: list[_Points] = [_Points(b"", {})] * len(batch)
+        for kind, rows in kinds.items():
+            for row, points in zip(rows, _format_kind(batch, np.array(rows), kind, feed), strict=True):
+                out[row] = points
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """What moves have in common whose points can be formatted together."""
+
+    axes: tuple[int, ...]
+    fine: tuple[int, ...]
+    inch: bool
+    incremental: bool
+    diameter: bool
+    line_end: bytes
+
+
+def _format_kind(
+    batch: Batch, rows: NDArray[np.int64], kind: _Kind, feed: NDArray[np.int64]
+) -> list[_Points]:
+    """Points of rows of one kind; the last point of each is left to its block's own words."""
+    whole_step, decimals = axis_steps(batch.plans.machine, kind.inch)
+    knots = batch.grid.knots[rows]
+    inner = (knots > 0) & (knots < batch.grid.counts[rows, np.newaxis])
+    counts = np.count_nonzero(inner, axis=1)
+    columns: list[Column] = []
+    reached: dict[int, tuple[NDArray[np.int64], int]] = {}
+    for axis in kind.axes:
+        scale = int(whole_step[axis]) * (2 if kind.diameter and AXES[axis] == "X" else 1)
+        places = int(decimals[axis]) + (FINE_DECIMALS if axis in kind.fine else 0)
+        values = batch.whole[axis][rows] * scale
+        reached[axis] = (values[:, -2], places)
+        if kind.incremental:
+            values = np.diff(np.where(knots > 0, values, 0), axis=1, prepend=0)
+        prefix = b" " if columns else b"G1 "
+        columns.append(Column(prefix + AXES[axis].encode(), values[inner], places))
+    columns.append(Column(b" F", feed[rows][inner], FEED_DECIMALS))
+    text, ends = format_lines(columns, kind.line_end)
+    at = np.concatenate([[0], ends])[np.concatenate([[0], np.cumsum(counts)])]
+    return [
+        _Points(
+            text[at[k] : at[k + 1]].removesuffix(kind.line_end),
+            {
+                axis: Decimal(int(value[k])).scaleb(-places) if counts[k] else Decimal(0)
+                for axis, (value, places) in reached.items()
+            },
+        )
+        for k in range(len(rows))
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Points:
+    """The text of a move's points but the last, and how far each axis is then from the origin."""
+
+    text: bytes
+    before_end: dict[int, Decimal]
+
+
+class _Frame:
+    """The lines around the points of one move: what the block says besides, and what it relies on."""
+
+    def __init__(self, rapids: Rapids, move: int, block: Block, text: bytes) -> None:
+        self.rapids, self.move, self.block, self.text = rapids, move, block, text
+        self.axis_words = [w for w in block.words if w.letter in AXES]
+        self.stops = [w for w in block.words if w.letter == "M" and w.value in STOPS]
+
+    def head(self, comments: bool) -> list[bytes]:
+        """A comment that names the block, and the block without its axis words."""
+        out = [self._comment()] if comments else []
+        rest, at = [], 0
+        for word in sorted([*self.axis_words, *self.stops], key=lambda w: w.begin):
+            rest.append(self.text[at : word.begin])
+            at = word.end
+        rest.append(self.text[at:])
+        others = [w for w in self.block.words if w not in self.axis_words and w not in self.stops]
+        if self.block.comments or any(not (w.letter == "G" and w.value == 0.0) for w in others):
+            out.append(b"".join(rest).rstrip(b" \t"))
+        return out
+
+    def _comment(self) -> bytes:
+        """`(gcodejerk: ...)` with the words of the block, in at most COMMENT_LENGTH characters."""
+        words = b" ".join(b"".join(w.text.split()) for w in self.block.words)
+        plain = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
+        room = COMMENT_LENGTH - len(b"(gcodejerk: )")
+        if len(plain) > room:
+            plain = plain[: room - 3] + b"..."
+        return b"(gcodejerk: " + plain + b")"
+
+    def setup(self, follows: bool) -> list[bytes]:
+        """An exact stop, unless the machine rests already, and the modes of the stream."""
+        rapids, move = self.rapids, self.move
+        stands = follows or rapids.path[move] in (61, 62)
+        codes = []
+        if not rapids.distance_stated[move]:
+            codes.append(b"G90")
+        if rapids.feed_mode[move] != 94 or not rapids.feed_mode_stated[move]:
+            codes.append(b"G94")
+        if rapids.path[move] in (61, 62):
+            codes.append(b"G64")
+        return ([] if stands else [b"G4 P0"]) + ([b" ".join(codes)] if codes else [])
+
+    def last_point(self, before_end: dict[int, Decimal], feed: int) -> bytes:
+        """The last point: the block's own words, or what is left of its increments."""
+        words = []
+        for word in self.axis_words:
+            axis = AXES.index(word.letter)
+            if not self.rapids.incremental[self.move]:
+                words.append(b"".join(word.text.split()).upper())
+            else:
+                number = Decimal(b"".join(word.text[1:].split()).decode())
+                left = number - before_end.get(axis, Decimal(0))
+                words.append(word.letter.encode() + _plain(left))
+        words.append(b"F" + _plain(Decimal(feed).scaleb(-FEED_DECIMALS)))
+        return b" ".join([b"G1", *words])
+
+    def tail(self) -> list[bytes]:
+        """Restore the modal values, then stop where the block stops."""
+        rapids, move = self.rapids, self.move
+        words = [b"G0"]
+        mode = int(rapids.feed_mode[move])
+        if mode != 94:
+            words.append(b"G%d" % mode)
+        if mode != 93 and not np.isnan(rapids.feed[move]):
+            words.append(b"F" + _plain(Decimal(repr(float(rapids.feed[move])))))
+        if rapids.path[move] in (61, 62):
+            words.append(b"G61" if rapids.path[move] == 61 else b"G61.1")
+        stops = [b" ".join(b"".join(w.text.split()) for w in self.stops)] if self.stops else []
+        return [b" ".join(words), *stops]
+
+
+def _plain(number: Decimal) -> bytes:
+    """A number without exponent, with a decimal point, and never minus zero."""
+    text = format(number if number else abs(number), "f")
+    return (text if "." in text else text + ".").encode()
+
+
+def _adjacent(batch: Batch, rapids: Rapids, row: int) -> bool:
+    """Whether the block directly before this one is a stream too: the machine then rests."""
+    before, move = batch.moves[row - 1], batch.moves[row]
+    return bool(rapids.line[before] + 1 == rapids.line[move])
+
+
+def _path_speed(batch: Batch, rapids: Rapids) -> NDArray[np.float64]:
+    """Speed at every knot as F means it, in the program's own unit per second."""
+    out = np.zeros(batch.grid.knots.shape)
+    moving = batch.plans.displacement[batch.moves] != 0.0
+    inch = rapids.inch[batch.moves]
+    left = np.ones(len(batch), dtype=bool)
+    for group in FEED_GROUPS:
+        axes = [AXES.index(a) for a in group]
+        chosen = left & moving[:, axes].any(axis=1)
+        square = np.zeros(out.shape)
+        for axis in axes:
+            if axis in batch.velocity:
+                square += batch.velocity[axis] ** 2
+        unit = np.where(inch & (group != "ABC"), MM_PER_INCH, 1.0)[:, np.newaxis]
+        out = np.where(chosen[:, np.newaxis], np.sqrt(square) / unit, out)
+        left &= ~chosen
+    return out
+
+
+def _feed(speed: NDArray[np.float64]) -> NDArray[np.int64]:
+    """F of the block that ends at each knot, in whole units of its last decimal."""
+    ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
+    # F0 is an error in LinuxCNC; a block that hardly moves still has its smallest F.
+    return np.maximum(np.rint(per_minute(1.0) * 10.0**FEED_DECIMALS * ends), 1.0).astype(np.int64)

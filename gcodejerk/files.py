@@ -1,0 +1,143 @@
+"""Files in and out: an output appears in one move, or not at all.
+
+Rule 1: an output is written beside its place under a hidden name, and renamed when it is complete and
+verified. Killed at any moment, a run leaves the old file or the new one; at worst a hidden
+`.~gcodejerk-` file stays, which nothing reads.
+Rule 2: an input is never opened for writing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from gcodejerk.errors import EmitError, ProgramError
+
+STANDARD = "-"
+"""Name of standard input and output."""
+PREFIX = ".~gcodejerk-"
+SPOOL = 8 << 20
+"""Standard input and output are held in memory up to this size, then on disk."""
+
+
+@contextlib.contextmanager
+def open_input(path: str) -> Iterator[BinaryIO]:
+    """Open a program for reading, seekable.
+
+    Parameters
+    ----------
+    path : str
+        A file's name, or `-` for standard input.
+
+    Yields
+    ------
+    binary file
+
+    Raises
+    ------
+    ProgramError
+        There is no such file, or it cannot be read.
+    """
+    if path == STANDARD:
+        with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:
+            shutil.copyfileobj(sys.stdin.buffer, spool)
+            spool.seek(0)
+            yield spool  # type: ignore[misc]
+        return
+    try:
+        file = open(path, "rb")  # noqa: SIM115
+    except FileNotFoundError:
+        raise ProgramError(f"there is no file {path}", "check the name and the folder") from None
+    except IsADirectoryError:
+        raise ProgramError(f"{path} is a folder", "name the program in it") from None
+    except OSError as error:
+        raise ProgramError(f"{path} cannot be read: {error.strerror}", "check its permissions") from None
+    with file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:
+                shutil.copyfileobj(file, spool)
+                spool.seek(0)
+                yield spool  # type: ignore[misc]
+            return
+        yield file
+
+
+@contextlib.contextmanager
+def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
+    """A file that appears under its name when the block ends without an error.
+
+    Parameters
+    ----------
+    path : str
+        Where it is to appear, or `-` for standard output.
+    like : str, optional
+        A file whose permissions it gets.
+
+    Yields
+    ------
+    binary file
+        Empty, for writing and reading back.
+
+    Raises
+    ------
+    EmitError
+        It cannot be written: a full disk, a folder that is missing or read-only.
+    """
+    if path == STANDARD:
+        with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:
+            yield spool  # type: ignore[misc]
+            spool.seek(0)
+            shutil.copyfileobj(spool, sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+        return
+    place = Path(path)
+    # A link stays a link: what it points to is replaced.
+    place = Path(os.path.realpath(place)) if place.is_symlink() else place
+    temporary: str | None = None
+    try:
+        if place.is_dir():
+            raise EmitError(f"{path} is a folder", "name a file in it (-o), or use --output-dir")
+        handle, temporary = tempfile.mkstemp(prefix=PREFIX, dir=place.parent)
+        with os.fdopen(handle, "w+b") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, _mode(like))
+        os.replace(temporary, place)
+        temporary = None
+    except OSError as error:
+        raise EmitError(
+            f"{path} cannot be written: {error.strerror or error}",
+            "nothing was written; check the folder, its permissions and the space on the disk",
+        ) from error
+    finally:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                os.unlink(temporary)
+
+
+def same_file(one: str, other: str) -> bool:
+    """Whether two names are the same file."""
+    if STANDARD in (one, other):
+        return False
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return os.path.abspath(one) == os.path.abspath(other)
+
+
+def _mode(like: str | None) -> int:
+    """Permissions of a new file: those of another, or what the umask leaves."""
+    if like is not None and like != STANDARD:
+        with contextlib.suppress(OSError):
+            return stat.S_IMODE(os.stat(like).st_mode)
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

@@ -1,0 +1,181 @@
+"""One move: the library's way to plan without a program.
+
+This module owns `Plan`, a view of one row of `plan.Plans` with its stream, in the words of a user.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.errors import PlanError
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.motion import laws_response
+from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.plan import Plans, plan_moves
+from gcodejerk.reasons import CERTAIN, REASONS
+from gcodejerk.stream import Batch, Spelling, make_streams
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """One planned move from rest to rest.
+
+    Attributes
+    ----------
+    machine : Machine
+        What it was planned for.
+    displacement : dict of str to float
+        What each axis moves. [mm] or [deg]
+    plans : Plans
+        The plan as columns of one row.
+    batch : Batch
+        Its stream.
+    """
+
+    machine: Machine
+    displacement: dict[str, float]
+    plans: Plans
+    batch: Batch
+
+    @property
+    def time(self) -> float:
+        """T_SUM, a whole number of intervals. [s]"""
+        return float(self.plans.counts[0]) * self.machine.interval
+
+    @property
+    def conventional_time(self) -> float:
+        """What the controller's own G0 takes. [s]"""
+        return float(self.plans.conventional_time[0])
+
+    @property
+    def length(self) -> float:
+        """Along the path. [mm], or [deg] where only rotary axes move"""
+        return float(self.plans.length[0])
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Whether the conventional law is written, shape (1,)."""
+        return self.batch.kept
+
+    @property
+    def profile(self) -> str:
+        """Name of the profile that is written."""
+        return "conventional" if self.batch.kept[0] else "condition3"
+
+    @property
+    def laws(self) -> Laws:
+        """The unit law that is written, or one for each axis under independent positioning."""
+        return self.batch.laws
+
+    @property
+    def t(self) -> Array:
+        """Moments of the stream, shape (n,). [s]"""
+        return self.batch.positions(0)[0]
+
+    @property
+    def positions(self) -> dict[str, Array]:
+        """Position of each axis of the machine, as written, shape (n,) each. [mm] or [deg]"""
+        rows = self.batch.positions(0)[1]
+        return {axis: rows[:, AXES.index(axis)] for axis in self.machine.axis_names}
+
+    @property
+    def residual(self) -> Array:
+        """Displacement envelope of each mode, of the stream as written, shape (1, m). [mm]"""
+        return self.batch.residual
+
+    @property
+    def conventional_residual(self) -> Array:
+        """The same of the controller's own G0, sampled at the interval, shape (1, m). [mm]"""
+        return self.batch.conventional_residual
+
+    def unsampled(self) -> list[tuple[float, float]]:
+        """Acceleration amplitudes of the profiles themselves, before sampling and rounding.
+
+        Returns
+        -------
+        list of (float, float)
+            The designed and the conventional profile's, for each mode that the move excites.
+            [mm/s^2]
+        """
+        modes, share = self.plans.modes, self.plans.share
+        weights = share @ modes.participation.T
+        omega_squared = np.abs(modes.poles) ** 2
+        columns = []
+        for laws in (self.batch.laws, self.plans.conventional):
+            # Laws of one move end at different times; each rings on until the last has ended.
+            left = (laws.total.max() - laws.total)[:, np.newaxis]
+            response = laws_response(laws, modes.poles) * np.exp(modes.poles * left) * weights
+            columns.append(np.abs(response.sum(axis=0)) / modes.poles.imag * omega_squared)
+        moving = self.plans.displacement[0] != 0.0
+        excited = ((modes.participation != 0.0) & moving).any(axis=1)
+        return [(float(columns[0][m]), float(columns[1][m])) for m in np.nonzero(excited)[0]]
+
+
+def plan_move(
+    displacement: Mapping[str, float],
+    machine: Machine,
+    profile: str | None = None,
+    *,
+    time: float | None = None,
+    T1: float | None = None,
+) -> Plan:
+    """Plan one move from rest to rest.
+
+    Parameters
+    ----------
+    displacement : mapping of str to float
+        What each axis moves, for example ``{"Z": 1.0}``. [mm] or [deg]
+    machine : Machine
+        Limits, modes and interval.
+    profile : str, optional
+        `condition3` or `conventional`; the machine's own by default.
+    time : float, optional
+        T_SUM, rounded up to whole intervals; the conventional time by default. [s]
+    T1 : float, optional
+        T1 of a four-segment law; the best by default. [s]
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    PlanError
+        An axis is unknown, nothing moves, or no profile keeps the limits.
+
+    Examples
+    --------
+    The case of the paper, with the paper's T1:
+
+    >>> from gcodejerk.machine import find_machine
+    >>> vmc = Machine.load(find_machine("vmc"))
+    >>> plan = plan_move({"Z": 1.0}, vmc, time=0.040, T1=0.001)
+    >>> plan.time, round(float(plan.positions["Z"][1]), 4), plan.profile
+    (0.04, 0.0006, 'condition3')
+    """
+    row = np.zeros((1, len(AXES)))
+    for axis, length in displacement.items():
+        name = axis.upper()
+        machine.axis(name)
+        if not np.isfinite(length):
+            raise PlanError(f"{name} moves by {length}, expected a length", "for example Z=1.5")
+        row[0, AXES.index(name)] = length
+    if time is not None and not (np.isfinite(time) and time > 0.0):
+        raise PlanError(f"the time is {time:g} s, expected more than zero", "for example --time 0.040")
+    plans = plan_moves(row, machine, profile, time=time, T1=T1)
+    if plans.reason[0] != CERTAIN:
+        reason = REASONS[plans.reason[0]]
+        raise PlanError(
+            f"the move is not planned: {reason}",
+            "a controller would make it by itself; see 'What is left alone' in the README",
+        )
+    step = np.ones(len(AXES))
+    for described in machine.axes:
+        step[AXES.index(described.name)] = described.resolution
+    zero = np.zeros((1, len(AXES)))
+    batch = next(make_streams(plans, Spelling(zero, step[np.newaxis, :], zero), 1))
+    return Plan(machine, {a.upper(): float(x) for a, x in displacement.items()}, plans, batch)

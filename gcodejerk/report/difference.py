@@ -1,0 +1,51 @@
+"""What would change in a program, in the form of `diff -u`.
+
+The streams are the only differences and where they are is known, so nothing has to be searched for.
+"""
+
+from __future__ import annotations
+
+from typing import BinaryIO
+
+from gcodejerk.process import TERMINATOR_LENGTH, Result
+
+
+def difference(source: BinaryIO, target: BinaryIO, result: Result) -> bytes:
+    """A unified difference between a program and its output, without lines of context.
+
+    Parameters
+    ----------
+    source, target : binary files
+        The program and its output.
+    result : Result
+        What was done, with the place of every stream.
+
+    Returns
+    -------
+    bytes
+        Empty where nothing changes.
+    """
+    name = result.program.name.encode()
+    out = [b"--- %s\n+++ %s (gcodejerk)\n" % (name, name)]
+    added = 0
+    rapids = result.program.rapids
+    for begin, end, row in result.edits.tolist():
+        target.seek(begin)
+        new = target.read(end - begin).splitlines(keepends=True)
+        old: list[bytes] = []
+        # The stamp is inserted behind the first line at the most: an opening %.
+        line = 1 if result.program.insert_at else 0
+        if row >= 0:
+            line = int(rapids.line[row])
+            source.seek(int(rapids.begin[row]))
+            size = rapids.end[row] - rapids.begin[row] + TERMINATOR_LENGTH[rapids.terminator[row]]
+            old = [source.read(int(size))]
+        out.append(b"@@ -%d,%d +%d,%d @@\n" % (line, len(old), line + added, len(new)))
+        out += [b"-" + _ended(text) for text in old] + [b"+" + _ended(text) for text in new]
+        added += len(new) - len(old)
+    return b"".join(out) if len(out) > 1 else b""
+
+
+def _ended(line: bytes) -> bytes:
+    """A line with its end, or with diff's note that it has none."""
+    return line if line.endswith((b"\n", b"\r")) else line + b"\n\\ No newline at end of file\n"

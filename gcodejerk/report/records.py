@@ -1,0 +1,278 @@
+"""The JSON report: plain dictionaries with the keys of the contract, in its order.
+
+Rule: everything in a record is a Python number, string, list, dictionary or None. What is unknown is
+None, so that the file is strict JSON: NaN has no place in it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk import __version__
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.motion.laws import Array
+from gcodejerk.move import Plan
+from gcodejerk.nc import Rapids
+from gcodejerk.plan import Plans
+from gcodejerk.process import Result
+from gcodejerk.reasons import REASONS
+
+Record = dict[str, Any]
+DIGITS = 10
+"""Significant digits of a number in a report."""
+
+
+class Records:
+    """Records of planned moves; what is computed for all of them at once is computed once."""
+
+    def __init__(self, plans: Plans, kept: NDArray[np.bool_], residual: Array, conventional: Array) -> None:
+        self.plans, self.kept = plans, kept
+        self.residual, self.conventional = residual, conventional
+        interval = plans.machine.interval
+        usual = np.ceil(plans.conventional_time / interval - 1e-6)
+        extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
+        self.extension = extra * interval
+        written = kept[plans.move] if len(plans) else np.zeros(0, dtype=bool)
+        self.laws = plans.laws.replaced(written, plans.conventional.take(written))
+        self.peaks = (self.laws.velocity, self.laws.acceleration, self.laws.jerk)
+
+    def summary(self) -> Record:
+        """The counts and totals of all moves."""
+        plans, planned = self.plans, self.plans.planned
+        codes, counts = np.unique(plans.reason[~planned], return_counts=True)
+        order = np.argsort(-counts, kind="stable")
+        return {
+            "rapids": len(plans),
+            "planned": int(np.count_nonzero(planned)),
+            "left": int(np.count_nonzero(~planned)),
+            "left_by_reason": {str(REASONS[codes[k]]): int(counts[k]) for k in order},
+            "rapid_time": number(float(plans.counts.sum()) * plans.machine.interval),
+            "conventional_time": number(float(plans.conventional_time[planned].sum())),
+            "extended": int(np.count_nonzero(self.extension)),
+            "worst_residual": _largest(self.residual[planned]),
+            "worst_conventional_residual": _largest(self.conventional[planned]),
+        }
+
+    def motion(self, row: int) -> Record:
+        """Status, times, segments, peaks and residuals of one move."""
+        plans = self.plans
+        planned = bool(plans.planned[row])
+        record: Record = {
+            "status": "planned" if planned else "left",
+            "reason": None if planned else str(REASONS[plans.reason[row]]),
+            "length": number(float(plans.length[row])) if plans.length[row] > 0.0 else None,
+            "time": None,
+            "conventional_time": number(float(plans.conventional_time[row])) or None,
+            "extension": None,
+            "profile": None,
+            "segments": None,
+            "peak": None,
+            "residual": None,
+        }
+        if planned:
+            of_move = plans.laws_of(row)
+            kept = bool(self.kept[row])
+            record |= {
+                "time": number(float(plans.counts[row]) * plans.machine.interval),
+                "extension": number(float(self.extension[row])),
+                "profile": "conventional" if kept else plans.profile(of_move.start),
+                "segments": self._segments(row, of_move),
+                "peak": self._peak(of_move),
+                "residual": self._residual(row),
+            }
+        return record
+
+    def _segments(self, row: int, of_move: range) -> Any:
+        """Segments of the common law, or of each axis's."""
+        plans = self.plans
+        interval = plans.machine.interval
+        if plans.machine.positioning == "linear":
+            total = float(plans.counts[row]) * interval
+            return _scaled(self.laws.segments(of_move.start), float(plans.length[row]), total)
+        out: Record = {}
+        for k in of_move:
+            axis = int(np.argmax(plans.share[k] != 0.0))
+            length, total = abs(float(plans.share[k, axis])), float(plans.law_counts[k]) * interval
+            out[AXES[axis]] = _scaled(self.laws.segments(k), length, total)
+        return out
+
+    def _peak(self, of_move: range) -> Record:
+        """Peaks of each moving axis."""
+        out: Record = {}
+        for k in of_move:
+            for axis in np.nonzero(self.plans.share[k])[0]:
+                size = abs(float(self.plans.share[k, axis]))
+                names = ("velocity", "acceleration", "jerk")
+                out[AXES[axis]] = {
+                    name: number(float(peak[k]) * size)
+                    for name, peak in zip(names, self.peaks, strict=True)
+                }
+        return out
+
+    def _residual(self, row: int) -> list[Record]:
+        """Residual of every mode that the move excites."""
+        out = []
+        modes = self.plans.modes
+        moving = self.plans.displacement[row] != 0.0
+        for m, (label, mode) in enumerate(zip(modes.labels, modes.modes, strict=True)):
+            if not np.any(moving & (modes.participation[m] != 0.0)):
+                continue
+            own, usual = float(self.residual[row, m]), float(self.conventional[row, m])
+            square = (2.0 * math.pi * mode.frequency) ** 2
+            out.append(
+                {
+                    "axis": label,
+                    "mode": mode.name,
+                    "frequency": number(mode.frequency),
+                    "damping": number(mode.damping),
+                    "acceleration": number(own * square),
+                    "displacement": number(own),
+                    "conventional_acceleration": number(usual * square),
+                    "conventional_displacement": number(usual),
+                }
+            )
+        return out
+
+
+def process_record(result: Result, machine: Machine, output: str | None, blocks: list[str]) -> Record:
+    """The report on one processed program.
+
+    Parameters
+    ----------
+    result : Result
+        Of `process`.
+    machine : Machine
+        What it was processed for.
+    output : str or None
+        Name of the file that was written.
+    blocks : list of str
+        Text of each rapid's block.
+
+    Returns
+    -------
+    dict
+        Section 4 of the contract.
+    """
+    records = Records(result.plans, result.kept, result.residual, result.conventional_residual)
+    rapids = result.program.rapids
+    rows = [
+        {
+            "line": int(rapids.line[row]),
+            "block": blocks[row],
+            "start": _positions(rapids, rapids.start[row], row),
+            "end": _positions(rapids, rapids.target[row], row),
+        }
+        | records.motion(row)
+        for row in range(len(rapids))
+    ]
+    summary = {"blocks": result.program.blocks} | records.summary()
+    return _head(machine, result.controller, result.form, result.profile) | {
+        "input": result.program.name,
+        "output": output,
+        "dialect": result.program.dialect,
+        "summary": summary,
+        "notes": list(result.notes),
+        "verified": None if result.verification is None else result.verification.ok,
+        "rapids": rows,
+    }
+
+
+def move_record(plan: Plan) -> Record:
+    """The report on one planned move, in the same form."""
+    records = Records(plan.plans, plan.kept, plan.residual, plan.conventional_residual)
+    end = {axis: number(length) for axis, length in plan.displacement.items()}
+    row = {
+        "line": None,
+        "block": None,
+        "start": dict.fromkeys(end, 0.0),
+        "end": end,
+    } | records.motion(0)
+    for entry, (own, usual) in zip(row["residual"], plan.unsampled(), strict=True):
+        entry["profile_acceleration"] = number(own)
+        entry["conventional_profile_acceleration"] = number(usual)
+    return _head(plan.machine, "csv", "stream", plan.profile) | {
+        "input": None,
+        "output": None,
+        "dialect": None,
+        "summary": {"blocks": 0} | records.summary(),
+        "notes": [],
+        "verified": None,
+        "rapids": [row],
+    }
+
+
+def conventional_motion(plan: Plan) -> Record:
+    """Time, segments and peaks of the controller's own G0, as the `motion` of a record has them."""
+    plans = plan.plans
+    usual = replace(plans, laws=plans.conventional, kept=np.ones_like(plans.kept))
+    records = Records(usual, np.ones(1, dtype=bool), plan.residual, plan.conventional_residual)
+    motion = records.motion(0) | {"time": number(plan.conventional_time)}
+    if isinstance(motion["segments"], list):
+        motion["segments"] = _scaled(plans.conventional.segments(0), plan.length, 0.0)
+    else:
+        for k in plans.laws_of(0):
+            axis = AXES[int(np.argmax(plans.share[k] != 0.0))]
+            motion["segments"][axis] = _scaled(plans.conventional.segments(k), 1.0, 0.0)
+    return motion
+
+
+def stream_csv(plan: Plan) -> bytes:
+    """The stream of a plan as a table: t and every axis of the machine, in mm and degrees."""
+    positions = plan.positions
+    lines = [",".join(["t", *positions])]
+    for row, t in enumerate(plan.t):
+        lines.append(",".join([f"{t:.10g}", *(f"{q[row]:.10g}" for q in positions.values())]))
+    return "
+".join(lines).encode() + b"
+"
+
+
+def _head(machine: Machine, controller: str, form: str, profile: str) -> Record:
+    """What every report begins with."""
+    return {
+        "gcodejerk": __version__,
+        "input": None,
+        "output": None,
+        "machine": machine.source,
+        "controller": controller,
+        "as": form,
+        "profile": profile,
+        "positioning": machine.positioning,
+        "interval": machine.interval,
+    }
+
+
+def number(value: float) -> float | None:
+    """A number with the digits that mean something; None where it is not finite."""
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
+
+
+def dump(record: Record) -> bytes:
+    """A record as the text of a JSON file."""
+    return json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def _scaled(segments: list[tuple[float, float]], length: float, time: float) -> list[Record]:
+    """Segments scaled to a length; a rest fills up the time of a law that is shorter."""
+    out = [{"duration": number(d), "jerk": number(j * length)} for d, j in segments]
+    rest = time - sum(d for d, _ in segments)
+    if rest > 1e-9:
+        out.append({"duration": number(rest), "jerk": 0.0})
+    return out
+
+
+def _positions(rapids: Rapids, position: Any, row: int) -> Record:
+    """Positions of the axes that the block names, None where unknown."""
+    words = int(rapids.words[row])
+    return {axis: number(float(position[k])) for k, axis in enumerate(AXES) if words >> k & 1}
+
+
+def _largest(residual: Array) -> float | None:
+    """The largest residual of all rapids and modes. [mm]"""
+    return number(float(residual.max())) if residual.size else None

@@ -1,0 +1,190 @@
+"""Tables and lines for a terminal: what a person sees of a result.
+
+Rule: a table says what the JSON report says, in fewer digits. Lengths are mm (or deg), residuals um.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+UM_PER_MM = 1000.0
+MS_PER_S = 1000.0
+Record = dict[str, Any]
+
+
+def rapids_table(record: Record) -> Table:
+    """All rapids of a program: line, from, to, length, times, residual, and why one is left alone.
+
+    Parameters
+    ----------
+    record : dict
+        From `records.process_record`.
+
+    Returns
+    -------
+    Table
+    """
+    table = _table(
+        ("line", "right"),
+        ("from", "left"),
+        ("to", "left"),
+        ("length\n[mm]", "right"),
+        ("conventional\n[ms]", "right"),
+        ("planned\n[ms]", "right"),
+        ("residual [um]\nnow -> planned", "right"),
+        ("status", "left"),
+    )
+    for row in record["rapids"]:
+        planned = row["status"] == "planned"
+        status = row["profile"] if planned else f"left alone: {row['reason']}"
+        table.add_row(
+            str(row["line"]),
+            _position(row["start"]),
+            _position(row["end"]),
+            _number(row["length"], ".3f"),
+            _ms(row["conventional_time"], ".1f"),
+            _ms(row["time"], ".0f"),
+            _worst(row["residual"]) if planned else "",
+            Text(status, style="" if planned else "yellow"),
+        )
+    return table
+
+
+def summary_line(record: Record) -> str:
+    """One line: how many rapids were rewritten, what that gains, what was left alone and why."""
+    summary = record["summary"]
+    rapids = _count(summary["rapids"], "rapid")
+    if not summary["rapids"]:
+        return f"{record['input']}: 0 rapids found, nothing to do"
+    parts = [f"{record['input']}: {rapids}, {summary['planned']} rewritten"]
+    if summary["planned"] and summary["worst_conventional_residual"]:
+        now = summary["worst_conventional_residual"] * UM_PER_MM
+        then = summary["worst_residual"] * UM_PER_MM
+        parts.append(f"worst residual {now:.1f} -> {then:.1f} um")
+    if summary["extended"]:
+        extra = (summary["rapid_time"] - summary["conventional_time"]) * MS_PER_S
+        parts.append(f"{summary['extended']} longer than today, {extra:.0f} ms in all")
+    if summary["left"]:
+        why = ", ".join(f"{count} {reason}" for reason, count in summary["left_by_reason"].items())
+        parts.append(f"{summary['left']} left alone ({why})")
+    return "; ".join(parts)
+
+
+def move_tables(record: Record, conventional: Record) -> list[Table]:
+    """One planned move beside the conventional one: times and peaks, then residuals.
+
+    Parameters
+    ----------
+    record, conventional : dict
+        From `records.move_record`, of the design and of the conventional profile (which may be
+        a record whose rapid has no stream: its motion alone is shown).
+
+    Returns
+    -------
+    list of Table
+    """
+    row, usual = record["rapids"][0], conventional
+    table = _table(
+        ("profile", "left"),
+        ("T_SUM\n[ms]", "right"),
+        ("segments\n[ms]", "left"),
+        ("axis", "left"),
+        ("velocity\n[mm/s]", "right"),
+        ("acceleration\n[mm/s^2]", "right"),
+        ("jerk\n[mm/s^3]", "right"),
+    )
+    for name, motion in ((row["profile"], row), ("conventional today", usual)):
+        for k, (axis, peak) in enumerate(motion["peak"].items()):
+            segments = motion["segments"]
+            if isinstance(segments, dict):
+                segments = segments[axis]
+            table.add_row(
+                name if k == 0 else "",
+                _ms(motion["time"], ".4g") if k == 0 else "",
+                " / ".join(f"{s['duration'] * MS_PER_S:.4g}" for s in segments)
+                if k == 0 or isinstance(motion["segments"], dict)
+                else "",
+                axis,
+                _number(peak["velocity"], ".2f"),
+                _number(peak["acceleration"], ".1f"),
+                "step" if peak["jerk"] is None else _number(peak["jerk"], ".4g"),
+            )
+    return [table, _residual_table(row["residual"])]
+
+
+def _residual_table(residual: Sequence[Record]) -> Table:
+    """What each mode keeps: of the profiles, and of the streams as sampled and written."""
+    table = _table(
+        ("axis", "left"),
+        ("mode", "left"),
+        ("frequency\n[Hz]", "right"),
+        ("damping\n[-]", "right"),
+        ("profile [mm/s^2]\ntoday -> planned", "right"),
+        ("stream [mm/s^2]\ntoday -> planned", "right"),
+        ("stream [um]\ntoday -> planned", "right"),
+    )
+    for entry in residual:
+        pairs = (
+            (entry["conventional_profile_acceleration"], entry["profile_acceleration"], ".1f"),
+            (entry["conventional_acceleration"], entry["acceleration"], ".1f"),
+            (
+                entry["conventional_displacement"] * UM_PER_MM,
+                entry["displacement"] * UM_PER_MM,
+                ".2f",
+            ),
+        )
+        table.add_row(
+            entry["axis"],
+            entry["mode"],
+            f"{entry['frequency']:g}",
+            f"{entry['damping']:g}",
+            *(f"{now:{form}} -> {then:{form}}" for now, then, form in pairs),
+        )
+    return table
+
+
+def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
+    """Emitters: name, what each can write, and how far its facts can be trusted."""
+    table = _table(("controller", "left"), ("form", "left"), ("confidence", "left"), ("note", "left"))
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _table(*columns: tuple[str, str]) -> Table:
+    """A table without frame, its head underlined."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
+    for name, justify in columns:
+        table.add_column(name, justify=justify, overflow="fold")  # type: ignore[arg-type]
+    return table
+
+
+def _position(position: dict[str, float | None]) -> str:
+    """`X1.5 Z?` with a question mark for what is unknown."""
+    return " ".join(f"{axis}{'?' if x is None else f'{x:.6g}'}" for axis, x in position.items())
+
+
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else f"{value:{form}}"
+
+
+def _ms(value: float | None, form: str) -> str:
+    return "" if value is None else f"{value * MS_PER_S:{form}}"
+
+
+def _worst(residual: Sequence[Record]) -> str:
+    """The largest residual displacement now and as planned."""
+    if not residual:
+        return "no modes"
+    now = max(entry["conventional_displacement"] for entry in residual) * UM_PER_MM
+    then = max(entry["displacement"] for entry in residual) * UM_PER_MM
+    return f"{now:.2f} -> {then:.2f}"
+
+
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}" + ("" if count == 1 else "s")
