@@ -1,0 +1,248 @@
+"""Proof that a processed program is the original with only its rapids re-timed.
+
+It reads both files from their bytes, with means of its own: how a stream was planned or written
+it does not know and cannot ask (`tests/unit/test_layers.py`). What it shares with the writing side is `nc`,
+which says where the rapids are and what is in force there.
+
+    verify(original, processed, machine)       -> Verification
+    require(verification)                      raises VerifyError unless it is all right
+
+What is checked, module by module: `walk` (every other byte is kept), `form` (the lines of a stream,
+modal values restored), `points` (exact ends, straight, never backwards), `dynamics` (duration and
+limits), `feeds` (F words), `table` (controller `csv`).
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import BinaryIO
+
+from gcodejerk.errors import VerifyError
+from gcodejerk.machine import Machine
+from gcodejerk.nc import Dialect, Program, Start, read_program
+from gcodejerk.start import program_start
+from gcodejerk.verify.dynamics import check_dynamics, stride_of
+from gcodejerk.verify.findings import Findings, Kind, Verification, Violation, require
+from gcodejerk.verify.form import Stream
+from gcodejerk.verify.points import Paths, Reader, check_line, check_rapids
+from gcodejerk.verify.source import Window
+from gcodejerk.verify.table import TableReader
+from gcodejerk.verify.walk import Walk
+
+__all__ = [
+    "Kind",
+    "Verification",
+    "Violation",
+    "require",
+    "verify",
+    "verify_csv",
+    "verify_files",
+]
+
+MOST = 100
+"""Violations that are collected, unless asked otherwise."""
+BATCH_BYTES = 4 << 20
+"""Text of streams that is judged at a time."""
+NAMES = ("<original>", "<processed>")
+
+
+def verify(
+    original: bytes | str | Path,
+    processed: bytes | str | Path,
+    machine: Machine,
+    *,
+    dialect: str | Dialect | None = None,
+    most: int = MOST,
+) -> Verification:
+    r"""Compare a processed program with its original.
+
+    Parameters
+    ----------
+    original, processed : bytes, str or Path
+        The programs themselves, or the names of their files. A file is read in bounded memory.
+    machine : Machine
+        What the program was processed for.
+    dialect : str or Dialect, optional
+        How the original is written; the machine's by default.
+    most : int, optional
+        Violations after which it stops.
+
+    Returns
+    -------
+    Verification
+        With every violation that was found, in the order of the processed file.
+
+    Raises
+    ------
+    ProgramError
+        The original cannot be a program.
+    VerifyError
+        A file cannot be read.
+
+    Examples
+    --------
+    >>> from gcodejerk.machine import find_machine
+    >>> vmc = Machine.load(find_machine("vmc"))
+    >>> verify(b"G21 G90 G0 X1\nM2\n", b"G21 G90 G0 X1\nM2\n", vmc).ok
+    True
+    >>> found = verify(b"G21 G90 G0 X1\nM2\n", b"G21 G90 G0 X2\nM2\n", vmc)
+    >>> str(found.violations[0].kind), found.violations[0].line
+    ('line changed', 1)
+    """
+    with ExitStack() as stack:
+        one, other = (stack.enter_context(_opened(given)) for given in (original, processed))
+        names = (_name(original, NAMES[0]), _name(processed, NAMES[1]))
+        return verify_files(one, other, machine, names=names, dialect=dialect, most=most)
+
+
+def _name(given: bytes | str | Path, instead: str) -> str:
+    """Name a file for messages."""
+    return instead if isinstance(given, bytes) else str(given)
+
+
+def _opened(given: bytes | str | Path) -> BinaryIO:
+    """Open a file for reading."""
+    if isinstance(given, bytes):
+        return io.BytesIO(given)
+    try:
+        return open(given, "rb")
+    except OSError as error:
+        raise VerifyError(
+            f"cannot read '{given}': {error.strerror}", "give the name of a file that can be read"
+        ) from error
+
+
+def verify_files(
+    original: BinaryIO,
+    processed: BinaryIO,
+    machine: Machine,
+    *,
+    names: tuple[str, str] = NAMES,
+    dialect: str | Dialect | None = None,
+    start: Start | None = None,
+    most: int = MOST,
+) -> Verification:
+    """Compare open files; see `verify`.
+
+    Parameters
+    ----------
+    original, processed : BinaryIO
+        Opened for reading bytes, at their beginning; the original is read twice, so it is seekable.
+    machine : Machine
+        What the program was processed for.
+    names : tuple of str, optional
+        For messages.
+    dialect : str or Dialect, optional
+        The machine's by default.
+    start : Start, optional
+        What the original may assume; the machine's `program` by default.
+    most : int, optional
+        Violations after which it stops.
+
+    Returns
+    -------
+    Verification
+        With every violation that was found.
+
+    Raises
+    ------
+    ProgramError
+        The original cannot be a program.
+    """
+    program = _read(original, machine, names[0], dialect, start)
+    found = Findings(most)
+    walk = Walk(Window(original), Window(processed), program, found)
+    reader = Reader(program.rapids, machine, found)
+    stride = stride_of(machine)
+    for streams in _batches(_checked(walk, reader)):
+        _judge(reader.paths(streams), program, machine, stride, found)
+    return Verification(len(program.rapids), walk.rewritten, walk.kept, found.sorted(), names)
+
+
+def verify_csv(
+    original: BinaryIO,
+    table: BinaryIO,
+    machine: Machine,
+    *,
+    names: tuple[str, str] = NAMES,
+    dialect: str | Dialect | None = None,
+    start: Start | None = None,
+    most: int = MOST,
+) -> Verification:
+    """Compare a table of streams (controller `csv`) with the program that it belongs to.
+
+    Parameters
+    ----------
+    original, table : BinaryIO
+        Opened for reading bytes, at their beginning.
+    machine, names, dialect, start, most
+        As for `verify_files`.
+
+    Returns
+    -------
+    Verification
+        Lines of violations are those of the table; no line counts as kept.
+
+    Raises
+    ------
+    ProgramError
+        The original cannot be a program.
+    """
+    program = _read(original, machine, names[0], dialect, start)
+    found = Findings(most)
+    reader = TableReader(table, program.rapids, machine, found)
+    for paths in reader.paths():
+        _judge(paths, program, machine, 1, found)
+    return Verification(len(program.rapids), reader.rewritten, 0, found.sorted(), names)
+
+
+def _read(
+    original: BinaryIO,
+    machine: Machine,
+    name: str,
+    dialect: str | Dialect | None,
+    start: Start | None,
+) -> Program:
+    """Read the original, then go back to its beginning."""
+    begin = original.tell()
+    program = read_program(
+        original,
+        name=name,
+        dialect=dialect or machine.dialect,
+        start=program_start(machine) if start is None else start,
+    )
+    original.seek(begin)
+    return program
+
+
+def _checked(walk: Walk, reader: Reader) -> Iterator[Stream]:
+    """Streams whose axes are right."""
+    for stream in walk.streams():
+        if reader.check_end(stream, walk.block):
+            yield stream
+
+
+def _batches(streams: Iterator[Stream]) -> Iterator[list[Stream]]:
+    """Streams in lists, each of some MB of text."""
+    batch: list[Stream] = []
+    size = 0
+    for stream in streams:
+        batch.append(stream)
+        size += len(stream.text) + 64 * len(stream.rest)
+        if size > BATCH_BYTES:
+            yield batch
+            batch, size = [], 0
+    if batch:
+        yield batch
+
+
+def _judge(paths: Paths, program: Program, machine: Machine, stride: int, found: Findings) -> None:
+    """All checks on points."""
+    check_rapids(paths, program.rapids, machine, found)
+    check_line(paths, machine, found)
+    # A rapid without length has no time law.
+    if (paths.displacement != 0.0).any(axis=1).all():
+        check_dynamics(paths, machine, stride, found)

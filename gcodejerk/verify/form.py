@@ -1,0 +1,376 @@
+"""The text that stands in the place of a rapid, read back.
+
+This module owns the form: which lines may follow each other, and a small machine for the modal
+words that may stand in them (motion, distance, feed, path). It judges by meaning: a mode word
+more or less, the number of decimals and the order of words make no difference; anything that it does
+not know is a violation.
+
+Rule: what it cannot read it does not guess. `read_stream` then returns None, and the walk ends.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from decimal import Context, Decimal
+from functools import lru_cache
+
+from gcodejerk.nc import AXES, Block, Rapids, parse_block
+from gcodejerk.verify.findings import Findings, Kind
+from gcodejerk.verify.source import PIECE, Window
+
+LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
+"""By `Rapids.terminator`."""
+STOPS = frozenset({0.0, 1.0, 2.0, 30.0, 60.0})
+"""M words that take effect after the motion of their block."""
+COMMENT_LENGTH = 69
+LONGEST_STREAM = 1 << 26
+"""Bytes of one stream; more is not read."""
+
+_NUMBER = rb"[-+]?+(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)"
+_WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
+_WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
+_IS_POINT = re.compile(rb"[ \t]*G0?1(?![0-9.])")
+_COMMENT = re.compile(rb"\(gcodejerk: ([ -')-~*]*)\)")
+_EXACT = Context(prec=200)
+
+
+@dataclass(slots=True)
+class Modes:
+    """The modal words that a stream may touch."""
+
+    motion: int | None
+    distance: int
+    feed_mode: int
+    feed: Decimal | None
+    path: int
+    p: float
+    q: float
+
+    @classmethod
+    def after(cls, rapids: Rapids, i: int) -> Modes:
+        """List what the original has in force after the block of rapid i."""
+        feed = float(rapids.feed[i])
+        return cls(
+            0,
+            91 if rapids.incremental[i] else 90,
+            int(rapids.feed_mode[i]),
+            None if math.isnan(feed) else Decimal(repr(feed)),
+            int(rapids.path[i]),
+            float(rapids.path_p[i]),
+            float(rapids.path_q[i]),
+        )
+
+    def apply(self, words: list[tuple[str, Decimal]]) -> str | None:
+        """Execute a line without motion; what is wrong with it."""
+        seen = [letter + str(value) if letter == "G" else letter for letter, value in words]
+        if len(set(seen)) < len(seen):
+            return "a word stands twice"
+        codes = {float(value) for letter, value in words if letter == "G"}
+        values = {letter: value for letter, value in words if letter != "G"}
+        if not set(values) <= {"F", "P", "Q"}:
+            return f"word {min(set(values) - {'F', 'P', 'Q'})} has no place here"
+        for group in ({90.0, 91.0}, {93.0, 94.0, 95.0}, {61.0, 61.1, 64.0}, {0.0, 4.0}):
+            if len(codes & group) > 1:
+                return "two codes of one modal group"
+        known = {0.0, 4.0, 61.0, 61.1, 64.0, 90.0, 91.0, 93.0, 94.0, 95.0}
+        if not codes <= known:
+            return f"G{min(codes - known):g} has no place here"
+        if 4.0 in codes and (len(codes) > 1 or values != {"P": 0}):
+            return "only G4 P0 may stand here"
+        if ("P" in values or "Q" in values) and not codes & {4.0, 64.0}:
+            return "P or Q without G64"
+        self._set(codes, values)
+        return None
+
+    def _set(self, codes: set[float], values: dict[str, Decimal]) -> None:
+        """Change what the words say, the feed mode before the feed."""
+        for code in codes:
+            if code == 0.0:
+                self.motion = 0
+            elif code in (90.0, 91.0):
+                self.distance = int(code)
+            elif code in (93.0, 94.0, 95.0) and int(code) != self.feed_mode:
+                self.feed_mode, self.feed = int(code), None
+            elif code in (61.0, 61.1, 64.0):
+                self.path = 62 if code == 61.1 else int(code)
+                self.p = float(values.get("P", math.nan)) if code == 64.0 else math.nan
+                self.q = float(values.get("Q", math.nan)) if code == 64.0 else math.nan
+        if "F" in values:
+            self.feed = values["F"]
+
+
+@dataclass(slots=True)
+class Stream:
+    """What stands in the place of one rapid."""
+
+    rapid: int
+    """Index into the original's rapids."""
+    original_line: int
+    line: int
+    """Of the first point, in the processed file."""
+    letters: str
+    """Axes of the points in `text`, in the order written."""
+    text: bytes
+    """The points that are written alike."""
+    rest: list[dict[str, Decimal]] = field(default_factory=list)
+    """The points after these, by letter, F included."""
+
+    @property
+    def ends(self) -> dict[str, Decimal]:
+        """Where the stream ends, or, in increments, how far it goes, exactly."""
+        ends: dict[str, Decimal] = {}
+        if self.letters and not self.rest:
+            last = self.text.rstrip().rpartition(b"\n")[2]
+            ends.update(dict(read_words(last) or ()))
+        for words in self.rest:
+            ends.update(words)
+        return ends
+
+    def sums(self) -> dict[str, Decimal]:
+        """Sum of the numbers of each axis, exactly."""
+        sums = dict.fromkeys(self.letters, Decimal(0))
+        for letter, number in _WORD.findall(self.text):
+            axis = letter.decode()
+            if axis in sums:
+                sums[axis] = _EXACT.add(sums[axis], Decimal(number.decode()))
+        for words in self.rest:
+            for axis, number in words.items():
+                sums[axis] = _EXACT.add(sums.get(axis, Decimal(0)), number)
+        return sums
+
+
+def read_words(line: bytes) -> list[tuple[str, Decimal]] | None:
+    """Read the words of a line that holds nothing else; None where it does."""
+    if not _WORDS.fullmatch(line):
+        return None
+    return [(letter.decode(), Decimal(text.decode())) for letter, text in _WORD.findall(line)]
+
+
+def head_of(block: Block, text: bytes) -> tuple[bytes, bool]:
+    """Take axis words and stops out of a block; what is left, and whether it says anything."""
+    out = [w for w in block.words if w.letter in AXES or _is_stop(w.letter, w.value)]
+    kept, at = [], 0
+    for word in sorted(out, key=lambda w: w.begin):
+        kept.append(text[at : word.begin])
+        at = word.end
+    kept.append(text[at:])
+    left = [w for w in block.words if w not in out and not (w.letter == "G" and w.value == 0.0)]
+    return b"".join(kept), bool(left or block.comments)
+
+
+def _is_stop(letter: str, value: float | None) -> bool:
+    return letter == "M" and value in STOPS
+
+
+@lru_cache(maxsize=256)
+def _run_of(letters: str, line_end: bytes) -> re.Pattern[bytes]:
+    """Lines of points with these axes, one after another."""
+    words = b"".join(
+        rb"[ \t]*+" + letter.encode() + rb"[ \t]*+" + _NUMBER for letter in letters + "F"
+    )
+    return re.compile(rb"(?:G0?1" + words + rb"[ \t]*+" + re.escape(line_end) + rb")*+")
+
+
+class StreamReader:
+    """Reads one replacement; what is wrong with its form goes to the findings."""
+
+    def __init__(
+        self, window: Window, rapids: Rapids, i: int, text: bytes, newline: bytes, found: Findings
+    ) -> None:
+        self.window, self.rapids, self.i, self.text, self.found = window, rapids, i, text, found
+        self.original_line = int(rapids.line[i])
+        last = LINE_ENDS[int(rapids.terminator[i])]
+        self.last_end = last
+        self.line_end = last if last.endswith(b"\n") else newline
+        self.block = parse_block(text)
+        self.modes = Modes.after(rapids, i)
+
+    def complain(self, kind: Kind, problem: str, line: int | None = None) -> None:
+        """Note what is wrong."""
+        self.found.add(kind, line or self.window.line, self.original_line, problem)
+
+    def peek(self) -> bytes:
+        """Look at the next line without its end."""
+        return self.window.peek_line().removesuffix(self.line_end)
+
+    def next(self) -> None:
+        """Go to the next line; the end of this one must be the block's."""
+        line = self.window.peek_line()
+        if not line.endswith(self.line_end) or line.endswith(b"\r" + self.line_end):
+            self.complain(Kind.LINE_END, f"line end is not {self.line_end!r} as in the original")
+        self.window.skip(len(line))
+
+    def last(self, more: bool) -> None:
+        """Pass the end of a line that may be the last one, whose end is the block's own."""
+        if more:
+            self.next()
+            return
+        line = self.window.peek_line()
+        if self.last_end.endswith(b"\n"):
+            self.next()
+            return
+        if line.rstrip(b"\r\n") + self.last_end != line:
+            self.complain(Kind.LINE_END, "the file's last line does not end as it did")
+        self.window.skip(len(line))
+
+    def read(self) -> Stream | None:
+        """Read all of it; None where that is not possible."""
+        self._comment()
+        if not self._head() or not self._setup():
+            return None
+        stream = self._points()
+        if stream is None or not self._tail():
+            return None
+        return stream
+
+    def _comment(self) -> None:
+        line = self.peek()
+        if not line.startswith(b"(gcodejerk:"):
+            return
+        match = _COMMENT.fullmatch(line)
+        words = b"".join(b"".join(w.text.split()) for w in self.block.words)
+        named = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
+        if match is None or len(line) > COMMENT_LENGTH:
+            self.complain(Kind.COMMENT, "comment is not one of ours, or too long")
+        else:
+            body = match[1].replace(b" ", b"")
+            cut = body.endswith(b"...") and len(body) > 3
+            if not (named.startswith(body[:-3]) if cut else named == body):
+                self.complain(Kind.COMMENT, f"comment names {match[1]!r}, not the replaced block")
+        self.next()
+
+    def _head(self) -> bool:
+        head, needed = head_of(self.block, self.text)
+        line = self.peek()
+        if line in (head, head.rstrip(b" \t")) and line.strip():
+            self.next()
+            return True
+        if needed:
+            shown = head.decode("latin-1").strip()
+            self.complain(
+                Kind.HEAD, f"expected the block's other words, '{shown}', and nothing else"
+            )
+        return not needed
+
+    def _setup(self) -> bool:
+        """Pass the lines in front of the points."""
+        for _ in range(4):
+            line = self.peek()
+            if _IS_POINT.match(line):
+                break
+            words = read_words(line)
+            problem = "this is no line of a stream" if words is None else self.modes.apply(words)
+            if problem:
+                shown = line[:60].decode("latin-1")
+                self.complain(Kind.FORM, f"{problem}: '{shown}'")
+                return False
+            self.next()
+        modes = self.modes
+        if modes.feed_mode != 94:
+            self.complain(Kind.MODE, f"feed mode is G{modes.feed_mode or '?'}, a stream needs G94")
+        if modes.path in (61, 62):
+            self.complain(Kind.MODE, "exact stop or exact path is in force, a stream needs G64")
+        if (modes.distance == 91) != bool(self.rapids.incremental[self.i]):
+            self.complain(Kind.MODE, "distance mode is not that of the original")
+        return True
+
+    def _points(self) -> Stream | None:
+        window, first = self.window, self.window.line
+        words = read_words(self.peek())
+        if words is None or not words or words[0] != ("G", Decimal(1)):
+            self.complain(Kind.FORM, "points of a stream are missing")
+            return None
+        letters = "".join(letter for letter, _ in words[1:-1])
+        stream = Stream(self.i, self.original_line, first, "", b"")
+        if (
+            words[-1][0] == "F"
+            and all(c in AXES for c in letters)
+            and len(set(letters)) == len(letters)
+        ):
+            stream.letters = letters
+            size = 1 << 13
+            while True:
+                have = window.fill(size)
+                match = _run_of(letters, self.line_end).match(
+                    window.data, window.at, window.at + have
+                )
+                assert match is not None
+                if have < size or match.end() < window.at + have - 512 or size > LONGEST_STREAM:
+                    break
+                size *= 4
+            stream.text = match[0]
+            window.skip(len(match[0]))
+        while _IS_POINT.match(line := self.peek()):
+            words = read_words(line)
+            by_letter = dict(words[1:]) if words else {}
+            if not words or words[0] != ("G", Decimal(1)) or len(by_letter) != len(words) - 1:
+                self.complain(Kind.FORM, f"this is no point: '{line[:60].decode('latin-1')}'")
+                return None
+            if "F" not in by_letter or not set(by_letter) <= {*AXES, "F"}:
+                self.complain(Kind.FORM, "a point holds axis words and F, nothing else")
+                return None
+            stream.rest.append(by_letter)
+            if len(stream.rest) > PIECE:
+                self.complain(Kind.FORM, "stream is endless")
+                return None
+            self.next()
+        self.modes.motion, self.modes.feed = 1, None
+        return stream
+
+    def _tail(self) -> bool:
+        stops = [(w.letter, w.value) for w in self.block.words if _is_stop(w.letter, w.value)]
+        line = self.window.peek_line().rstrip(b"\r\n")
+        words = read_words(line)
+        problem = "the modes are not restored" if words is None else self.modes.apply(words)
+        if problem:
+            self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
+            return False
+        self._compare(Modes.after(self.rapids, self.i))
+        self.last(more=bool(stops))
+        if stops:
+            line = self.window.peek_line().rstrip(b"\r\n")
+            written = read_words(line) or []
+            if [(letter, float(value)) for letter, value in written] != stops:
+                wanted = " ".join(f"{letter}{value:g}" for letter, value in stops)
+                self.complain(Kind.STOP, f"expected {wanted}, which the block holds")
+                return False
+            self.last(more=False)
+        return True
+
+    def _compare(self, wanted: Modes) -> None:
+        """Compare what is in force after the stream with what was after the block."""
+        modes = self.modes
+        if modes.motion != 0:
+            self.complain(Kind.MOTION, "G1 stays in force, the original has G0 here")
+        if modes.distance != wanted.distance:
+            self.complain(
+                Kind.DISTANCE,
+                f"G{modes.distance} stays in force, the original has G{wanted.distance}",
+            )
+        if modes.feed_mode != wanted.feed_mode:
+            self.complain(
+                Kind.FEED_MODE, f"G{modes.feed_mode} stays in force, not G{wanted.feed_mode or '?'}"
+            )
+        if wanted.feed_mode != 93 and (wanted.feed is not None or self.rapids.feed_needed[self.i]):
+            if wanted.feed is None:
+                self.complain(
+                    Kind.FEED_RESTORED, "F is needed later and not known, so not restorable"
+                )
+            elif modes.feed != wanted.feed:
+                is_now = "that of the stream" if modes.feed is None else f"F{modes.feed}"
+                self.complain(
+                    Kind.FEED_RESTORED, f"F is {is_now}, the original has F{wanted.feed} in force"
+                )
+        path, original = (modes.path, modes.p, modes.q), (wanted.path, wanted.p, wanted.q)
+        if not all(a == b or (a != a and b != b) for a, b in zip(path, original, strict=True)):
+            self.complain(
+                Kind.PATH, f"path mode is {_path(path)}, the original has {_path(original)}"
+            )
+
+
+def _path(path: tuple[int, float, float]) -> str:
+    code, p, q = path
+    name = {0: "unknown", 61: "G61", 62: "G61.1", 64: "G64"}.get(code, f"G{code}")
+    return name + (f" P{p:g}" if p == p else "") + (f" Q{q:g}" if q == q else "")

@@ -1,0 +1,289 @@
+"""The points of many streams as columns, and where they lie.
+
+This module owns positions: text to numbers, the exact ends, the straight line, the way forwards.
+
+Rule: numbers that must be exact are compared as decimals, as written; everything else as float64
+in mm, with the written step as the only tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.machine import Machine
+from gcodejerk.nc import AXES, Rapids, parse_block
+from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from gcodejerk.verify.findings import Findings, Kind
+from gcodejerk.verify.form import Stream
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+STANDSTILL = 1e-9
+"""An axis that moves less does not move. [mm] or [deg]"""
+TINY = 1e-9
+"""Rounding of float64 in positions. [mm] or [deg]"""
+FINEST = 1e-3
+"""An axis that moves a few steps may be written this much finer. [steps]"""
+_NUMBERS_ONLY = bytes(c if c in b"0123456789.+-" else 32 for c in range(256))
+LINEAR = np.array([axis not in "ABC" for axis in AXES])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Paths:
+    """Streams as points; row begin[k] is the start of stream k, row end[k] - 1 its last point."""
+
+    rapid: Index
+    """Index into the rapids, of each stream."""
+    original_line: Index
+    line: Index
+    """Line of each stream's first point."""
+    begin: Index
+    end: Index
+    position: Array
+    """Shape (rows, 9). [mm] or [deg]; 0 where an axis is not named"""
+    feed: Array
+    """F of the block that ends in the row, NaN at starts. [program units/min]"""
+    start: Array
+    displacement: Array
+    """Shape (k, 9); 0 for an axis that does not move."""
+    unit: Array
+    """mm per unit of length."""
+
+    @property
+    def count(self) -> Index:
+        """Blocks of each stream."""
+        return self.end - self.begin - 1
+
+    @property
+    def owner(self) -> Index:
+        """Stream of each row."""
+        return np.repeat(np.arange(len(self.begin)), self.end - self.begin)
+
+
+class Reader:
+    """Turns streams into paths, and says which do not end where they must."""
+
+    def __init__(self, rapids: Rapids, machine: Machine, found: Findings) -> None:
+        self.rapids, self.machine, self.found = rapids, machine, found
+        self.known = sum(1 << AXES.index(name) for name in machine.axis_names)
+
+    def check_end(self, stream: Stream, block: bytes) -> bool:
+        """Compare axes and end with the words of the block, exactly; whether the axes are right."""
+        wanted = {
+            w.letter: Decimal(b"".join(w.text[1:].split()).decode())
+            for w in parse_block(block).words
+            if w.letter in AXES
+        }
+        line = stream.line + stream.text.count(b"\n") + len(stream.rest) - 1
+        used = set(stream.letters).union(*stream.rest) - {"F"}
+        if not used <= set(wanted):
+            axis = min(used - set(wanted))
+            self._complain(
+                Kind.AXES, stream, line, f"axis {axis} moves, which the block does not name"
+            )
+            return False
+        if int(self.rapids.words[stream.rapid]) & ~self.known:
+            self._complain(Kind.AXES, stream, line, "an axis that the machine does not have")
+            return False
+        incremental = bool(self.rapids.incremental[stream.rapid])
+        reached = stream.sums() if incremental else stream.ends
+        for axis, number in wanted.items():
+            if axis not in reached and self._stands(stream.rapid, axis):
+                continue
+            if reached.get(axis) != number:
+                what = f"the increments of {axis} add up to" if incremental else f"{axis} ends at"
+                problem = f"{what} {reached.get(axis, 'nothing')}, the block says {number}"
+                self._complain(Kind.END, stream, line, problem)
+        return True
+
+    def _stands(self, i: int, axis: str) -> bool:
+        k = AXES.index(axis)
+        return bool(self.rapids.start[i, k] == self.rapids.target[i, k])
+
+    def _complain(self, kind: Kind, stream: Stream, line: int, problem: str) -> None:
+        self.found.add(kind, line, stream.original_line, problem)
+
+    def paths(self, streams: Sequence[Stream]) -> Paths:
+        """Points of streams as columns."""
+        rapids = self.rapids
+        index = np.array([stream.rapid for stream in streams], dtype=np.int64)
+        fast = _fast_points(streams)
+        counts = np.array(
+            [len(f) + len(s.rest) for f, s in zip(fast, streams, strict=True)], dtype=np.int64
+        )
+        end = np.cumsum(counts + 1)
+        begin = end - counts - 1
+        raw = np.full((int(end[-1]), len(AXES) + 1), np.nan)
+        for stream, first, numbers in zip(streams, begin.tolist(), fast, strict=True):
+            columns = [_COLUMN[letter] for letter in stream.letters + "F"]
+            at = first + 1 + len(numbers)
+            raw[first + 1 : at, columns] = numbers
+            for words in stream.rest:
+                for letter, value in words.items():
+                    raw[at, _COLUMN[letter]] = value
+                at += 1
+        start = np.nan_to_num(rapids.start[index])
+        displacement = rapids.target[index] - rapids.start[index]
+        displacement = np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0)
+        unit = np.where(rapids.inch[index], MM_PER_INCH, 1.0)
+        scale = np.where(LINEAR, unit[:, np.newaxis], 1.0)
+        scale[:, 0] *= np.where(rapids.diameter[index], 0.5, 1.0)
+        owner = np.repeat(np.arange(len(index)), counts + 1)
+        position = raw[:, :-1] * scale[owner]
+        incremental = rapids.incremental[index]
+        position = np.where(
+            incremental[owner][:, np.newaxis],
+            _sum_up(position, begin, end) + start[owner],
+            _carry_on(position, begin, start),
+        )
+        return Paths(
+            rapid=index,
+            original_line=np.array([s.original_line for s in streams], dtype=np.int64),
+            line=np.array([s.line for s in streams], dtype=np.int64),
+            begin=begin,
+            end=end,
+            position=position,
+            feed=raw[:, -1],
+            start=start,
+            displacement=displacement,
+            unit=unit,
+        )
+
+
+_COLUMN = {letter: column for column, letter in enumerate(AXES + "F")}
+
+
+def _fast_points(streams: Sequence[Stream]) -> list[Array]:
+    """Numbers of the points that are written alike, one matrix for each stream."""
+    out: list[Array] = [np.zeros((0, len(s.letters) + 1)) for s in streams]
+    groups: dict[int, list[int]] = {}
+    for k, stream in enumerate(streams):
+        if stream.text:
+            groups.setdefault(len(stream.letters), []).append(k)
+    for axes, members in groups.items():
+        # The code goes out first: "G1" holds a digit.
+        text = b"".join(streams[k].text for k in members)
+        text = text.replace(b"G01", b"").replace(b"G1", b"").translate(_NUMBERS_ONLY)
+        numbers = np.fromstring(text.decode("ascii"), sep=" ").reshape(-1, axes + 1)
+        at = 0
+        for k in members:
+            lines = streams[k].text.count(b"\n")
+            out[k] = numbers[at : at + lines]
+            at += lines
+        assert at == len(numbers)
+    return out
+
+
+def _sum_up(increments: Array, begin: Index, end: Index) -> Array:
+    """Distance from each stream's start, row by row."""
+    total = np.cumsum(np.nan_to_num(increments), axis=0)
+    at_start: Array = np.repeat(total[begin], end - begin, axis=0)
+    return total - at_start
+
+
+def _carry_on(position: Array, begin: Index, start: Array) -> Array:
+    """Keep an axis that a point does not name where it was."""
+    position = position.copy()
+    position[begin] = start
+    rows = np.arange(len(position))[:, np.newaxis]
+    known = np.maximum.accumulate(np.where(np.isnan(position), 0, rows), axis=0)
+    out: Array = np.take_along_axis(position, known, axis=0)
+    return out
+
+
+def resolutions(machine: Machine) -> Array:
+    """Smallest step [mm] or [deg] of each axis of `AXES`."""
+    steps = {axis.name: axis.resolution for axis in machine.axes}
+    return np.array([steps.get(axis, 0.0) for axis in AXES])
+
+
+def check_rapids(paths: Paths, rapids: Rapids, machine: Machine, found: Findings) -> None:
+    """Length and travel: whether these rapids may be replaced at all."""
+    D = paths.displacement
+    rotary = np.array(
+        [a in "ABC" or (a in machine.axis_names and machine.axis(a).rotary) for a in AXES]
+    )
+    linear = np.sqrt((D[:, ~rotary] ** 2).sum(axis=1))
+    length = np.where(linear > STANDSTILL, linear, np.sqrt((D[:, rotary] ** 2).sum(axis=1)))
+    least = machine.design.minimum_length
+    for k in np.flatnonzero(length < least * (1.0 - 1e-9)).tolist():
+        _complain(found, Kind.LENGTH, paths, k, 0, f"rapid of {length[k]:g} mm, below {least:g} mm")
+    for axis in machine.axes:
+        if axis.travel is None:
+            continue
+        a = AXES.index(axis.name)
+        low, high = axis.travel[0] - axis.resolution, axis.travel[1] + axis.resolution
+        named = (rapids.words[paths.rapid] >> a & 1) != 0
+        for column in (rapids.start, rapids.target):
+            where = column[paths.rapid, a] + rapids.offset[paths.rapid, a]
+            for k in np.flatnonzero(named & ((where < low) | (where > high))).tolist():
+                problem = (
+                    f"{axis.name} {where[k]:g} is outside {axis.travel[0]:g} to {axis.travel[1]:g}"
+                )
+                _complain(found, Kind.TRAVEL, paths, k, 0, problem)
+
+
+def check_line(paths: Paths, machine: Machine, found: Findings) -> None:
+    """Every point lies on the way from start to end, in order, within a step of the line."""
+    step = resolutions(machine)
+    owner = paths.owner
+    D = paths.displacement[owner]
+    moved = paths.position - paths.start[owner]
+    still = (D == 0.0) & (np.abs(moved) > TINY)
+    _report(found, Kind.AXES, paths, still.any(axis=1), "an axis moves that must stand still")
+    direction = np.sign(D)
+    slack = TINY + np.where(np.abs(D) < 2.0 * FINEST * step, FINEST * step, 0.0)
+    back = np.zeros(len(D), dtype=np.bool_)
+    forward = np.diff(moved, axis=0) * direction[1:]
+    back[1:] = (forward < -slack[1:]).any(axis=1)
+    back[paths.begin] = False
+    ahead = moved * direction
+    past = ((ahead > np.abs(D) + slack) | (ahead < -slack)).any(axis=1)
+    _report(found, Kind.BACKWARDS, paths, back | past, "the point goes backwards or past the end")
+    if machine.positioning != "linear":
+        return
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low = np.where(D != 0.0, (ahead - step - TINY) / np.abs(D), -np.inf).max(axis=1)
+        high = np.where(D != 0.0, (ahead + step + TINY) / np.abs(D), np.inf).min(axis=1)
+    _report(
+        found, Kind.LINE, paths, low > high, "the point is more than a step off the straight line"
+    )
+
+
+def _complain(found: Findings, kind: Kind, paths: Paths, k: int, block: int, problem: str) -> None:
+    """Note a violation in a block of stream k."""
+    found.add(kind, int(paths.line[k]) + block, int(paths.original_line[k]), problem)
+
+
+def _report(
+    found: Findings, kind: Kind, paths: Paths, rows: NDArray[np.bool_], problem: str
+) -> None:
+    """Note a violation for every stream that has one, at the first row that does."""
+    bad = np.flatnonzero(rows)
+    owner = paths.owner[bad]
+    for at in np.unique(owner, return_index=True)[1].tolist():
+        k = int(owner[at])
+        block = max(int(bad[at] - paths.begin[k]) - 1, 0)
+        _complain(found, kind, paths, k, block, problem)
+
+
+def feed_speed(paths: Paths) -> tuple[Array, Array]:
+    """Speed that F asks for along the path, per row [mm/s], and what F refers to, per stream [mm].
+
+    F is the speed along the first of XYZ, UVW, ABC that moves (LinuxCNC, G94).
+    """
+    D = paths.displacement
+    length = np.zeros(len(D))
+    unit = np.ones(len(D))
+    for axes in (slice(0, 3), slice(6, 9), slice(3, 6)):
+        norm = np.sqrt((D[:, axes] ** 2).sum(axis=1))
+        first = length == 0.0
+        unit = np.where(first & (norm > 0.0), 1.0 if axes.start == 3 else paths.unit, unit)
+        length = np.where(first, norm, length)
+    return paths.feed * unit[paths.owner] / SECONDS_PER_MINUTE, length

@@ -1,0 +1,105 @@
+"""A file read forwards through a window, so that memory does not grow with it.
+
+Rule: bytes are handed out exactly as they are; a line is what ends with LF.
+"""
+
+from __future__ import annotations
+
+from typing import BinaryIO
+
+PIECE = 1 << 18
+"""Bytes read and compared at a time."""
+LONGEST_LINE = 1 << 16
+"""What is longer is not a line of a program."""
+
+
+class Window:
+    """A place in a file, with what follows it."""
+
+    __slots__ = ("_ended", "at", "data", "file", "line")
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+        self.data = b""
+        """What is in memory; the place itself is ``data[at]``."""
+        self.at = 0
+        self.line = 1
+        """Number of the line that the place is in."""
+        self._ended = False
+
+    def fill(self, size: int) -> int:
+        """Have this many bytes in memory behind the place, or all there are; how many they are."""
+        if len(self.data) - self.at < size and not self._ended:
+            parts = [self.data[self.at :]]
+            have = len(parts[0])
+            while have < size:
+                piece = self.file.read(max(PIECE, size - have))
+                if not piece:
+                    self._ended = True
+                    break
+                parts.append(piece)
+                have += len(piece)
+            self.data, self.at = b"".join(parts), 0
+        return min(size, len(self.data) - self.at)
+
+    def peek(self, size: int) -> bytes:
+        """Look at the next bytes, fewer at the end of the file."""
+        self.fill(size)
+        return self.data[self.at : self.at + size]
+
+    def skip(self, size: int) -> None:
+        """Go on by bytes that are in memory."""
+        self.line += self.data.count(b"\n", self.at, self.at + size)
+        self.at += size
+
+    def take(self, size: int) -> bytes:
+        """Take the next bytes."""
+        taken = self.peek(size)
+        self.skip(len(taken))
+        return taken
+
+    def peek_line(self) -> bytes:
+        """Look at the rest of the line, its end included; empty at the end of the file."""
+        have = self.fill(LONGEST_LINE)
+        end = self.data.find(b"\n", self.at, self.at + have)
+        return self.data[self.at : self.at + have if end < 0 else end + 1]
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing follows."""
+        return self.fill(1) == 0
+
+
+def skip_common(one: Window, other: Window, size: int | None) -> int | None:
+    """Go on in both files as long as they agree.
+
+    Parameters
+    ----------
+    one, other : Window
+        The files.
+    size : int, optional
+        Bytes of `one` to pass; to its end where left out.
+
+    Returns
+    -------
+    int or None
+        Lines passed; None where they differ: both then stand at the first line that does.
+    """
+    lines = 0
+    while size is None or size > 0:
+        want = PIECE if size is None else min(PIECE, size)
+        have = one.fill(want)
+        if not have:
+            break
+        if other.fill(have) < have or one.peek(have) != other.peek(have):
+            while (line := one.peek_line()[:have]) and line == other.peek(len(line)):
+                one.skip(len(line))
+                other.skip(len(line))
+                have -= len(line)
+            return None
+        before = one.line
+        one.skip(have)
+        other.skip(have)
+        lines += one.line - before
+        size = None if size is None else size - have
+    return lines

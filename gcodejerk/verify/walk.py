@@ -1,0 +1,156 @@
+"""Both files in step: what was kept, what was replaced, and nothing else.
+
+Rule: the original leads. Up to each rapid that may be replaced the processed file must go on with
+the very bytes of the original; there it either keeps the block or holds a stream; where neither is
+the case, the walk ends with a violation, since everything behind would be guesswork.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gcodejerk.nc import CERTAIN, REASONS, Program
+from gcodejerk.verify.findings import Findings, Kind
+from gcodejerk.verify.form import LINE_ENDS, Stream, StreamReader
+from gcodejerk.verify.source import Window, skip_common
+
+_STAMP = b"(gcodejerk stamp"
+_TRACES = (b"(gcodejerk: ", b"G1 ", b"G4 P0")
+"""How a stream may begin."""
+
+
+class Walk:
+    """One walk through an original and what was made of it."""
+
+    def __init__(
+        self, original: Window, processed: Window, program: Program, found: Findings
+    ) -> None:
+        self.original, self.processed = original, processed
+        self.program, self.found = program, found
+        self.at = 0
+        """Place in the original, in bytes."""
+        self.kept = 0
+        self.rewritten = 0
+        self.block = b""
+        """Text of the block whose stream was found last."""
+        self._stamp_at: int | None = program.insert_at
+        self._stamp_line: int | None = None
+
+    def streams(self) -> Iterator[Stream]:
+        """Find the streams, in the order of the file."""
+        rapids = self.program.rapids
+        for i in np.flatnonzero(rapids.reason == CERTAIN).tolist():
+            begin, end = int(rapids.begin[i]), int(rapids.end[i])
+            if self.found.full or not self._same(begin - self.at):
+                return
+            line_end = LINE_ENDS[int(rapids.terminator[i])]
+            block = self.original.peek(end - begin + len(line_end))
+            if self.processed.peek(len(block)) == block and not self._goes_on(block):
+                self.processed.skip(len(block))
+                self.kept += 1
+            else:
+                text = block[: end - begin]
+                reader = StreamReader(
+                    self.processed, rapids, i, text, self.program.newline, self.found
+                )
+                if not self._is_stream(reader, block, i):
+                    return
+                stream = reader.read()
+                if stream is None:
+                    return
+                self.rewritten += 1
+                self.block = text
+                yield stream
+            self.original.skip(len(block))
+            self.at += len(block)
+        if self._same(None):
+            self._end()
+
+    def _goes_on(self, block: bytes) -> bool:
+        """Whether a last line without end is followed by more."""
+        return not block.endswith(b"\n") and len(self.processed.peek(len(block) + 1)) > len(block)
+
+    def _is_stream(self, reader: StreamReader, block: bytes, i: int) -> bool:
+        """Whether what stands here can be meant as the stream of this rapid."""
+        line = self.processed.peek_line()
+        head = reader.peek()
+        if line and block.rstrip(b"\r\n") == line.rstrip(b"\r\n"):
+            self._different()
+            return False
+        ended = self.processed.ended
+        if ended:
+            self._different()
+            return False
+        return head is not None
+
+    def _same(self, size: int | None) -> bool:
+        """Pass this many bytes of the original, all the rest for None; whether they are kept."""
+        if self._stamp_at is not None and (size is None or self._stamp_at <= self.at + size):
+            first = self._stamp_at - self.at
+            self._stamp_at = None
+            if not self._same(first):
+                return False
+            self._stamp()
+            size = None if size is None else size - first
+        before = self.processed.line
+        lines = skip_common(self.original, self.processed, size)
+        if lines is None:
+            self._different()
+            return False
+        self.kept += lines
+        if size is None:
+            self.kept += bool(self.program.lines > self.original.line - 1)
+        else:
+            self.at += size
+        assert self.processed.line >= before
+        return True
+
+    def _stamp(self) -> None:
+        """Pass a stamp, which the original does not have here."""
+        line = self.processed.peek_line()
+        if not line.startswith(_STAMP) or line == self.original.peek(len(line)):
+            return
+        body = line.rstrip(b"\r\n")
+        self._stamp_line = self.processed.line
+        proper = body.endswith(b")") and body.count(b"(") == body.count(b")") == 1
+        if not proper or not all(32 <= byte < 127 for byte in body):
+            self._complain(Kind.STAMP, "stamp is not one comment of plain characters")
+        if line[len(body) :] != self.program.newline:
+            self._complain(Kind.STAMP, "stamp does not end as the lines of the original do")
+        self.processed.skip(len(line))
+
+    def _different(self) -> None:
+        """Say how the files differ where they stand."""
+        mine, theirs = self.original.peek_line(), self.processed.peek_line()
+        shown = [line[:60].rstrip(b"\r\n").decode("latin-1") for line in (mine, theirs)]
+        rapids = self.program.rapids
+        at = int(np.searchsorted(rapids.line, self.original.line))
+        left = at < len(rapids) and rapids.line[at] == self.original.line
+        left = left and rapids.reason[at] != CERTAIN
+        if not theirs:
+            self._complain(Kind.MISSING, f"file ends where the original has '{shown[0]}'")
+        elif not mine:
+            self._complain(Kind.ADDED, f"the original ends, here follows '{shown[1]}'")
+        elif mine.rstrip(b"\r\n") == theirs.rstrip(b"\r\n"):
+            self._complain(Kind.LINE_END, "line does not end as in the original")
+        elif left and theirs.startswith(_TRACES):
+            why = REASONS[int(rapids.reason[at])]
+            self._complain(Kind.NOT_CERTAIN, f"'{shown[0]}' had to be left alone: {why}")
+        else:
+            self._complain(
+                Kind.CHANGED, f"expected '{shown[0]}' as in the original, found '{shown[1]}'"
+            )
+
+    def _end(self) -> None:
+        if not self.processed.ended:
+            self._different()
+        elif self._stamp_line is not None and not self.rewritten:
+            self.found.add(
+                Kind.STAMP, self._stamp_line, None, "stamp, though nothing was rewritten"
+            )
+
+    def _complain(self, kind: Kind, problem: str) -> None:
+        line = None if self.original.ended else self.original.line
+        self.found.add(kind, self.processed.line, line, problem)
