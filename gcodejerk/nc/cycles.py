@@ -54,7 +54,8 @@ def run_cycle(state: State, code: int, values: Mapping[str, float]) -> bool:
         level = NAN  # not measured: where a series in G91 takes its level from
     # max() with a NaN would return either operand
     above = NAN if level != level or r != r else max(level, r)
-    end = r if state.retract == 990 else above if state.retract == 980 else NAN
+    known = above == r or state.retract is not None
+    end = NAN if not known else r if state.retract == 990 else above
     for axis in (first, second):
         if AXES[axis] in values:
             value = values[AXES[axis]] * state.scale(axis)
@@ -64,8 +65,6 @@ def run_cycle(state: State, code: int, values: Mapping[str, float]) -> bool:
                 state.move(axis, state.position[axis] + repeats * value)
             else:
                 state.move(axis, NAN)
-    if series and state.cycle_level != state.cycle_level:
-        end = end if state.retract == 990 else NAN
     if not series and here < r:
         state.put("cycle_level", r)
     state.move(along, end)

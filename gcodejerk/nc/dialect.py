@@ -131,7 +131,7 @@ LINUXCNC = Dialect(
     name="linuxcnc",
     groups=_LINUXCNC_GROUPS,
     # What M2 leaves behind and the interpreter starts with. Path mode, feed and units are a matter
-    # of the configuration, so they are not here.
+    # of the configuration, and nothing resets G98/G99 (mmount.ngc starts in G99): not here.
     defaults={
         "motion": 10,
         "plane": 170,
@@ -139,7 +139,6 @@ LINUXCNC = Dialect(
         "arc distance": 911,
         "feed mode": 940,
         "compensation": 400,
-        "retract": 980,
         "system": 540,
     },
     m_groups=_LINUXCNC_M,

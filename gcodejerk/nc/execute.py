@@ -58,6 +58,8 @@ class Step:
     """Bit k set: a word for AXES[k]."""
     feed_event: int = NO_FEED
     fault: bool = False
+    unknown: bool = False
+    """A code that the dialect does not know."""
 
 
 class Executor:
@@ -78,6 +80,7 @@ class Executor:
                 step.words |= 1 << bit
         for target in block.assigns:
             self._assign(target)
+        step.unknown = codes.unknown and not codes.expression
         before = state.motion
         ended = state.ended
         if codes.fault or block.problem is not None or not self._complete(codes):
@@ -162,7 +165,7 @@ class Executor:
         if (
             motion is not None
             and motion not in (0, 800)
-            and (g.get("feed mode", self.state.feed_mode) == 930)
+            and (g["feed mode"] == 930 if "feed mode" in g else self.state.feed_mode == 93)
             and axes
             and "F" not in values
         ):
@@ -244,6 +247,10 @@ class Executor:
                 step.feed_event = GIVES_FEED
         for m in codes.m:
             self._miscellaneous(m, step)
+        if state.cycle is not None and g.get("distance", state.distance) != state.distance:
+            # R and Z that stay in force across G90/G91 are read anew in a way not documented
+            state.put("cycle", (state.cycle[0], NAN, NAN))
+            state.put("cycle_level", NAN)
         for group, code in g.items():
             if (name := GROUP_FIELDS.get(group)) is not None and group != "motion":
                 state.put(name, code)
@@ -269,8 +276,6 @@ class Executor:
             state.put("path_q", values.get("Q", NAN) if code == 640 else NAN)
         if "distance" in g:
             state.put("distance_stated", True)
-            if state.cycle is not None:
-                state.put("cycle_level", NAN)
         self._move(codes, step)
         for m in codes.m:
             if m in (2, 30, 99) and self.dialect.m_groups[m] == "stop":

@@ -110,6 +110,8 @@ def read_lines(data: bytes, line_limit: int) -> Lines:
     np.subtract(joint[1:], joint[:-1], out=width[:-1])
     width[-1] = 1
     ends = kind == _END
+    line_end = joint[ends] - _PAD
+    line_begin = np.concatenate([[0], line_end[:-1] + 1])
     line = np.cumsum(ends) - ends
     is_letter = kind >= _LETTERS
     bad = is_letter != (width > 1)  # a letter without a number, or a number without a letter
@@ -134,14 +136,12 @@ def read_lines(data: bytes, line_limit: int) -> Lines:
     good &= ~(unsigned & (value < 0.0))
     numbers = np.flatnonzero(letter == ord("N"))
     if len(numbers):
-        follows = (numbers > 0) & (word_line[numbers - 1] == word_line[numbers])
+        follows = begin[numbers] - _PAD != line_begin[word_line[numbers]]
         signed = source[begin[numbers] + 1] < ord(".")  # + and -
         dotted = source[begin[numbers] + 1] == ord(".")
         good[numbers] &= ~(follows | signed | dotted)
     odd_lines.append(word_line[~good])
 
-    line_end = joint[ends] - _PAD
-    line_begin = np.concatenate([[0], line_end[:-1] + 1])
     odd = np.zeros(len(line_end), dtype=np.bool_)
     for lines in odd_lines:
         odd[lines] = True

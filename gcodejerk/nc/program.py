@@ -222,6 +222,8 @@ class Reader:
         state = executor.state
         if step.fault and block.problem is None:
             self._odd(number, "the controller would refuse this combination of words", None, text)
+        elif step.unknown:
+            self._odd(number, "a code that the dialect does not know", None, text)
         uncertain = before is not None or self.flow.inside
         if not (uncertain and step.feed_event == GIVES_FEED):
             self.log.feed_event(step.feed_event)
@@ -380,8 +382,14 @@ def read_program(
     >>> program.rapids.reason == 255
     array([False,  True])
     """
-    chosen = find_dialect(dialect)
-    reader = Reader(name, chosen, start)
+    return follow(file, Reader(name, find_dialect(dialect), start), progress, fast)
+
+
+def follow(
+    file: BinaryIO, reader: Reader, progress: Callable[[int], None] | None, fast: bool
+) -> Program:
+    """Take a whole file; the reader keeps the state that the program ends in."""
+    name, chosen = reader.name, reader.dialect
     digest = hashlib.blake2b(digest_size=16)
     size = lines = 0
     newline, stamp = b"\n", None

@@ -181,8 +181,8 @@ class _Line:
         """Take one word."""
         begin = self.at
         letter = self.text[begin : begin + 1].decode().upper()
-        if letter == "N" and self.words:
-            raise _Odd("N stands behind another word", begin)
+        if letter == "N" and (self.words or self.comments):
+            raise _Odd("N stands behind something else", begin)
         match = _WORD.match(self.text, begin)
         if match and _SHAPE.fullmatch(match[2]):  # the usual case, made quick
             self.at = match.end(2)

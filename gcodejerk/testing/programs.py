@@ -13,10 +13,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import Program, Start, read_program
-from gcodejerk.nc.chunks import read_chunks
+from gcodejerk.nc import Program, Start
 from gcodejerk.nc.modal import MODES
-from gcodejerk.nc.program import Reader, find_dialect, read_chunk
+from gcodejerk.nc.program import Reader, find_dialect, follow
 
 Draw = st.DrawFn
 
@@ -40,9 +39,12 @@ def differences(data: bytes, start: Start | None = None, dialect: str = "linuxcn
     """
     start = Start() if start is None else start
     readings: list[Program | str] = []
+    ends = []
     for fast in (True, False):
         try:
-            readings.append(read_program(io.BytesIO(data), dialect=dialect, start=start, fast=fast))
+            reader = Reader("<program>", find_dialect(dialect), start)
+            readings.append(follow(io.BytesIO(data), reader, None, fast))
+            ends.append(reader.state)
         except ProgramError as error:
             readings.append(str(error))
     quick, careful = readings
@@ -57,12 +59,6 @@ def differences(data: bytes, start: Start | None = None, dialect: str = "linuxcn
         a, b = getattr(quick.rapids, field.name), getattr(careful.rapids, field.name)
         if a.dtype != b.dtype or not np.array_equal(a, b, equal_nan=a.dtype.kind == "f"):
             found.append(f"rapids.{field.name}")
-    ends = []
-    for fast in (True, False):
-        reader = Reader("<program>", find_dialect(dialect), start)
-        for chunk in read_chunks(io.BytesIO(data), "<program>"):
-            read_chunk(reader, chunk, fast)
-        ends.append(reader.state)
     found += [f"state.{name}" for name in MODES if getattr(ends[0], name) != getattr(ends[1], name)]
     for name in ("position", "feed", "g5x", "g92", "tool"):
         if not np.array_equal(getattr(ends[0], name), getattr(ends[1], name), equal_nan=True):
@@ -157,8 +153,6 @@ def _line(draw: Draw, words: list[str], number: int | None) -> bytes:
     text = blank.join(words)
     if draw(st.integers(0, 9)) == 0:
         text = text.lower()
-    if number is not None:
-        text = f"N{number}{blank}{text}"
     kind = draw(st.integers(0, 19))
     if kind == 0:
         text += " (comment)"
@@ -166,7 +160,9 @@ def _line(draw: Draw, words: list[str], number: int | None) -> bytes:
         text = f"(first) {text} ; last"
     elif kind == 2:
         text = f" {text} "
-    elif kind == 3:
+    if number is not None:
+        text = f"N{number}{blank}{text}"
+    if kind == 3:
         text = "/" + text
     return text.encode("latin-1")
 

@@ -11,7 +11,7 @@ from gcodejerk.nc import CERTAIN, REASONS, read_program
 from gcodejerk.reasons import Reason
 from gcodejerk.testing.programs import programs
 
-QUICK = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+QUICK = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 @QUICK
@@ -52,7 +52,9 @@ def test_drawn_programs_hold_rapids_of_every_common_kind(wanted):
     ids=["CR LF", "percent", "inches", "incremental", "comments", "no last newline"],
 )
 def test_drawn_programs_are_varied(condition):
-    assert find(programs(), condition, settings=settings(QUICK, derandomize=True))
+    assert find(
+        programs(), condition, settings=settings(QUICK, max_examples=2000, derandomize=True)
+    )
 
 
 def test_a_dialect_that_is_not_drawn_is_refused():
