@@ -31,6 +31,8 @@ class Job:
     report: str | None
     mode: str
     """write, check or diff"""
+    in_place: bool
+    """The output is meant to replace the input."""
     strict: bool
 
 
@@ -87,8 +89,7 @@ def run_job(job: Job, machine: Machine, settings: Settings, progress: Progress |
 
 
 def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
-    if job.input != job.output:
-        _refuse_overwriting(job)
+    _refuse_overwriting(job)
     with ExitStack() as stack:
         source = stack.enter_context(open_input(job.input))
         # The outputs are renamed when the stack closes without an error, the report last.
@@ -128,7 +129,7 @@ def record_of(result: Result, machine: Machine, output: str | None, source: Bina
 
 def _refuse_overwriting(job: Job) -> None:
     """An output or report that is the input, under whatever name."""
-    for name in (job.output, job.report):
+    for name in (None if job.in_place else job.output, job.report):
         if name is not None and job.mode == "write" and same_file(job.input, name):
             raise EmitError(
                 f"{name} is the input itself",

@@ -228,9 +228,7 @@ def stream_csv(plan: Plan) -> bytes:
     lines = [",".join(["t", *positions])]
     for row, t in enumerate(plan.t):
         lines.append(",".join([f"{t:.10g}", *(f"{q[row]:.10g}" for q in positions.values())]))
-    return "
-".join(lines).encode() + b"
-"
+    return "\n".join(lines).encode() + b"\n"
 
 
 def _head(machine: Machine, controller: str, form: str, profile: str) -> Record:
