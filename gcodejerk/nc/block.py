@@ -38,7 +38,7 @@ class Block:
     assigns: tuple[str, ...] = ()
     """Targets of assignments, for example ``1`` or ``<depth>``; empty text where computed."""
     rest: bytes = b""
-    """What follows the place of the problem, unread."""
+    """The rest of the line from the word that has the problem."""
     problem: str | None = None
     column: int | None = None
     """Where the problem is, counted from 1."""

@@ -15,36 +15,17 @@ from dataclasses import dataclass, field
 from gcodejerk.nc import frames
 from gcodejerk.nc.block import Block
 from gcodejerk.nc.cycles import run_cycle
-from gcodejerk.nc.dialect import ARC_CENTRES, AXES, PLANES, Dialect
+from gcodejerk.nc.dialect import AXES, PLANES, Dialect
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
+from gcodejerk.nc.rules import Codes, arc_words, is_complete, takes_axes
 from gcodejerk.reasons import Reason
 from gcodejerk.units import MM_PER_INCH
 
-_ARCS = frozenset({20, 30})
 _RETURNS = frozenset({280, 300})
-_AXIS_USERS = frozenset({100, 280, 300, 520, 920})
 _REDRAWN = frozenset({331, 382, 383, 384, 385, 52, 53})
 """Motions whose end is not what their words say."""
-_OFF = frozenset({400, None})
 _GROUPED_M = frozenset({"stop", "spindle", "coolant", "tool"})
-_EMPTY: dict[str, float] = {}
-
-
-@dataclass(slots=True)
-class Codes:
-    """The words of a block, sorted."""
-
-    g: dict[str, int] = field(default_factory=dict)
-    """Modal group -> G code."""
-    m: list[int] = field(default_factory=list)
-    values: dict[str, float] = field(default_factory=dict)
-    """Letter -> number, NaN for an expression; G, M and N left out."""
-    unknown: bool = False
-    """A code that is computed or that the dialect does not know."""
-    fault: bool = False
-    """The controller refuses the block."""
-    expression: bool = False
 
 
 @dataclass(slots=True)
@@ -83,7 +64,11 @@ class Executor:
         step.unknown = codes.unknown and not codes.expression
         before = state.motion
         ended = state.ended
-        if codes.fault or block.problem is not None or not self._complete(codes):
+        if (
+            codes.fault
+            or block.problem is not None
+            or not is_complete(codes, self.state, self.dialect)
+        ):
             self._doubt(block, codes, step)
         else:
             self._act(codes, step)
@@ -133,80 +118,6 @@ class Executor:
         if block.assigns:
             codes.expression = True
         return codes
-
-    def _complete(self, codes: Codes) -> bool:
-        """Whether the controller accepts this combination of words."""
-        if codes.unknown:
-            return True
-        values, g = codes.values, codes.g
-        motion, user = g.get("motion"), g.get("non-modal")
-        axes = any(axis in values for axis in AXES)
-        if user in _AXIS_USERS:
-            if motion not in (None, 800) or (user not in _RETURNS and user != 100 and not axes):
-                return False
-            motion = None
-        elif motion is None and (axes or self._arc_words(values)):
-            motion = self.state.motion
-            if motion == 800:
-                return False
-        elif (motion not in (None, 0, 10, 20, 30, 800) and not axes) or (motion == 800 and axes):
-            return False
-        if user == 530 and not (
-            axes
-            and motion in (0, 10)
-            and self.state.compensation in _OFF
-            and g.get("distance", self.state.distance) != 910
-        ):
-            return False
-        if values.get("F", 0.0) < 0.0 or values.get("S", 0.0) < 0.0:
-            return False
-        if motion in _ARCS and not self._arc_complete(values, g):
-            return False
-        if (
-            motion is not None
-            and motion not in (0, 800)
-            and (g["feed mode"] == 930 if "feed mode" in g else self.state.feed_mode == 93)
-            and axes
-            and "F" not in values
-        ):
-            return False
-        return self._words_used(codes, motion)
-
-    def _words_used(self, codes: Codes, motion: int | None) -> bool:
-        """Whether every letter has a code that uses it."""
-        in_force = None
-        for letter in codes.values:
-            users = self.dialect.uses.get(letter)
-            if users is None:
-                if letter not in "FSTXYZABCUVW":
-                    return False
-                continue
-            if in_force is None:
-                used = list(codes.g.values())
-                if motion is not None:
-                    used.append(motion)
-                elif self.state.motion is None:
-                    return True
-                in_force = {f"G{c / 10:g}" for c in used} | {f"M{m}" for m in codes.m}
-            if not users & in_force:
-                return False
-        return True
-
-    def _arc_words(self, values: dict[str, float]) -> bool:
-        """Whether centre words alone make an arc, one being in force."""
-        return self.state.motion in _ARCS and ("I" in values or "J" in values or "K" in values)
-
-    def _arc_complete(self, values: dict[str, float], g: dict[str, int]) -> bool:
-        plane = g.get("plane", self.state.plane)
-        centres = [letter for letter in "IJK" if letter in values]
-        if "R" in values:
-            return not centres and (
-                plane is None or any(axis in values for axis in PLANES[plane][:2])
-            )
-        if not centres or plane is None:
-            return bool(centres)
-        allowed = ARC_CENTRES.get(plane)
-        return allowed is not None and all(letter in allowed for letter in centres)
 
     def _doubt(self, block: Block, codes: Codes, step: Step) -> None:
         """Forget what a block that is not understood may have changed."""
@@ -279,7 +190,7 @@ class Executor:
         self._move(codes, step)
         for m in codes.m:
             if m in (2, 30, 99) and self.dialect.m_groups[m] == "stop":
-                self._end()
+                self.end()
 
     def _miscellaneous(self, m: int, step: Step) -> None:
         """Execute an M code, the end of the program excepted."""
@@ -295,7 +206,7 @@ class Executor:
             state.forget()
             step.feed_event = USES_FEED
 
-    def _end(self) -> None:
+    def end(self) -> None:
         """End the program: what follows is not executed."""
         self.state.forget()
         self.state.put("motion", 10)
@@ -305,6 +216,7 @@ class Executor:
         """Execute the motion, or what takes its axis words away."""
         state, g, values = self.state, codes.g, codes.values
         user = g.get("non-modal")
+        step.start = state.position.copy()  # behind a tool change or a new frame, before the move
         if user in _RETURNS:
             self._return(values, step)
             return
@@ -318,11 +230,13 @@ class Executor:
             frames.set_g92(state, user, values)
             if user == 920:
                 return
+        if step.words and takes_axes(codes):
+            return
         if "motion" in g:
             state.put("motion", g["motion"])
             if g["motion"] not in self.dialect.cycles:
                 state.put("cycle", None)
-        if not step.words and not self._arc_words(values):
+        if not step.words and not arc_words(values, self.state):
             return
         motion = state.motion
         if motion is None:
@@ -389,10 +303,10 @@ class Executor:
         """Decide whether this is a rapid, and why it would have to be left alone."""
         rapid = self.dialect.rapid
         if step.fault or codes.unknown:
-            looks = codes.g.get("motion") == rapid or (
-                "motion" not in codes.g and motion_before == rapid
-            )
-            step.rapid = step.rapid or (looks and bool(step.words))
+            stated = [word.value for word in block.words if word.letter == "G"]
+            looks = rapid in stated or ("motion" not in codes.g and motion_before == rapid)
+            axes = step.words or any(axis in block.rest.decode("latin-1").upper() for axis in AXES)
+            step.rapid = step.rapid or bool(looks and axes)
         if not step.rapid:
             return
         g = codes.g

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
@@ -17,11 +17,11 @@ import numpy as np
 from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.block import Block
 from gcodejerk.nc.chunks import Chunk, read_chunks
-from gcodejerk.nc.dialect import AXES, DIALECTS, Dialect
+from gcodejerk.nc.dialect import DIALECTS, Dialect
 from gcodejerk.nc.execute import Executor, Step
 from gcodejerk.nc.flow import Flow
 from gcodejerk.nc.lexer import read_lines
-from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State, join
+from gcodejerk.nc.modal import State, join
 from gcodejerk.nc.rapids import (
     GIVES_FEED,
     USES_FEED,
@@ -30,10 +30,10 @@ from gcodejerk.nc.rapids import (
     common_columns,
 )
 from gcodejerk.nc.runs import can_run, run_plain
+from gcodejerk.nc.start import NOTHING_KNOWN, Start, initial_state
 from gcodejerk.nc.tokenizer import parse_line
 from gcodejerk.nc.words import Lines
 from gcodejerk.reasons import Reason
-from gcodejerk.units import MM_PER_INCH
 
 STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""
@@ -42,24 +42,6 @@ SHORT_RUN = 24
 """Fewer plain lines than this between odd ones go the careful way; arrays would not pay."""
 _SHOWN = 20
 """Lines not understood that get a finding of their own."""
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """What may be assumed when the program starts; by default nothing but the dialect's modes."""
-
-    positions: Mapping[str, float] = field(default_factory=dict)
-    """Axis -> program coordinate [mm, deg]."""
-    offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """System, for example ``G54`` -> axis -> machine minus program coordinate [mm, deg]."""
-    tool_lengths: Mapping[int, float] = field(default_factory=dict)
-    """H number -> length along Z [mm]."""
-    startup: str = ""
-    """Codes in force when a program starts, for example LinuxCNC's RS274NGC_STARTUP_CODE."""
-    inch: bool = False
-    """Unit where the program states none."""
-    diameter: bool = False
-    """X is a diameter where the program states neither G7 nor G8."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,49 +89,6 @@ def find_dialect(dialect: str | Dialect) -> Dialect:
 def parse_block(text: bytes, dialect: str | Dialect = "linuxcnc") -> Block:
     """Read one line, without its line end, the careful way."""
     return parse_line(text, find_dialect(dialect))
-
-
-def initial_state(dialect: Dialect, start: Start) -> State:
-    """Make the state in which a program starts."""
-    state = State()
-    for group, code in dialect.defaults.items():
-        if (name := GROUP_FIELDS.get(group)) is not None:
-            setattr(state, name, code)
-    state.system = dialect.defaults.get("system")
-    mode = dialect.defaults.get("feed mode")
-    state.feed_mode = None if mode is None else mode // 10
-    state.unit = MM_PER_INCH if start.inch else 1.0
-    state.diameter = state.turns = start.diameter
-    for system, offsets in start.offsets.items():
-        code = round(float(system.upper().removeprefix("G")) * 10.0)
-        state.offsets[code] = [offsets.get(axis, NAN) for axis in AXES]
-    if start.positions or start.offsets:
-        # Who states where the axes are, states it for the modes that the dialect starts in: no
-        # tool length and no G92, which would otherwise outlive the program before this one.
-        state.tool = [0.0] * len(AXES)
-        state.g92 = [0.0] * len(AXES)
-    if state.system is not None:
-        state.g5x = list(state.offsets.get(state.system, state.g5x))
-    if start.startup:
-        block = parse_line(start.startup.encode("latin-1", "replace"), dialect)
-        if block.problem is not None:
-            raise ProgramError(
-                f"startup codes: {block.problem}",
-                "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
-                Place("startup", 1, block.column, start.startup),
-            )
-        Executor(dialect, state, dict(start.tool_lengths)).run(block)
-        if "tool length" in _groups_of(block, dialect):
-            state.tool = [0.0] * len(AXES)
-    for axis, letter in enumerate(AXES):
-        state.position[axis] = start.positions.get(letter, NAN)
-    return state
-
-
-def _groups_of(block: Block, dialect: Dialect) -> set[str]:
-    """List the modal groups whose codes stand in a block."""
-    codes = [round(w.value * 10) for w in block.words if w.letter == "G" and w.value is not None]
-    return {dialect.groups[code] for code in codes if code in dialect.groups}
 
 
 class Reader:
@@ -270,8 +209,7 @@ class Reader:
             self.percent = number
             self.insert_at = end
         elif self.percent is not None:
-            self.state.forget()
-            self.state.ended = True
+            self.executor.end()
         else:
             self._odd(number, "% in the middle of a program that did not begin with one", 1, b"%")
             self.state.forget()
@@ -342,7 +280,7 @@ def read_program(
     *,
     name: str = "<program>",
     dialect: str | Dialect = "linuxcnc",
-    start: Start = Start(),
+    start: Start = NOTHING_KNOWN,
     progress: Callable[[int], None] | None = None,
     fast: bool = True,
 ) -> Program:
@@ -456,7 +394,7 @@ def trace(
     file: BinaryIO,
     *,
     dialect: str | Dialect = "linuxcnc",
-    start: Start = Start(),
+    start: Start = NOTHING_KNOWN,
 ) -> Iterator[tuple[int, tuple[float, ...], int | None]]:
     """Follow a program line by line.
 

@@ -215,7 +215,7 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     """
     line = _Line(text)
     delete = False
-    problem, column, rest = None, None, b""
+    problem, column, rest, mark = None, None, b"", 0
     try:
         if line.skip() == b"%":
             if text.strip(b" \t") != b"%":
@@ -227,6 +227,7 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
             delete = True
             line.at += 1
         while byte := line.skip():
+            mark = line.at
             if byte.isalpha():
                 if byte in b"Oo" and all(word.letter == "N" for word in line.words):
                     line.flow()
@@ -239,7 +240,7 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
             else:
                 raise _Odd(f"'{byte.decode('latin-1')}' has no meaning here", line.at)
     except _Odd as odd:
-        problem, column, rest = odd.problem, odd.at + 1, text[odd.at :]
+        problem, column, rest = odd.problem, odd.at + 1, text[mark:]
     return Block(
         tuple(line.words),
         tuple(line.comments),

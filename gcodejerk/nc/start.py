@@ -1,0 +1,81 @@
+"""What may be assumed when a program starts, and the modal state that follows from it.
+
+Rule: without a word from the user only the dialect's documented modes are assumed, and no position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gcodejerk.errors import Place, ProgramError
+from gcodejerk.nc.block import Block
+from gcodejerk.nc.dialect import AXES, Dialect
+from gcodejerk.nc.execute import Executor
+from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
+from gcodejerk.nc.tokenizer import parse_line
+from gcodejerk.units import MM_PER_INCH
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What may be assumed when the program starts; by default nothing but the dialect's modes."""
+
+    positions: Mapping[str, float] = field(default_factory=dict)
+    """Axis -> program coordinate [mm, deg]."""
+    offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """System, for example ``G54`` -> axis -> machine minus program coordinate [mm, deg]."""
+    tool_lengths: Mapping[int, float] = field(default_factory=dict)
+    """H number -> length along Z [mm]."""
+    startup: str = ""
+    """Codes in force when a program starts, for example LinuxCNC's RS274NGC_STARTUP_CODE."""
+    inch: bool = False
+    """Unit where the program states none."""
+    diameter: bool = False
+    """X is a diameter where the program states neither G7 nor G8."""
+
+
+NOTHING_KNOWN = Start()
+
+
+def initial_state(dialect: Dialect, start: Start) -> State:
+    """Make the state in which a program starts."""
+    state = State()
+    for group, code in dialect.defaults.items():
+        if (name := GROUP_FIELDS.get(group)) is not None:
+            setattr(state, name, code)
+    state.system = dialect.defaults.get("system")
+    mode = dialect.defaults.get("feed mode")
+    state.feed_mode = None if mode is None else mode // 10
+    state.unit = MM_PER_INCH if start.inch else 1.0
+    state.diameter = state.turns = start.diameter
+    for system, offsets in start.offsets.items():
+        code = round(float(system.upper().removeprefix("G")) * 10.0)
+        state.offsets[code] = [offsets.get(axis, NAN) for axis in AXES]
+    if start.positions or start.offsets:
+        # Who states where the axes are, states it for the modes that the dialect starts in: no
+        # tool length and no G92, which would otherwise outlive the program before this one.
+        state.tool = [0.0] * len(AXES)
+        state.g92 = [0.0] * len(AXES)
+    if state.system is not None:
+        state.g5x = list(state.offsets.get(state.system, state.g5x))
+    if start.startup:
+        block = parse_line(start.startup.encode("latin-1", "replace"), dialect)
+        if block.problem is not None:
+            raise ProgramError(
+                f"startup codes: {block.problem}",
+                "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
+                Place("startup", 1, block.column, start.startup),
+            )
+        Executor(dialect, state, dict(start.tool_lengths)).run(block)
+        if "tool length" in _groups_of(block, dialect):
+            state.tool = [0.0] * len(AXES)
+    for axis, letter in enumerate(AXES):
+        state.position[axis] = start.positions.get(letter, NAN)
+    return state
+
+
+def _groups_of(block: Block, dialect: Dialect) -> set[str]:
+    """List the modal groups whose codes stand in a block."""
+    codes = [round(w.value * 10) for w in block.words if w.letter == "G" and w.value is not None]
+    return {dialect.groups[code] for code in codes if code in dialect.groups}

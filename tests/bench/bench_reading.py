@@ -1,0 +1,139 @@
+"""How fast programs are read, beside a plain tracker that takes one line at a time.
+
+    python tests/bench/bench_reading.py [--megabytes 10] [--memory]
+
+The finishing program is three-axis, modal words omitted, with a retract and an approach every 200
+lines. The plain tracker does the least that finds the rapids: a regular expression over each line,
+G0 to G3, G90, G91 and the last X, Y, Z. `--memory` reads 100 MB in a fresh process and prints its
+largest resident size.
+"""
+
+import argparse
+import io
+import re
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+from gcodejerk.nc import CERTAIN, read_program
+
+
+def finishing_program(lines):
+    """Parallel paths over a wavy surface."""
+    random = np.random.default_rng(4)
+    x = np.cumsum(random.uniform(0.05, 0.9, lines)) % 250.0
+    y = np.repeat(np.arange(lines // 200 + 1), 200)[:lines] * 0.35 % 400.0
+    z = -6.0 + 5.0 * np.sin(x / 17.0) * np.cos(y / 23.0)
+    rows = [b"G21 G90 G94 G17 G40", b"G0 Z50.", b"M3 S12000", b"G1 X0. Y0. Z0. F2400"]
+    columns = zip(x.tolist(), y.tolist(), z.tolist(), strict=True)
+    for k, (a, b, c) in enumerate(columns):
+        if k % 200 == 199:
+            rows += [b"G0Z5.", b"X%.3fY%.3f" % (a, b), b"G1Z%.3f" % c]
+        else:
+            rows.append(b"X%.3fY%.3fZ%.3f" % (a, b, c))
+    return b"\n".join([*rows, b"M5", b"M30", b""])
+
+
+def drilling_program(lines):
+    """Positions with comments, line numbers and inches."""
+    rows = [b"%", b"G20 G90 G94 G17 G40", b"F10"]
+    for k in range(lines // 4):
+        rows += [
+            b"N%d G0 X%.4f Y%.4f (hole %d)" % (4 * k + 10, k % 37 / 7, k % 53 / 11, k),
+            b"N%d G0 Z0.1" % (4 * k + 11),
+            b"N%d G1 Z-0.5" % (4 * k + 12),
+            b"N%d G0 Z1." % (4 * k + 13),
+        ]
+    return b"\n".join([*rows, b"M2", b"%", b""])
+
+
+WORD = re.compile(rb"([A-Z])([-+]?[0-9.]+)")
+
+
+def plain_tracker(data):
+    """Rapids by a loop over the lines: the alternative that anyone would write first."""
+    motion, incremental, position, rapids = 1, False, {}, []
+    for number, line in enumerate(io.BytesIO(data), 1):
+        start = None
+        for letter, text in WORD.findall(line):
+            value = float(text)
+            if letter == b"G":
+                if value in (0.0, 1.0, 2.0, 3.0):
+                    motion = int(value)
+                elif value in (90.0, 91.0):
+                    incremental = value == 91.0
+            elif letter in b"XYZ":
+                if start is None:
+                    start = dict(position)
+                if incremental:
+                    value += position.get(letter, 0.0)
+                position[letter] = value
+        if motion == 0 and start is not None:
+            rapids.append((number, start, dict(position)))
+    return rapids
+
+
+def best_of(function, repeats=3):
+    """Least of some wall times, and the result."""
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        result = function()
+        times.append(time.perf_counter() - begin)
+    return min(times), result
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--megabytes", type=float, default=10.0)
+    parser.add_argument("--memory", action="store_true")
+    given = parser.parse_args()
+    lines = int(given.megabytes * 46600)
+    print(f"{'program':22}{'MB':>6}{'lines':>9}{'rapids':>9}{'certain':>9}", end="")
+    print(f"{'MB/s':>8}{'plain':>8}{'ratio':>7}{'careful':>9}")
+    makers = {"3-axis finishing": finishing_program, "commented drilling": drilling_program}
+    for name, make in makers.items():
+        data = make(lines)
+        megabytes = len(data) / 1e6
+        quick, program = best_of(lambda data=data: read_program(io.BytesIO(data)))
+        plain, found = best_of(lambda data=data: plain_tracker(data))
+        few = data[: len(data) // 10]
+        careful, _ = best_of(lambda few=few: read_program(io.BytesIO(few), fast=False), 1)
+        rapids = program.rapids
+        assert set(rapids.line.tolist()) == {number for number, _, _ in found}
+        print(f"{name:22}{megabytes:6.1f}{program.lines:9}{len(rapids):9}", end="")
+        print(f"{np.count_nonzero(rapids.reason == CERTAIN):9}{megabytes / quick:8.1f}", end="")
+        print(f"{megabytes / plain:8.1f}{plain / quick:7.1f}{len(few) / 1e6 / careful:9.2f}")
+    if given.memory:
+        print_memory()
+
+
+READER = """
+import re, sys
+from gcodejerk.nc import read_program
+def resident():  # of this process alone; getrusage keeps what the parent had at the fork
+    return int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1])
+before = resident()
+with open(sys.argv[1], "rb") as file:
+    program = read_program(file)
+after = resident()
+print(f"{program.size / 1e6:.0f} MB, {program.lines} lines, {len(program.rapids)} rapids: ", end="")
+print(f"{after / 1024:.0f} MB resident at most, {before / 1024:.0f} MB before reading")
+"""
+
+
+def print_memory():
+    """Read 100 MB in a process of its own."""
+    piece = finishing_program(466_000)
+    with tempfile.NamedTemporaryFile(suffix=".ngc") as file:
+        for _ in range(10):
+            file.write(piece.replace(b"M30", b"M9"))
+        file.flush()
+        subprocess.run([sys.executable, "-c", READER, file.name], check=True)
+
+
+if __name__ == "__main__":
+    main()
