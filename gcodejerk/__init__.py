@@ -1,8 +1,73 @@
 """gcodejerk: rapids that do not shake the machine.
 
-`import gcodejerk` is cheap: the names below are loaded when they are first used.
+`import gcodejerk` is cheap: each name below is loaded when it is first used.
+
+Examples
+--------
+>>> import gcodejerk
+>>> vmc = gcodejerk.Machine.load(gcodejerk.find_machine("vmc"))
+>>> plan = gcodejerk.plan_move({"Z": 1.0}, vmc)
+>>> plan.time, plan.conventional_time
+(0.04, 0.04)
 """
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gcodejerk.errors import (
+        EmitError,
+        GcodejerkError,
+        MachineError,
+        PlanError,
+        ProgramError,
+        VerifyError,
+    )
+    from gcodejerk.machine import Machine, find_machine
+    from gcodejerk.motion import residual_acceleration
+    from gcodejerk.move import Plan, plan_move
+    from gcodejerk.process import Result, process
+    from gcodejerk.verify import Verification, verify
+
 __version__ = "0.1.0"
+
+_HOMES = {
+    "gcodejerk.errors": (
+        "EmitError", "GcodejerkError", "MachineError", "PlanError", "ProgramError", "VerifyError",
+    ),
+    "gcodejerk.machine": ("Machine", "find_machine"),
+    "gcodejerk.motion": ("residual_acceleration",),
+    "gcodejerk.move": ("Plan", "plan_move"),
+    "gcodejerk.process": ("Result", "process"),
+    "gcodejerk.verify": ("Verification", "verify"),
+}  # fmt: skip
+
+__all__ = [
+    "EmitError",
+    "GcodejerkError",
+    "Machine",
+    "MachineError",
+    "Plan",
+    "PlanError",
+    "ProgramError",
+    "Result",
+    "Verification",
+    "VerifyError",
+    "find_machine",
+    "plan_move",
+    "process",
+    "residual_acceleration",
+    "verify",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used."""
+    for home, names in _HOMES.items():
+        if name in names:
+            value = getattr(import_module(home), name)
+            globals()[name] = value
+            return value
+    raise AttributeError(f"module 'gcodejerk' has no attribute {name!r}")

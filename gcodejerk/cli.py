@@ -21,7 +21,7 @@ from gcodejerk.errors import GcodejerkError
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
-    from gcodejerk.process import Result, Settings
+    from gcodejerk.process import Settings
 
 app = typer.Typer(
     help="Rapids that do not shake the machine: re-times the G0 moves of an NC program.",
@@ -35,7 +35,9 @@ app.add_typer(machine_app, name="machine")
 
 MachineOption = Annotated[
     str,
-    typer.Option("--machine", "-m", metavar="M", help="machine file, or the name of a shipped machine"),
+    typer.Option(
+        "--machine", "-m", metavar="M", help="machine file, or the name of a shipped machine"
+    ),
 ]
 ProfileOption = Annotated[str | None, typer.Option(help="condition3 (default) or conventional")]
 
@@ -71,27 +73,44 @@ def _common(
 
 @app.command()
 def process(
-    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="programs; - is standard input")],
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="programs; - is standard input")
+    ],
     machine: MachineOption,
     output: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="OUT", help="output file; - is standard output")
+        str | None,
+        typer.Option("-o", "--output", metavar="OUT", help="output file; - is standard output"),
     ] = None,
     output_dir: Annotated[
         str | None, typer.Option(metavar="DIR", help="write each program under its own name here")
     ] = None,
     in_place: Annotated[bool, typer.Option("--in-place", help="replace each program")] = False,
-    controller: Annotated[str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")] = None,
+    controller: Annotated[
+        str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
+    ] = None,
     form: Annotated[str, typer.Option("--as", help="stream, pvt or parameters")] = "stream",
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
     report: Annotated[str | None, typer.Option(metavar="FILE.json", help="write a report")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
-    strict: Annotated[bool, typer.Option("--strict", help="refuse a program with rapids left alone")] = False,
-    check: Annotated[bool, typer.Option("--check", help="write nothing; exit 1 if anything would change")] = False,
-    diff: Annotated[bool, typer.Option("--diff", help="write nothing; print what would change")] = False,
-    no_verify: Annotated[bool, typer.Option("--no-verify", help="do not read the output back")] = False,
-    no_comments: Annotated[bool, typer.Option("--no-comments", help="do not name replaced blocks")] = False,
-    force: Annotated[bool, typer.Option("--force", help="accept a program processed before")] = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="refuse a program with rapids left alone")
+    ] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="write nothing; exit 1 if anything would change")
+    ] = False,
+    diff: Annotated[
+        bool, typer.Option("--diff", help="write nothing; print what would change")
+    ] = False,
+    no_verify: Annotated[
+        bool, typer.Option("--no-verify", help="do not read the output back")
+    ] = False,
+    no_comments: Annotated[
+        bool, typer.Option("--no-comments", help="do not name replaced blocks")
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="accept a program processed before")
+    ] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
@@ -118,7 +137,14 @@ def process(
     mode = "check" if check else "diff" if diff else "write"
     described = _machine(machine, files[0])
     jobs_list = [
-        Job(file, _output(file, output, output_dir, in_place, described, settings), report, mode, strict)
+        Job(
+            file,
+            _output(file, output, output_dir, in_place, described, settings),
+            report,
+            mode,
+            in_place,
+            strict,
+        )
         for file in files
     ]
     to_stdout = diff or any(job.output == "-" for job in jobs_list)
@@ -174,17 +200,29 @@ def inspect(
 
 @app.command()
 def plan(
-    moves: Annotated[list[str], typer.Argument(metavar="AXIS=LENGTH...", help="for example Z=1 or X=20 Y=-5")],
+    moves: Annotated[
+        list[str], typer.Argument(metavar="AXIS=LENGTH...", help="for example Z=1 or X=20 Y=-5")
+    ],
     machine: MachineOption,
-    time: Annotated[float | None, typer.Option(metavar="S", help="T_SUM; the conventional time by default")] = None,
-    t1: Annotated[float | None, typer.Option("--T1", metavar="S", help="T1 of a four-segment profile")] = None,
+    time: Annotated[
+        float | None, typer.Option(metavar="S", help="T_SUM; the conventional time by default")
+    ] = None,
+    t1: Annotated[
+        float | None, typer.Option("--T1", metavar="S", help="T1 of a four-segment profile")
+    ] = None,
     profile: ProfileOption = None,
     as_json: Annotated[
-        str | None, typer.Option("--json", metavar="FILE", help="write the report; - is standard output")
+        str | None,
+        typer.Option("--json", metavar="FILE", help="write the report; - is standard output"),
     ] = None,
-    csv: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="write the stream")] = None,
+    csv: Annotated[
+        str | None, typer.Option("--csv", metavar="FILE", help="write the stream")
+    ] = None,
     plot: Annotated[
-        str | None, typer.Option("--plot", metavar="FILE", help="draw profile and vibration (.png, .svg, .pdf)")
+        str | None,
+        typer.Option(
+            "--plot", metavar="FILE", help="draw profile and vibration (.png, .svg, .pdf)"
+        ),
     ] = None,
 ) -> None:
     """Plan one move: its profile, peaks and residuals, the conventional ones beside it."""
@@ -213,7 +251,9 @@ def plan(
 
 @machine_app.command("check")
 def machine_check(
-    machine: Annotated[str, typer.Argument(metavar="M", help="machine file, or the name of a shipped machine")],
+    machine: Annotated[
+        str, typer.Argument(metavar="M", help="machine file, or the name of a shipped machine")
+    ],
 ) -> None:
     """Validate a machine file; every problem with its line and column."""
     described = _machine(machine, None)
@@ -244,7 +284,9 @@ def controllers() -> None:
         except GcodejerkError as error:
             rows.append((name, "-", "broken", str(error)))
             continue
-        rows += [(name if k == 0 else "", f.name, f.confidence, f.note) for k, f in enumerate(forms)]
+        rows += [
+            (name if k == 0 else "", f.name, f.confidence, f.note) for k, f in enumerate(forms)
+        ]
     _console().print(controllers_table(rows))
 
 
@@ -252,7 +294,7 @@ def _machine(name: str, program: str | None) -> Machine:
     """The machine that the user named: a shipped one, or a file, also beside the program."""
     from gcodejerk.machine import Machine, find_machine
 
-    beside = Path(program).parent / name if program not in (None, "-") else None  # type: ignore[arg-type]
+    beside = None if program is None or program == "-" else Path(program).parent / name
     if beside is not None and not Path(name).exists() and beside.is_file():
         return Machine.load(beside)
     return Machine.load(find_machine(name))
@@ -290,7 +332,9 @@ def _output(
     suffix = load_controller(settings.controller or machine.controller).suffix
     if in_place:
         if suffix:
-            raise typer.BadParameter("--in-place: this controller's streams are a file of their own")
+            raise typer.BadParameter(
+                "--in-place: this controller's streams are a file of their own"
+            )
         return file
     if output is not None:
         return output
@@ -318,9 +362,20 @@ def _progress(silent: bool) -> Iterator[Callable[[str, int, int], None] | None]:
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn("{task.description:>10}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description:>10}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
 

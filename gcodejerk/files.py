@@ -1,7 +1,7 @@
 """Files in and out: an output appears in one move, or not at all.
 
-Rule 1: an output is written beside its place under a hidden name, and renamed when it is complete and
-verified. Killed at any moment, a run leaves the old file or the new one; at worst a hidden
+Rule 1: an output is written beside its place under a hidden name, and renamed when it is complete
+and verified. Killed at any moment, a run leaves the old file or the new one; at worst a hidden
 `.~gcodejerk-` file stays, which nothing reads.
 Rule 2: an input is never opened for writing.
 """
@@ -58,7 +58,9 @@ def open_input(path: str) -> Iterator[BinaryIO]:
     except IsADirectoryError:
         raise ProgramError(f"{path} is a folder", "name the program in it") from None
     except OSError as error:
-        raise ProgramError(f"{path} cannot be read: {error.strerror}", "check its permissions") from None
+        raise ProgramError(
+            f"{path} cannot be read: {error.strerror}", "check its permissions"
+        ) from None
     with file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:

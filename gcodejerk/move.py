@@ -15,7 +15,8 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import laws_response
 from gcodejerk.motion.laws import Array, Laws
-from gcodejerk.plan import Plans, plan_moves
+from gcodejerk.plan import plan_moves
+from gcodejerk.plans import Plans
 from gcodejerk.reasons import CERTAIN, REASONS
 from gcodejerk.stream import Batch, Spelling, make_streams
 
@@ -43,17 +44,17 @@ class Plan:
 
     @property
     def time(self) -> float:
-        """T_SUM, a whole number of intervals. [s]"""
+        """T_SUM, a whole number of intervals [s]."""
         return float(self.plans.counts[0]) * self.machine.interval
 
     @property
     def conventional_time(self) -> float:
-        """What the controller's own G0 takes. [s]"""
+        """What the controller's own G0 takes [s]."""
         return float(self.plans.conventional_time[0])
 
     @property
     def length(self) -> float:
-        """Along the path. [mm], or [deg] where only rotary axes move"""
+        """Along the path [mm], or [deg] where only rotary axes move."""
         return float(self.plans.length[0])
 
     @property
@@ -73,23 +74,23 @@ class Plan:
 
     @property
     def t(self) -> Array:
-        """Moments of the stream, shape (n,). [s]"""
+        """Moments of the stream, shape (n,) [s]."""
         return self.batch.positions(0)[0]
 
     @property
     def positions(self) -> dict[str, Array]:
-        """Position of each axis of the machine, as written, shape (n,) each. [mm] or [deg]"""
+        """Position of each axis of the machine, as written, shape (n,) each [mm] or [deg]."""
         rows = self.batch.positions(0)[1]
         return {axis: rows[:, AXES.index(axis)] for axis in self.machine.axis_names}
 
     @property
     def residual(self) -> Array:
-        """Displacement envelope of each mode, of the stream as written, shape (1, m). [mm]"""
+        """Displacement envelope of each mode, of the stream as written, shape (1, m) [mm]."""
         return self.batch.residual
 
     @property
     def conventional_residual(self) -> Array:
-        """The same of the controller's own G0, sampled at the interval, shape (1, m). [mm]"""
+        """The same of the controller's own G0, sampled at the interval, shape (1, m) [mm]."""
         return self.batch.conventional_residual
 
     def unsampled(self) -> list[tuple[float, float]]:
@@ -165,7 +166,9 @@ def plan_move(
             raise PlanError(f"{name} moves by {length}, expected a length", "for example Z=1.5")
         row[0, AXES.index(name)] = length
     if time is not None and not (np.isfinite(time) and time > 0.0):
-        raise PlanError(f"the time is {time:g} s, expected more than zero", "for example --time 0.040")
+        raise PlanError(
+            f"the time is {time:g} s, expected more than zero", "for example --time 0.040"
+        )
     plans = plan_moves(row, machine, profile, time=time, T1=T1)
     if plans.reason[0] != CERTAIN:
         reason = REASONS[plans.reason[0]]

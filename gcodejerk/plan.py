@@ -3,21 +3,15 @@
 This module owns the decisions between the program and the physics: how long a move takes (its
 conventional time, rounded up to whole intervals), which laws compete, when the conventional one
 stays, and why a move cannot be planned. Numbers are columns: one row a move, one row a law.
-
-A move along a straight line has one law, which every axis follows in proportion to its displacement.
-Under `positioning: independent` each axis has a law of its own. Both are the same thing here: a law
-has a *share*, the displacement of every axis that it carries.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine, Mode
+from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import (
     Laws,
     conventional_laws,
@@ -25,116 +19,18 @@ from gcodejerk.motion import (
     design_four_segments,
     four_segment_range,
     laws_response,
-    mode_poles,
 )
 from gcodejerk.motion.laws import Array
-from gcodejerk.motion.residual import Complex
 from gcodejerk.nc import Rapids
+from gcodejerk.plans import Modes, Plans
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 PROFILES = ("condition3", "conventional")
 """The profiles that this version designs."""
 STANDSTILL = 1e-9
-"""An axis that moves less than this does not move. [mm] or [deg]"""
+"""An axis that moves less than this does not move [mm] or [deg]."""
 GRID_TOLERANCE = 1e-6
-"""A time this little above a whole number of intervals is that number. [intervals]"""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Modes:
-    """A machine's modes as columns.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        The axes that excite each: `Z`, or `Y+Z`.
-    modes : tuple of Mode
-        The modes themselves.
-    poles : ndarray of complex, shape (m,)
-        [rad/s]
-    participation : ndarray, shape (m, 9)
-        Of each axis of `AXES`. [-]
-    """
-
-    labels: tuple[str, ...]
-    modes: tuple[Mode, ...]
-    poles: Complex
-    participation: Array
-
-    @classmethod
-    def of(cls, machine: Machine) -> Modes:
-        """The modes of a machine."""
-        pairs = machine.all_modes()
-        modes = tuple(mode for _, mode in pairs)
-        poles = mode_poles([mode.frequency for mode in modes], [mode.damping for mode in modes])
-        participation = np.array(
-            [[mode.participation_of(axis) for axis in AXES] for mode in modes], dtype=float
-        ).reshape(len(modes), len(AXES))
-        return cls(tuple(label for label, _ in pairs), modes, poles, participation)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Plans:
-    """Planned moves: columns of n moves, and of the l laws that they follow.
-
-    Attributes
-    ----------
-    machine : Machine
-        What they were planned for.
-    modes : Modes
-        Its modes.
-    reason : ndarray of uint8, shape (n,)
-        CERTAIN, or the index in `REASONS` of why the move is not planned; it then has no law.
-    displacement : ndarray, shape (n, 9)
-        Of each axis. [mm] or [deg]
-    length : ndarray, shape (n,)
-        Along the path. [mm], or [deg] where only rotary axes move
-    conventional_time : ndarray, shape (n,)
-        What the controller's own G0 takes. [s]
-    counts : ndarray of int, shape (n,)
-        T_SUM; 0 where the move is not planned. [intervals]
-    move : ndarray of int, shape (l,)
-        The move of each law, ascending.
-    share : ndarray, shape (l, 9)
-        Displacement of each axis that the law carries. [mm] or [deg]
-    laws, conventional : Laws
-        The designed laws, and those of the controller's own G0.
-    law_counts : ndarray of int, shape (l,)
-        T_SUM of each law. [intervals]
-    kept : ndarray of bool, shape (l,)
-        The law is the conventional one, because none is better.
-    """
-
-    machine: Machine
-    modes: Modes
-    reason: NDArray[np.uint8]
-    displacement: Array
-    length: Array
-    conventional_time: Array
-    counts: NDArray[np.int64]
-    move: NDArray[np.int64]
-    share: Array
-    laws: Laws
-    conventional: Laws
-    law_counts: NDArray[np.int64]
-    kept: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.reason)
-
-    @property
-    def planned(self) -> NDArray[np.bool_]:
-        """Which moves are planned, shape (n,)."""
-        return self.reason == CERTAIN
-
-    def profile(self, law: int) -> str:
-        """Name of the profile that a law follows."""
-        return "conventional" if self.kept[law] else "condition3"
-
-    def laws_of(self, move: int) -> range:
-        """The laws of a move."""
-        begin, end = np.searchsorted(self.move, [move, move + 1])
-        return range(int(begin), int(end))
+"""A time this little above a whole number of intervals is that number [intervals]."""
 
 
 def path_length(displacement: Array, machine: Machine) -> Array:
@@ -155,7 +51,8 @@ def path_length(displacement: Array, machine: Machine) -> Array:
     rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
     linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
     turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
-    return np.where(linear > STANDSTILL, linear, turning)
+    length: Array = np.where(linear > STANDSTILL, linear, turning)
+    return length
 
 
 def plan_moves(
@@ -197,7 +94,7 @@ def plan_moves(
     if profile not in PROFILES:
         raise PlanError(
             f"profile {profile!r} is not available in this version",
-            f"choose one of {', '.join(PROFILES)} (--profile, or design.profile in the machine file)",
+            f"choose one of {', '.join(PROFILES)} (--profile, or the machine's design.profile)",
         )
     reason = np.full(len(displacement), CERTAIN, np.uint8) if reason is None else reason.copy()
     out = reason != CERTAIN
@@ -297,7 +194,9 @@ class _Planner:
 
     def run(self) -> Plans:
         """Design every law, then gather the moves."""
-        total = self.conventional.total if self.time is None else np.full(len(self.share), self.time)
+        total = (
+            self.conventional.total if self.time is None else np.full(len(self.share), self.time)
+        )
         counts = np.ceil(total / self.interval - GRID_TOLERANCE).astype(np.int64)
         counts = np.maximum(counts, 1)
         if self.profile == "conventional":
@@ -338,8 +237,8 @@ class _Planner:
     def _given_T1(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
         """Four segments with the T1 that the user asked for."""
         assert self.T1 is not None
-        total = counts * self.interval
-        if not np.all((self.T1 > 0.0) & (self.T1 < 0.5 * total)):
+        total: Array = counts * self.interval
+        if not np.all((self.T1 > 0.0) & (0.5 * total > self.T1)):
             shortest = 0.5 * float(total.min(initial=np.inf))
             raise PlanError(
                 f"T1 is {self.T1:g} s, outside 0 < T1 < T_SUM/2 = {shortest:g} s",
@@ -370,7 +269,7 @@ class _Planner:
             worst = np.where(keep, reference, worst)
             kept |= keep
             laws, counts, worst = self._extend(laws, counts, worst)
-            # A trapezoid cannot be written. Where the design shakes more, the controller does better.
+            # A trapezoid cannot be written: where the design shakes more, it stays the controller's.
             worse = ~fits & np.isfinite(worst) & (worst > reference)
             self._rule_out_laws(worse, Reason.NOT_BETTER)
         elif not np.isfinite(worst).all():
@@ -380,7 +279,7 @@ class _Planner:
 
     def _search(self, counts: NDArray[np.int64], rows: NDArray[np.intp]) -> tuple[Laws, Array]:
         """The best laws for these rows; the worst residual is infinite where there is none."""
-        total = counts[rows] * self.interval
+        total: Array = counts[rows] * self.interval
         V, A, J = (limit[rows] for limit in self.limits)
         weights, conventional = self.weights[rows], self.conventional.take(rows)
         # Four segments where the conventional law has them: it is then a member of the family.
@@ -393,7 +292,9 @@ class _Planner:
         for chosen, part in ((four, "four"), (~four, "general")):
             index = np.nonzero(chosen)[0]
             if part == "four":
-                found, value = design_four_segments(total[index], low[index], high[index], poles, weights[index])
+                found, value = design_four_segments(
+                    total[index], low[index], high[index], poles, weights[index]
+                )
             else:
                 found, value, _ = design_condition3(
                     total[index], V[index], A[index], J[index], poles, weights[index],
@@ -429,14 +330,14 @@ class _Planner:
         return laws, counts, worst
 
     def _worst(self, laws: Laws) -> Array:
-        """Largest residual displacement of laws over the modes. [mm]"""
+        """Largest residual displacement of laws over the modes [mm]."""
         poles = self.modes.poles
         amplitude = np.abs(laws_response(laws, poles)) / poles.imag * self.weights
         worst: Array = amplitude.max(axis=1, initial=0.0)
         return worst
 
     def _noise(self) -> Array:
-        """What rounding may add to a residual: below this a design has gained nothing. [mm]"""
+        """What rounding may add to a residual: below this a design has gained nothing [mm]."""
         resolution = np.array(
             [self.machine.axis(a).resolution if a in self.machine.axis_names else 0.0 for a in AXES]
         )
@@ -480,34 +381,41 @@ class _Planner:
         total = float(law.total[0])
         if float(np.minimum(law.T1, law.T2)[0]) < self.interval * (1.0 - 1e-9):
             return PlanError(
-                f"T1 = {float(law.T1[0]):g} s leaves a segment shorter than the interval of {self.interval:g} s",
+                f"T1 = {float(law.T1[0]):g} s leaves a segment shorter than the interval "
+                f"of {self.interval:g} s",
                 f"give a T1 from {self.interval:g} to {0.5 * total - self.interval:g} s",
             )
         units = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
         for quantity in ("jerk", "acceleration", "velocity"):
             for axis in self.machine.axes:
-                peak = float(getattr(law, quantity)[0] * abs(self.share[row, AXES.index(axis.name)]))
+                peak = float(
+                    getattr(law, quantity)[0] * abs(self.share[row, AXES.index(axis.name)])
+                )
                 limit = getattr(axis.limit, quantity)
                 if peak > limit * (1.0 + 1e-9):
                     unit = ("deg" if axis.rotary else "mm") + units[quantity]
                     return PlanError(
-                        f"{how}axis {axis.name} reaches {peak:.6g} {unit} of {quantity} in {total:.3f} s, "
-                        f"above its limit of {limit:.6g} {unit}",
+                        f"{how}axis {axis.name} reaches {peak:.6g} {unit} of {quantity} "
+                        f"in {total:.3f} s, above its limit of {limit:.6g} {unit}",
                         f"allow more time (--time), or raise axes.{axis.name}.limit.{quantity}",
                     )
         raise AssertionError("a law outside its range keeps every limit")
 
     def _time_error(self, row: int, total: float) -> PlanError:
         """A time too short for the limits, with the least that would do."""
-        fastest = conventional_laws(*(limit[row : row + 1] for limit in self.limits), self.interval)
+        V, A, J = (limit[row : row + 1] for limit in self.limits)
+        fastest = conventional_laws(V, A, J, self.interval)
         least = float(np.ceil(fastest.total[0] / self.interval - GRID_TOLERANCE) * self.interval)
         stretch = total / float(fastest.total[0])
         if stretch < 1.0:
             law = Laws(*(column * stretch for column in fastest.columns()))
             error = self._limit_error(law, 0, "") if float(law.T1[0]) >= self.interval else None
             if error is not None:
-                return PlanError(error.problem, f"allow at least {least:.6g} s (--time {least:.6g})")
+                return PlanError(
+                    error.problem, f"allow at least {least:.6g} s (--time {least:.6g})"
+                )
         return PlanError(
-            f"no profile of {total:g} s keeps the limits and has segments of at least {self.interval:g} s",
+            f"no profile of {total:g} s keeps the limits and has segments of at least "
+            f"{self.interval:g} s",
             f"allow at least {least:.6g} s (--time {least:.6g})",
         )

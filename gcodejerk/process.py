@@ -24,7 +24,8 @@ from gcodejerk.errors import EmitError, Place, ProgramError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, read_program
-from gcodejerk.plan import Plans, plan_rapids
+from gcodejerk.plan import plan_rapids
+from gcodejerk.plans import Plans
 from gcodejerk.start import program_start
 from gcodejerk.stream import Batch, make_streams
 from gcodejerk.verify import Verification, require, verify_csv, verify_files
@@ -113,7 +114,7 @@ def process(
     force: bool = False,
     name: str = "<program>",
 ) -> Result:
-    """Rewrite every rapid of a program that is certain.
+    r"""Rewrite every rapid of a program that is certain.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def process(
     --------
     >>> from gcodejerk.machine import Machine, find_machine
     >>> vmc = Machine.load(find_machine("vmc"))
-    >>> result = process(b"G21 G90 G94 G64\\nG0 X0 Y0 Z0\\nG0 Z1.\\nM2\\n", vmc)
+    >>> result = process(b"G21 G90 G94 G64\nG0 X0 Y0 Z0\nG0 Z1.\nM2\n", vmc)
     >>> result.planned, result.left
     (1, 1)
     """
@@ -251,7 +252,9 @@ def stamp_comment(machine: Machine, settings: Settings, emitter: Controller) -> 
     chosen = (emitter.name, settings.form, settings.profile or machine.design.profile)
     text = " ".join((machine.settings_hash, *chosen)).encode()
     digest = hashlib.blake2b(text, digest_size=4).hexdigest()
-    plain = "".join(c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name)
+    plain = "".join(
+        c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name
+    )
     return f"(gcodejerk stamp {__version__} {digest} {plain[:28]})".encode()
 
 
@@ -367,7 +370,7 @@ class _Writer:
         return data
 
     def _copy(self, end: int) -> None:
-        """Copy the source up to an offset, or only read it where the output is a file of its own."""
+        """Copy the source up to an offset; only read it where the output is its own file."""
         while self.at < end:
             data = self._read(min(end, self.at + COPY_SIZE))
             if self.target is not None and self.emitter.in_place:

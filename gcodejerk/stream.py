@@ -28,7 +28,7 @@ from gcodejerk.motion import (
 )
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.residual import Complex
-from gcodejerk.plan import Plans
+from gcodejerk.plans import Plans
 
 BATCH_SAMPLES = 400_000
 """Samples of a batch, about; each needs some 100 bytes while it is worked on."""
@@ -116,7 +116,9 @@ class Batch:
         start = self.spelling.start[row]
         out = np.tile(start, (len(knots) - begin, 1))
         for axis, whole in self.whole.items():
-            written = self.spelling.origin[row, axis] + whole[row, begin:] * self.spelling.step[row, axis]
+            written = (
+                self.spelling.origin[row, axis] + whole[row, begin:] * self.spelling.step[row, axis]
+            )
             displacement = self.plans.displacement[self.moves[row], axis]
             if displacement:
                 out[:, axis] = written
@@ -153,7 +155,7 @@ def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[Batc
 
 
 def _make_batch(plans: Plans, moves: NDArray[np.int64], spelling: Spelling, stride: int) -> Batch:
-    """One batch; moves that rounding made worse than the conventional law are made again with it."""
+    """One batch; where rounding made a move worse than the conventional law, it gets that law."""
     rows = np.concatenate([np.arange(*_bounds(plans, move)) for move in moves]).astype(np.int64)
     row_of = np.searchsorted(moves, plans.move[rows])
     kept = np.zeros(len(moves), dtype=bool)
@@ -202,21 +204,25 @@ class _Maker:
         fine = (size > 0.0) & (size < FEW_STEPS * spelling.step)
         self.fine = fine
         self.spelling = Spelling(
-            spelling.start, np.where(fine, spelling.step / 10.0**FINE_DECIMALS, spelling.step), spelling.origin
+            spelling.start,
+            np.where(fine, spelling.step / 10.0**FINE_DECIMALS, spelling.step),
+            spelling.origin,
         )
 
     def writable(self, laws: Laws) -> NDArray[np.bool_]:
         """Whether the moves' laws, all of them, have finite jerk within the limits."""
         out = np.ones(len(self.moves), dtype=bool)
-        np.logical_and.at(out, self.row_of, np.isfinite(laws.jerk))
+        jerk = laws.jerk
+        finite = np.isfinite(jerk)
+        np.logical_and.at(out, self.row_of, finite)
+        jerk = np.where(finite, jerk, 0.0)
         for axis in self.plans.machine.axes:
-            jerk = laws.jerk * np.abs(self.share[:, AXES.index(axis.name)])
-            still = self.share[:, AXES.index(axis.name)] == 0.0
-            np.logical_and.at(out, self.row_of, still | (jerk <= axis.limit.jerk * (1.0 + 1e-9)))
+            size = np.abs(self.share[:, AXES.index(axis.name)])
+            np.logical_and.at(out, self.row_of, jerk * size <= axis.limit.jerk * (1.0 + 1e-9))
         return out
 
     def conventional_residual(self) -> Array:
-        """Of the controller's own rapid, sampled at the interval, shape (b, m). [mm]"""
+        """Of the controller's own rapid, sampled at the interval, shape (b, m) [mm]."""
         laws = self.plans.conventional.take(self.rows)
         counts = np.ceil(laws.total / self.interval - 1e-6).astype(np.int64)
         longest = np.zeros(len(self.moves), dtype=np.int64)
@@ -242,7 +248,9 @@ class _Maker:
             )  # fmt: skip
             error = origin[:, np.newaxis] + whole[axis] * step[:, np.newaxis] - exact[axis]
             begun = self.grid.knots > 0
-            error = np.where(begun & (self.grid.knots < self.grid.counts[:, np.newaxis]), error, 0.0)
+            error = np.where(
+                begun & (self.grid.knots < self.grid.counts[:, np.newaxis]), error, 0.0
+            )
             moving = self.plans.displacement[self.moves, axis] != 0.0
             noise = knots_response(error * moving[:, np.newaxis], self.grid, self.modes.poles)
             response = response + noise * self.modes.participation[:, axis]
@@ -269,7 +277,7 @@ class _Maker:
         return out
 
     def _response(self, laws: Laws, counts: NDArray[np.int64]) -> Complex:
-        """Response of the modes to moves sampled at every interval, before rounding, shape (b, m)."""
+        """Response of the modes to moves sampled at every interval, not rounded, shape (b, m)."""
         every = Grid.every(counts, 1, self.interval)
         unit, _ = sample_laws(laws, every.knots[self.row_of], self.interval)
         each = sampled_response(unit, self.interval, self.modes.poles)

@@ -1,8 +1,8 @@
 """What a controller's emitter is, and how emitters are found.
 
 An emitter turns streams into text. It knows the controller's language and nothing of how a law was
-designed. Emitters are found through the entry points `gcodejerk.controllers`, ours and those of other
-packages alike; listing them loads none.
+designed. Emitters are found through the entry points `gcodejerk.controllers`, ours and those of
+other packages alike; listing them loads none.
 """
 
 from __future__ import annotations
@@ -75,7 +75,12 @@ class Controller(Protocol):
         ...
 
     def render(
-        self, batch: Batch, rapids: Rapids, blocks: Sequence[bytes], newline: bytes, options: Options
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        blocks: Sequence[bytes],
+        newline: bytes,
+        options: Options,
     ) -> list[bytes]:
         """Text of each move of a batch.
 

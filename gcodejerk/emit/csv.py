@@ -1,9 +1,9 @@
 """Controller `csv`: the streams as a table, for whatever plays samples or looks at them.
 
 One row per interval: the rapid's line in the program, the time since its start, and the position of
-every axis of the machine in program coordinates, in mm and degrees (a radius where the program gives
-diameters). The first row is the exact start, the last the exact end. An axis that stands still at a
-position that the program does not tell has `nan`.
+every axis of the machine in program coordinates, in mm and degrees (a radius where the program
+gives diameters). The first row is the exact start, the last the exact end. An axis that stands
+still at a position that the program does not tell has `nan`.
 """
 
 from __future__ import annotations
@@ -47,10 +47,17 @@ class CsvController:
         return ",".join(["block", "t", *machine.axis_names]).encode() + b"\n"
 
     def render(
-        self, batch: Batch, rapids: Rapids, blocks: Sequence[bytes], newline: bytes, options: Options
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        blocks: Sequence[bytes],
+        newline: bytes,
+        options: Options,
     ) -> list[bytes]:
         """Rows of each move."""
-        return [self._rows(batch, row, int(rapids.line[batch.moves[row]])) for row in range(len(batch))]
+        return [
+            self._rows(batch, row, int(rapids.line[batch.moves[row]])) for row in range(len(batch))
+        ]
 
     def _rows(self, batch: Batch, row: int, line: int) -> bytes:
         """The rows of one move: the exact start, the rounded points, the exact end."""
@@ -72,10 +79,14 @@ class CsvController:
             else:
                 columns.append(Column(b"," + _exact(positions[0, k], decimals), None, 0))
         first = self._exact_row(machine, line, b"0", positions[0])
-        last = self._exact_row(machine, line, _exact(count * machine.interval, time_decimals), positions[-1])
+        last = self._exact_row(
+            machine, line, _exact(count * machine.interval, time_decimals), positions[-1]
+        )
         return first + (format_lines(columns, b"\n")[0] if count > 1 else b"") + last
 
-    def _exact_row(self, machine: Machine, line: int, t: bytes, position: NDArray[np.float64]) -> bytes:
+    def _exact_row(
+        self, machine: Machine, line: int, t: bytes, position: NDArray[np.float64]
+    ) -> bytes:
         """One row in full precision."""
         fields = [b"%d" % line, t]
         for axis in machine.axes:

@@ -1,8 +1,8 @@
 """Numbers to text, a million lines at a time.
 
 This module owns the way from columns of whole numbers to lines such as ``G1 X1.2500 F340.0810``:
-every line is a row of a matrix of bytes, wide enough for the largest number; bytes that a line
-does not use are zero and fall out when the matrix is flattened. Numbers are integers with an implied
+every line is a row of a matrix of bytes, wide enough for the largest number; bytes that a line does
+not use are zero and fall out when the matrix is flattened. Numbers are integers with an implied
 decimal point, so nothing is rounded here, and minus zero cannot occur.
 """
 
@@ -36,7 +36,7 @@ class Column:
 
 
 def format_lines(columns: list[Column], line_end: bytes) -> tuple[bytes, Whole]:
-    """Lines of text from columns of numbers.
+    r"""Lines of text from columns of numbers.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ def format_lines(columns: list[Column], line_end: bytes) -> tuple[bytes, Whole]:
     Examples
     --------
     >>> x, f = np.array([-5, 12345]), np.array([600, 10])
-    >>> text, ends = format_lines([Column(b"G1 X", x, 3), Column(b" F", f, 0)], b"\\n")
+    >>> text, ends = format_lines([Column(b"G1 X", x, 3), Column(b" F", f, 0)], b"\n")
     >>> text, ends.tolist()
-    (b'G1 X-0.005 F600\\nG1 X12.345 F10\\n', [16, 31])
+    (b'G1 X-0.005 F600\nG1 X12.345 F10\n', [16, 31])
     """
     count = next(len(column.values) for column in columns if column.values is not None)
     widths = [_digits_shown(column) for column in columns]

@@ -1,9 +1,9 @@
 """Controller `linuxcnc`: each stream as G1 blocks in the place of the rapid's block.
 
-The form is the one that was measured to follow a profile best (LinuxCNC 2.9, servo period 1 ms): blocks of
-2 ms under G94 and G64, each with F = the larger of the profile's speeds at the block's two ends,
-since LinuxCNC reaches F at the end of a servo period, and ends a block with the smaller of its own F and
-the next one's. Blocks of 1 ms would be stretched by 2 % (TP_MIN_SEGMENT_CYCLES).
+The form is the one that was measured to follow a profile best (LinuxCNC 2.9, servo period 1 ms):
+blocks of 2 ms under G94 and G64, each with F = the larger of the profile's speeds at the block's
+two ends, since LinuxCNC reaches F at the end of a servo period, and ends a block with the smaller
+of its own F and the next one's. Blocks of 1 ms would be stretched by 2 % (TP_MIN_SEGMENT_CYCLES).
 
 A replaced block becomes, each line only where it is needed::
 
@@ -15,8 +15,8 @@ A replaced block becomes, each line only where it is needed::
     G0 F600. G61                 the modal values that the program relies on
     M0                           what takes effect after motion
 
-Rule: the last point repeats the block's own words, so the end is exactly the programmed one, whatever
-was rounded before.
+Rule: the last point repeats the block's own words, so the end is exactly the programmed one,
+whatever was rounded before.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
-"""Duration of a block, measured as the best; whole intervals, at least one. [s]"""
+"""Duration of a block, measured as the best; whole intervals, at least one [s]."""
 FEED_DECIMALS = 4
 """Of F in units per minute."""
 COMMENT_LENGTH = 69
@@ -89,7 +89,12 @@ class LinuxcncController:
         return b""
 
     def render(
-        self, batch: Batch, rapids: Rapids, blocks: Sequence[bytes], newline: bytes, options: Options
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        blocks: Sequence[bytes],
+        newline: bytes,
+        options: Options,
     ) -> list[bytes]:
         """Text of each move."""
         moves = batch.moves
@@ -137,7 +142,9 @@ class LinuxcncController:
             kinds.setdefault(kind, []).append(row)
         out: list[_Points] = [_Points(b"", {})] * len(batch)
         for kind, rows in kinds.items():
-            for row, points in zip(rows, _format_kind(batch, np.array(rows), kind, feed), strict=True):
+            for row, points in zip(
+                rows, _format_kind(batch, np.array(rows), kind, feed), strict=True
+            ):
                 out[row] = points
         return out
 
@@ -197,7 +204,7 @@ class _Points:
 
 
 class _Frame:
-    """The lines around the points of one move: what the block says besides, and what it relies on."""
+    """The lines around a move's points: what its block says besides, and what it relies on."""
 
     def __init__(self, rapids: Rapids, move: int, block: Block, text: bytes) -> None:
         self.rapids, self.move, self.block, self.text = rapids, move, block, text
@@ -303,4 +310,7 @@ def _feed(speed: NDArray[np.float64]) -> NDArray[np.int64]:
     """F of the block that ends at each knot, in whole units of its last decimal."""
     ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
     # F0 is an error in LinuxCNC; a block that hardly moves still has its smallest F.
-    return np.maximum(np.rint(per_minute(1.0) * 10.0**FEED_DECIMALS * ends), 1.0).astype(np.int64)
+    feed: NDArray[np.int64] = np.maximum(
+        np.rint(per_minute(1.0) * 10.0**FEED_DECIMALS * ends), 1.0
+    ).astype(np.int64)
+    return feed

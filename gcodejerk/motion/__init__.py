@@ -1,9 +1,9 @@
 """Motion: profiles, residual vibration, the design of Condition III, sampling and rounding.
 
-Numbers in, arrays out: nothing here knows a file, a machine or a program. A move is described by its
-*unit law*, a rest-to-rest motion from 0 to 1; an axis sees it scaled by its own displacement, so
-that limits divided by displacements are the limits of the law, and one design serves all axes of a
-straight line.
+Numbers in, arrays out: nothing here knows a file, a machine or a program. A move is described by
+its *unit law*, a rest-to-rest motion from 0 to 1; an axis sees it scaled by its own displacement,
+so that limits divided by displacements are the limits of the law, and one design serves all axes of
+a straight line.
 """
 
 from gcodejerk.motion.condition3 import design_condition3, design_four_segments, four_segment_range

@@ -32,7 +32,7 @@ RAMP_GRID = 6
 REFINEMENTS = 10
 """Halvings of the step in the search around the best general law of the map."""
 TIE = 1e-7
-"""Residuals that differ by less than this are equal, and the lower jerk decides. [mm]"""
+"""Residuals that differ by less than this are equal, and the lower jerk decides [mm]."""
 ROUNDING = 1e-9
 """Relative tolerance on limits, for the rounding of floating-point numbers."""
 CELLS = 1 << 16
@@ -80,7 +80,9 @@ def four_segment_range(
         by_J1 = 0.5 * (T - np.sqrt(T * T - 4.0 * need))
         by_J2 = 0.75 * T - np.sqrt(0.0625 * T * T + need)
     low = np.where(np.isnan(by_J1), np.inf, np.maximum(by_J1, interval))
-    high = np.minimum(np.minimum(T - 1.5 / V, T - 6.0 / (T * A)), np.minimum(by_J2, 0.5 * T - interval))
+    high = np.minimum(
+        np.minimum(T - 1.5 / V, T - 6.0 / (T * A)), np.minimum(by_J2, 0.5 * T - interval)
+    )
     # The ends may cross by rounding where only one law is left.
     high = np.where((high < low) & (high > low * (1.0 - 1e-7)), low, high)
     return low, high
@@ -122,7 +124,9 @@ def design_four_segments(
         value = np.where(inside, value, np.inf)
         quarter = 0.25 * total[part]
         best[part] = np.where(
-            (low[part] <= quarter) & (quarter <= high[part]), quarter, 0.5 * (low[part] + high[part])
+            (low[part] <= quarter) & (quarter <= high[part]),
+            quarter,
+            0.5 * (low[part] + high[part]),
         )
         chosen = _least(value, np.abs(columns - quarter[:, np.newaxis]))
         found = np.isfinite(value[np.arange(len(chosen)), chosen])
@@ -142,11 +146,17 @@ def _refine_T1(
     T1: Array, step: Array, low: Array, high: Array, total: Array, poles: Complex, weights: Array
 ) -> tuple[Array, Array]:
     """Zoom in on the best T1 of the map, keeping what is not better by more than a tie."""
-    worst = _worst(_displacement(_four(T1[:, np.newaxis], total[:, np.newaxis]), poles), weights)[:, 0]
+    worst = _worst(_displacement(_four(T1[:, np.newaxis], total[:, np.newaxis]), poles), weights)[
+        :, 0
+    ]
     around = np.array([-1.0, -0.5, 0.5, 1.0])
     index = np.arange(len(T1))
     for _ in range(8):
-        every = np.clip(T1[:, np.newaxis] + step[:, np.newaxis] * around, low[:, np.newaxis], high[:, np.newaxis])
+        every = np.clip(
+            T1[:, np.newaxis] + step[:, np.newaxis] * around,
+            low[:, np.newaxis],
+            high[:, np.newaxis],
+        )
         value = _worst(_displacement(_four(every, total[:, np.newaxis]), poles), weights)
         chosen = np.argmin(value, axis=1)
         better = value[index, chosen] < worst - 0.01 * TIE
@@ -181,7 +191,8 @@ def design_condition3(
     interval : float
         Command interval, the least duration of a segment. [s]
     conventional : Laws
-        The laws to improve on; stretched to T_SUM they are candidates, where they are within limits.
+        The laws to improve on; stretched to T_SUM they are candidates, where they are within
+        limits.
 
     Returns
     -------
@@ -198,7 +209,13 @@ def design_condition3(
     fastest = conventional_laws(velocity, acceleration, jerk, interval)
     for part in _slices(n, RAMP_GRID * RAMP_GRID * 2):
         search = _GeneralSearch(
-            total[part], velocity[part], acceleration[part], jerk[part], poles, weights[part], interval
+            total[part],
+            velocity[part],
+            acceleration[part],
+            jerk[part],
+            poles,
+            weights[part],
+            interval,
         )
         laws, worst[part] = search.run([conventional.take(part), fastest.take(part)])
         for column, new in zip(columns, laws.columns(), strict=True):
@@ -211,7 +228,7 @@ COMPASS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0,
 
 
 class _Points(NamedTuple):
-    """One point of the search for each row: T1, T2, the share of Ta's range, and its worst residual."""
+    """A point of the search for each row: T1, T2, the share of Ta's range, the worst residual."""
 
     T1: Array
     T2: Array
@@ -223,7 +240,14 @@ class _GeneralSearch:
     """One batch of the general search: the feasible range of Ta, the map, and the refinement."""
 
     def __init__(
-        self, total: Array, V: Array, A: Array, J: Array, poles: Complex, weights: Array, interval: float
+        self,
+        total: Array,
+        V: Array,
+        A: Array,
+        J: Array,
+        poles: Complex,
+        weights: Array,
+        interval: float,
     ) -> None:
         slack = 1.0 + ROUNDING
         self.total, self.V, self.A, self.J = total, V * slack, A * slack, J * slack
@@ -299,7 +323,9 @@ class _GeneralSearch:
         b = T1 + 0.5 * T2 - centroid
         p = 0.5 * T - T1 - 0.5 * T2
         with np.errstate(invalid="ignore"):
-            high = np.minimum(-b + np.sqrt(b * b - 2.0 * (moment - centroid * half)), 0.5 * T - T1 - T2)
+            high = np.minimum(
+                -b + np.sqrt(b * b - 2.0 * (moment - centroid * half)), 0.5 * T - T1 - T2
+            )
             low = p - np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
         return np.maximum(low, 0.0), high
 
@@ -356,7 +382,7 @@ def _four(T1: Array, total: Array) -> Laws:
 
 
 def _displacement(laws: Laws, poles: Complex) -> Array:
-    """Displacement envelopes of unit laws for weight 1, shape (..., m). [-]"""
+    """Displacement envelopes of unit laws for weight 1, shape (..., m) [-]."""
     shape = laws.T1.shape
     flat = Laws(*(column.ravel() for column in laws.columns()))
     amplitude: Array = np.abs(laws_response(flat, poles)) / poles.imag
@@ -382,7 +408,8 @@ def _least(value: Array, tie_break: Array) -> NDArray[np.intp]:
     """Column of the least value in each row; among ties the one with the least tie_break."""
     least = value.min(axis=1, keepdims=True)
     tied = value <= least + TIE
-    return np.argmin(np.where(tied, tie_break, np.inf), axis=1)
+    column: NDArray[np.intp] = np.argmin(np.where(tied, tie_break, np.inf), axis=1)
+    return column
 
 
 def _slices(n: int, width: int) -> list[slice]:

@@ -53,22 +53,22 @@ class Laws:
 
     @property
     def ramp(self) -> Array:
-        """Duration of the acceleration, T1 + Ta + T2. [s]"""
+        """Duration of the acceleration, T1 + Ta + T2 [s]."""
         return self.T1 + self.Ta + self.T2
 
     @property
     def total(self) -> Array:
-        """Duration of the move, T_SUM. [s]"""
+        """Duration of the move, T_SUM [s]."""
         return 2.0 * self.ramp + self.Tv
 
     @property
     def area(self) -> Array:
-        """Velocity gained per unit of peak acceleration. [s]"""
+        """Velocity gained per unit of peak acceleration [s]."""
         return self.Ta + 0.5 * (self.T1 + self.T2)
 
     @property
     def centroid(self) -> Array:
-        """Moment at which the acceleration's area is balanced. [s]
+        """Moment at which the acceleration's area is balanced [s].
 
         The length of a law is V (T_SUM - 2 centroid): the acceleration acts as if it all happened
         at its centroid, and so, by symmetry, does the deceleration.
@@ -79,17 +79,17 @@ class Laws:
 
     @property
     def velocity(self) -> Array:
-        """Peak velocity of the unit law. [1/s]"""
+        """Peak velocity of the unit law [1/s]."""
         return 1.0 / (self.total - 2.0 * self.centroid)
 
     @property
     def acceleration(self) -> Array:
-        """Peak acceleration of the unit law. [1/s^2]"""
+        """Peak acceleration of the unit law [1/s^2]."""
         return self.velocity / self.area
 
     @property
     def jerk(self) -> Array:
-        """Peak jerk of the unit law; infinite where T1 or T2 is zero. [1/s^3]"""
+        """Peak jerk of the unit law; infinite where T1 or T2 is zero [1/s^3]."""
         with np.errstate(divide="ignore"):
             return self.acceleration / np.minimum(self.T1, self.T2)
 
@@ -119,9 +119,8 @@ class Laws:
         A = float(self.take(slice(index, index + 1)).acceleration[0])
         rising = A / T1 if T1 else 0.0
         falling = -A / T2 if T2 else 0.0
-        every = [
-            (T1, rising), (Ta, 0.0), (T2, falling), (Tv, 0.0), (T2, falling), (Ta, 0.0), (T1, rising),
-        ]  # fmt: skip
+        accelerating = [(T1, rising), (Ta, 0.0), (T2, falling)]
+        every = [*accelerating, (Tv, 0.0), *reversed(accelerating)]
         return [(duration, jerk) for duration, jerk in every if duration > 0.0]
 
 
@@ -158,7 +157,9 @@ def conventional_laws(
     >>> [round(float(t[0]), 6) for t in law.columns()]
     [0.01, 0.0, 0.01, 0.0]
     """
-    V, A, J = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (velocity, acceleration, jerk)))
+    V, A, J = np.broadcast_arrays(
+        *(np.asarray(x, dtype=float) for x in (velocity, acceleration, jerk))
+    )
     with np.errstate(divide="ignore"):
         # Jerk alone: the ramp ends where the length, the velocity or the acceleration is reached.
         by_length, by_velocity, by_acceleration = np.cbrt(0.5 / J), np.sqrt(V / J), A / J

@@ -45,13 +45,14 @@ def mode_poles(frequency: ArrayLike, damping: ArrayLike) -> Complex:
     f, zeta = np.asarray(frequency, dtype=float), np.asarray(damping, dtype=float)
     if not np.all((zeta >= 0.0) & (zeta < 1.0)):
         raise PlanError(
-            f"damping ratio is {damping}, outside 0 <= damping < 1",
+            f"damping ratio is {damping!r}, outside 0 <= damping < 1",
             "give the ratio to critical damping, for example 0.02",
         )
     if not np.all((f > 0.0) & np.isfinite(f)):
-        raise PlanError(f"frequency is {frequency}, expected a number above zero [Hz]")
+        raise PlanError(f"frequency is {frequency!r}, expected a number above zero [Hz]")
     omega = 2.0 * np.pi * f
-    return -zeta * omega + 1j * omega * np.sqrt(1.0 - zeta * zeta)
+    poles: Complex = -zeta * omega + 1j * omega * np.sqrt(1.0 - zeta * zeta)
+    return poles
 
 
 def residual_acceleration(

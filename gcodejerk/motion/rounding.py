@@ -1,8 +1,8 @@
 r"""Rounding of positions to the machine's resolution, without shaking it.
 
 Plain rounding adds noise of all frequencies, the modes' own among them. Here each rounding error is
-fed back: a running sum per mode says how the errors made so far will still ring at this moment,
-and the next position is rounded so that the sum shrinks. It is a noise shaper whose loop filter is the
+fed back: a running sum per mode says how the errors made so far will still ring at this moment, and
+the next position is rounded so that the sum shrinks. It is a noise shaper whose loop filter is the
 modes themselves, so it has its zeros at their poles, damping included, for any number of modes.
 
 Rule 1: a rounded position is one of the two neighbours of the exact one: the error stays below one
@@ -50,9 +50,10 @@ def round_positions(
 
     Notes
     -----
-    With :math:`z = e^{\lambda \tau}` for the time :math:`\tau` between two knots and e the errors, a
-    mode keeps :math:`R = \sum_i e_i z^{k-i}`, times a constant. Choosing between the two neighbours the one
-    with the smaller weighted sum of :math:`|R|^2` is rounding of :math:`x - \mathrm{Re}\,\overline{z R}`.
+    With :math:`z = e^{\lambda \tau}` for the time :math:`\tau` between two knots and e the errors,
+    a mode keeps :math:`R = \sum_i e_i z^{k-i}`, times a constant. Choosing between the two
+    neighbours the one with the smaller weighted sum of :math:`|R|^2` is rounding of :math:`x -
+    \mathrm{Re}\,\overline{z R}`.
     """
     n, k = positions.shape
     # Rows in order of length, so that those under way in a column are the first ones.

@@ -2,8 +2,8 @@
 
 This module owns the layout of sampled moves: a matrix with one move a row, *aligned at its end*, so
 that the last column is every move's arrival, the column before it one step earlier, and a short
-move begins far to the right. What counts is the time that is left for a vibration until arrival, and
-that is the same in a whole column: a residual is one product of matrices.
+move begins far to the right. What counts is the time that is left for a vibration until arrival,
+and that is the same in a whole column: a residual is one product of matrices.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ class Grid:
     @property
     def blocks(self) -> Counts:
         """Number of written points of each move, the start not counted."""
-        return np.count_nonzero(self.knots, axis=1)
+        blocks: Counts = np.count_nonzero(self.knots, axis=1)
+        return blocks
 
 
 def sample_laws(laws: Laws, moments: Counts, interval: float) -> tuple[Array, Array]:
@@ -93,15 +94,15 @@ def sample_laws(laws: Laws, moments: Counts, interval: float) -> tuple[Array, Ar
     in_2 = np.clip(t - T1 - Ta, 0.0, T2)
     in_v = np.maximum(t - T1 - Ta - T2, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        J1 = np.where(T1 > 0.0, A / T1, 0.0)
-        J2 = np.where(T2 > 0.0, A / T2, 0.0)
-    a1 = np.where(T1 > 0.0, J1 * in_1, A)
-    v1 = 0.5 * J1 * in_1 * in_1
+        rising = np.where(T1 > 0.0, A / T1, 0.0)
+        falling = np.where(T2 > 0.0, A / T2, 0.0)
+    a1 = np.where(T1 > 0.0, rising * in_1, A)
+    v1 = 0.5 * rising * in_1 * in_1
     s1 = v1 * in_1 / 3.0
     va = v1 + a1 * in_a
     sa = s1 + (v1 + 0.5 * a1 * in_a) * in_a
-    v2 = va + (a1 - 0.5 * J2 * in_2) * in_2
-    s2 = sa + (va + (0.5 * a1 - J2 * in_2 / 6.0) * in_2) * in_2
+    v2 = va + (a1 - 0.5 * falling * in_2) * in_2
+    s2 = sa + (va + (0.5 * a1 - falling * in_2 / 6.0) * in_2) * in_2
     position = s2 + v2 * in_v
     position = np.where(late, 1.0 - position, position)
     return position, v2

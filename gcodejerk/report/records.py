@@ -1,7 +1,7 @@
 """The JSON report: plain dictionaries with the keys of the contract, in its order.
 
-Rule: everything in a record is a Python number, string, list, dictionary or None. What is unknown is
-None, so that the file is strict JSON: NaN has no place in it.
+Rule: everything in a record is a Python number, string, list, dictionary or None. What is unknown
+is None, so that the file is strict JSON: NaN has no place in it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.move import Plan
 from gcodejerk.nc import Rapids
-from gcodejerk.plan import Plans
+from gcodejerk.plans import Plans
 from gcodejerk.process import Result
 from gcodejerk.reasons import REASONS
 
@@ -31,7 +31,9 @@ DIGITS = 10
 class Records:
     """Records of planned moves; what is computed for all of them at once is computed once."""
 
-    def __init__(self, plans: Plans, kept: NDArray[np.bool_], residual: Array, conventional: Array) -> None:
+    def __init__(
+        self, plans: Plans, kept: NDArray[np.bool_], residual: Array, conventional: Array
+    ) -> None:
         self.plans, self.kept = plans, kept
         self.residual, self.conventional = residual, conventional
         interval = plans.machine.interval
@@ -140,7 +142,9 @@ class Records:
         return out
 
 
-def process_record(result: Result, machine: Machine, output: str | None, blocks: list[str]) -> Record:
+def process_record(
+    result: Result, machine: Machine, output: str | None, blocks: list[str]
+) -> Record:
     """The report on one processed program.
 
     Parameters
@@ -187,7 +191,7 @@ def move_record(plan: Plan) -> Record:
     """The report on one planned move, in the same form."""
     records = Records(plan.plans, plan.kept, plan.residual, plan.conventional_residual)
     end = {axis: number(length) for axis, length in plan.displacement.items()}
-    row = {
+    row: Record = {
         "line": None,
         "block": None,
         "start": dict.fromkeys(end, 0.0),
@@ -272,5 +276,5 @@ def _positions(rapids: Rapids, position: Any, row: int) -> Record:
 
 
 def _largest(residual: Array) -> float | None:
-    """The largest residual of all rapids and modes. [mm]"""
+    """The largest residual of all rapids and modes [mm]."""
     return number(float(residual.max())) if residual.size else None

@@ -1,6 +1,7 @@
 """Tables and lines for a terminal: what a person sees of a result.
 
-Rule: a table says what the JSON report says, in fewer digits. Lengths are mm (or deg), residuals um.
+Rule: a table says what the JSON report says, in fewer digits. Lengths are mm (or deg), residuals
+um.
 """
 
 from __future__ import annotations
@@ -150,7 +151,9 @@ def _residual_table(residual: Sequence[Record]) -> Table:
 
 def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
     """Emitters: name, what each can write, and how far its facts can be trusted."""
-    table = _table(("controller", "left"), ("form", "left"), ("confidence", "left"), ("note", "left"))
+    table = _table(
+        ("controller", "left"), ("form", "left"), ("confidence", "left"), ("note", "left")
+    )
     for row in rows:
         table.add_row(*row)
     return table

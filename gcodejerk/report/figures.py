@@ -1,0 +1,123 @@
+"""Figures: a planned move beside the conventional one.
+
+matplotlib is an optional extra and is imported inside the functions that draw; where it is missing,
+the error names the remedy.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from gcodejerk.errors import EmitError
+from gcodejerk.machine import AXES
+from gcodejerk.motion import sample_laws
+from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.move import Plan
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMATS = (".png", ".svg", ".pdf")
+TODAY, PLANNED = "#c44e52", "#1f5fa8"
+"""Colours that differ in print and for colour-blind eyes."""
+FINE = 8
+"""Points of a curve for each interval."""
+PERIODS = 4.0
+"""Periods of the slowest mode that are shown after arrival."""
+
+
+def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
+    """Draw acceleration, velocity, and the vibration of the worst mode, now and as planned.
+
+    Parameters
+    ----------
+    plan : Plan
+        The move.
+    file : binary file
+        Where the figure goes.
+    suffix : str
+        Its format: .png, .svg or .pdf.
+
+    Raises
+    ------
+    EmitError
+        The format is unknown, or matplotlib is not installed.
+    """
+    if suffix.lower() not in FORMATS:
+        raise EmitError(
+            f"a figure cannot be {suffix or 'without suffix'}", f"use {', '.join(FORMATS)}"
+        )
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise EmitError(
+            "figures need matplotlib, which is not installed",
+            "install it with: pip install 'gcodejerk[figures]'",
+        ) from None
+    shown = [_Curve("controller's own G0", TODAY, plan.plans.conventional, plan)]
+    shown.append(_Curve(f"{plan.profile}, as written", PLANNED, plan.laws, plan))
+    figure = Figure(figsize=(7.2, 7.2), layout="constrained")
+    upper, middle, lower = figure.subplots(3, 1, sharex=True)
+    for curve in shown:
+        curve.draw(upper, middle, lower)
+    moved = ", ".join(f"{axis} {length:g} mm" for axis, length in plan.displacement.items())
+    figure.suptitle(f"{moved} in {plan.time * 1e3:g} ms on {plan.machine.name}", fontsize=11)
+    upper.set_ylabel("acceleration [mm/s²]")
+    middle.set_ylabel("velocity [mm/s]")
+    lower.set_ylabel("vibration of the tool [µm]")
+    lower.set_xlabel("time [ms]")
+    for axes in (upper, middle, lower):
+        axes.axvline(plan.time * 1e3, color="0.6", linewidth=0.8, linestyle=":")
+        axes.grid(True, color="0.92", linewidth=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+    lower.annotate(
+        "arrival", (plan.time * 1e3, 1.0), (3, -3), xycoords=("data", "axes fraction"),
+        textcoords="offset points", va="top", fontsize=8, color="0.4",
+    )  # fmt: skip
+    upper.legend(frameon=False, fontsize=9, loc="upper right")
+    figure.savefig(file, format=suffix.lower().removeprefix("."), dpi=150)
+
+
+class _Curve:
+    """One law of the longest-moving axis, and the sum of what it does to the modes."""
+
+    def __init__(self, label: str, colour: str, laws: Laws, plan: Plan) -> None:
+        self.label, self.colour = label, colour
+        modes, share = plan.plans.modes, plan.plans.share
+        slowest = min((mode.frequency for mode in modes.modes), default=1.0 / plan.time)
+        self.t = np.arange(0.0, plan.time + PERIODS / slowest, plan.machine.interval / FINE)
+        axis = int(np.argmax(np.abs(plan.plans.displacement[0])))
+        self.axis = AXES[axis]
+        self.velocity, self.vibration = np.zeros_like(self.t), np.zeros_like(self.t)
+        step = self.t[1]
+        moments = np.arange(len(self.t), dtype=np.int64)[np.newaxis, :]
+        for k in range(len(laws)):
+            _, v = sample_laws(laws.take(slice(k, k + 1)), moments, step)
+            self.velocity += v[0] * share[k, axis]
+            weights = modes.participation @ share[k]
+            for pole, weight in zip(modes.poles, weights, strict=True):
+                self.vibration += weight * _response(v[0], step, complex(pole))
+        self.acceleration = np.gradient(self.velocity, step)
+
+    def draw(self, upper: Axes, middle: Axes, lower: Axes) -> None:
+        """Add the three curves."""
+        style: dict[str, Any] = {"color": self.colour, "linewidth": 1.4, "label": self.label}
+        ms = self.t * 1e3
+        upper.plot(ms, self.acceleration, **style)
+        middle.plot(ms, self.velocity, **style)
+        lower.plot(ms, self.vibration * 1e3, **style)
+
+
+def _response(velocity: Array, step: float, pole: complex) -> Array:
+    """Displacement of a mode in time, driven by a velocity in straight pieces."""
+    acceleration = np.diff(velocity) / step
+    # Exact for a constant acceleration within each step.
+    growth = np.exp(pole * step)
+    gain = (growth - 1.0) / pole
+    state = np.zeros(len(velocity), dtype=np.complex128)
+    for k, a in enumerate(acceleration):
+        state[k + 1] = state[k] * growth + a * gain
+    out: Array = -state.imag / pole.imag
+    return out
