@@ -237,7 +237,7 @@ class _Planner:
     def _given_T1(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
         """Four segments with the T1 that the user asked for."""
         assert self.T1 is not None
-        total: Array = counts * self.interval
+        total: Array = np.asarray(counts * self.interval, dtype=float)
         if not np.all((self.T1 > 0.0) & (0.5 * total > self.T1)):
             shortest = 0.5 * float(total.min(initial=np.inf))
             raise PlanError(
@@ -269,7 +269,7 @@ class _Planner:
             worst = np.where(keep, reference, worst)
             kept |= keep
             laws, counts, worst = self._extend(laws, counts, worst)
-            # A trapezoid cannot be written: where the design shakes more, it stays the controller's.
+            # A trapezoid cannot be written: where the design shakes more, it is left alone.
             worse = ~fits & np.isfinite(worst) & (worst > reference)
             self._rule_out_laws(worse, Reason.NOT_BETTER)
         elif not np.isfinite(worst).all():
@@ -279,7 +279,7 @@ class _Planner:
 
     def _search(self, counts: NDArray[np.int64], rows: NDArray[np.intp]) -> tuple[Laws, Array]:
         """The best laws for these rows; the worst residual is infinite where there is none."""
-        total: Array = counts[rows] * self.interval
+        total: Array = np.asarray(counts[rows] * self.interval, dtype=float)
         V, A, J = (limit[rows] for limit in self.limits)
         weights, conventional = self.weights[rows], self.conventional.take(rows)
         # Four segments where the conventional law has them: it is then a member of the family.

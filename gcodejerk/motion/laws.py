@@ -145,8 +145,8 @@ def conventional_laws(
     Notes
     -----
     With :math:`t_j` the duration of a jerk phase and :math:`t_a` that of constant acceleration the
-    unit length is :math:`V (2 t_j + t_a + t_v)`, :math:`V = A (t_j + t_a)`. The phases are filled in
-    this order: jerk alone, :math:`2 J t_j^3 = 1`; then constant acceleration,
+    unit length is :math:`V (2 t_j + t_a + t_v)`, :math:`V = A (t_j + t_a)`. The phases are
+    filled in this order: jerk alone, :math:`2 J t_j^3 = 1`; then constant acceleration,
     :math:`A (t_j + t_a)(2 t_j + t_a) = 1`; then cruise.
 
     Examples
