@@ -1,8 +1,8 @@
 """Proof that a processed program is the original with only its rapids re-timed.
 
 It reads both files from their bytes, with means of its own: how a stream was planned or written
-it does not know and cannot ask (`tests/unit/test_layers.py`). What it shares with the writing side is `nc`,
-which says where the rapids are and what is in force there.
+it does not know and cannot ask (`tests/unit/test_layers.py`). What it shares with the writing
+side is `nc`, which says where the rapids are and what is in force there.
 
     verify(original, processed, machine)       -> Verification
     require(verification)                      raises VerifyError unless it is all right

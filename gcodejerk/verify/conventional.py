@@ -6,7 +6,8 @@ the length 1. With peak velocity v the ramp lasts
 .. math:: r(v) = v/A + A/J \quad (v \ge A^2/J), \qquad r(v) = 2\sqrt{v/J} \quad (v < A^2/J),
 
 and both ramps together cover v r(v), since each is odd about its middle. Where V r(V) <= 1 the
-rest is cruise; otherwise v solves v r(v) = 1, found by bisection: no closed form that could be mistaken.
+rest is cruise; otherwise v solves v r(v) = 1, found by bisection: no closed form that could be
+mistaken.
 """
 
 from __future__ import annotations
@@ -17,6 +18,37 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 HALVINGS = 64
+
+
+def peak_velocity(velocity: Array, acceleration: Array, jerk: Array) -> Array:
+    """Highest velocity [1/s] of a move of length 1 within limits, as for `rapid_time`."""
+    low, high = np.zeros_like(velocity), velocity.copy()
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        short = middle * _ramp(middle, acceleration, jerk) <= 1.0
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return high
+
+
+def rapid_speed(t: Array, total: Array, peak: Array, acceleration: Array, jerk: Array) -> Array:
+    """Speed [1/s] of such moves at moments t, their own durations and peaks being known.
+
+    Jerk must be finite: a trapezoid is never written.
+    """
+    t = np.minimum(t, total - t)
+    full = np.minimum(acceleration, np.sqrt(peak * jerk))
+    ramp, rise = _ramp(peak, acceleration, jerk), full / jerk
+    rising = 0.5 * jerk * t**2
+    falling = peak - 0.5 * jerk * (ramp - t) ** 2
+    straight = full * (t - 0.5 * rise)
+    speed = np.where(t < rise, rising, np.where(t > ramp - rise, falling, straight))
+    return np.where(t <= 0.0, 0.0, np.where(t >= ramp, peak, speed))
+
+
+def _ramp(v: Array, acceleration: Array, jerk: Array) -> Array:
+    """Time [s] from rest to a velocity."""
+    full: Array = v / acceleration + acceleration / jerk
+    return np.where(v * jerk >= acceleration**2, full, 2.0 * np.sqrt(v / jerk))
 
 
 def rapid_time(velocity: Array, acceleration: Array, jerk: Array) -> Array:
@@ -39,15 +71,7 @@ def rapid_time(velocity: Array, acceleration: Array, jerk: Array) -> Array:
     >>> rapid_time(V, A, J).round(9)
     array([0.04, 1.5 ])
     """
-
-    def ramp(v: Array) -> Array:
-        full: Array = v / acceleration + acceleration / jerk
-        return np.where(v * jerk >= acceleration**2, full, 2.0 * np.sqrt(v / jerk))
-
-    low, high = np.zeros_like(velocity), velocity.copy()
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        short = middle * ramp(middle) <= 1.0
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    cruise = np.maximum(1.0 - velocity * ramp(velocity), 0.0) / velocity
-    return np.where(cruise > 0.0, 2.0 * ramp(velocity) + cruise, 2.0 * ramp(high))
+    peak = peak_velocity(velocity, acceleration, jerk)
+    ramp = _ramp(peak, acceleration, jerk)
+    cruise = np.maximum(1.0 - peak * ramp, 0.0) / peak
+    return 2.0 * ramp + cruise

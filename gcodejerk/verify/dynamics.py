@@ -4,9 +4,9 @@ The time between two points is not written; it follows from the machine's interv
 lasts `stride` intervals, and the remainder of the division lengthens one block in the middle.
 
 Velocity, acceleration and jerk are divided differences of the points. Times a factorial, such a
-difference is a weighted mean of the derivative, so exact points of a motion within its limits never exceed
-them, however short or long the blocks are; only the rounding of the points needs a tolerance.
-"""
+difference is a weighted mean of the derivative, so exact points of a motion within its limits
+never exceed them, however short or long the blocks are; only the rounding of the points needs a
+tolerance."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES
 from gcodejerk.verify.conventional import rapid_time
-from gcodejerk.verify.feeds import judge_feeds
+from gcodejerk.verify.feeds import judge_feeds, rapid_limits
 from gcodejerk.verify.findings import Findings, Kind
 from gcodejerk.verify.points import Array, Index, Paths, resolutions
 
@@ -49,16 +49,12 @@ def limits_of(machine: Machine) -> Array:
 
 def conventional_counts(displacement: Array, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
-    axes = [AXES.index(axis.name) for axis in machine.axes]
-    rapid = np.array([(a.rapid.velocity, a.rapid.acceleration, a.rapid.jerk) for a in machine.axes])
-    size = np.abs(displacement[:, axes])
-    with np.errstate(divide="ignore"):
-        limits = rapid.T[:, np.newaxis, :] / size
+    limits = rapid_limits(displacement, machine)
     if machine.positioning == "linear":
         total = rapid_time(*limits.min(axis=2))
     else:
-        moving = size > 0.0
-        each = np.zeros(size.shape)
+        moving = displacement != 0.0
+        each = np.zeros(displacement.shape)
         each[moving] = rapid_time(*limits[:, moving])
         total = each.max(axis=1, initial=0.0)
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
@@ -127,7 +123,7 @@ class Complaint:
 def _judge(paths: Paths, machine: Machine, clock: Clock) -> list[Complaint | None]:
     """Look at each stream under one guess of its times."""
     out: list[Complaint | None] = [None] * len(paths.begin)
-    t: Array = clock.moment * machine.interval
+    t: Array = np.asarray(clock.moment * machine.interval, dtype=np.float64)
     for kind, rows, problem in (
         *_limits(paths, machine, t),
         *judge_feeds(paths, machine, t, limits_of(machine)),

@@ -1,8 +1,9 @@
 """Whether the F words of a stream belong to its points.
 
-F of a block is the larger of the speeds at its two ends; between rest and rest these rise and fall
-once. So the speed at each point is the smaller of the F words on its two sides, known to the last decimal
-written, far better than from rounded points. That gives four tests, each with what it notices:
+F of a block is the larger of the speeds at its two ends; between rest and rest these rise and
+fall once. So the speed at each point is the smaller of the F words on its two sides, known to the
+last decimal written, far better than from rounded points. That gives these tests, each with what
+it notices:
 
 - the F words rise, then fall, and the highest stands on both sides of its point: notices any
   change at the peak and at constant velocity;
@@ -10,8 +11,8 @@ written, far better than from rounded points. That gives four tests, each with w
 - the way of each block is what the speeds at its ends give (the trapezoid with its correction for
   acceleration): notices changes beyond two steps per block time, that is 0.1 mm/s for steps of
   1e-4 mm and 2 ms, away from the moments at which the jerk jumps;
-- a stream that is its own mirror image but for a few blocks is damaged in these: notices any change
-  of a single F in streams with symmetric times.
+- a stream whose F words are their own mirror image, or those of the controller's own rapid, but
+  for a few blocks is damaged in these: notices any change of a single F beyond its rounding.
 
 For independent axes the speeds are those of no single law: F is held between the bounds that the
 points and the axes' jerk give, which notices gross changes only.
@@ -25,16 +26,17 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES
 from gcodejerk.units import SECONDS_PER_MINUTE
+from gcodejerk.verify.conventional import peak_velocity, rapid_speed, rapid_time
 from gcodejerk.verify.findings import Kind
 from gcodejerk.verify.points import Array, Paths, feed_speed, resolutions
 
 FEED_STEP = 1e-3
 """Rounding of F that is allowed for. [units/min]"""
 RELATIVE = 1e-6
-JUMP = 0.08
+JUMP = 0.3
 """Share of h^2 times the local range of jerk that a block's correction may be wrong by."""
-MIRRORED = 0.7
-"""Share of blocks beyond which a stream counts as symmetric."""
+ALIKE = 0.7
+"""Share of blocks from which on a stream counts as symmetric, or as the conventional law."""
 
 Rows = NDArray[np.bool_]
 Verdicts = list[tuple[Kind, Rows, str]]
@@ -66,9 +68,21 @@ def judge_feeds(paths: Paths, machine: Machine, t: Array, limits: Array) -> Verd
         judge.most(),
     ]
     if machine.positioning == "linear":
-        out += [judge.shape(), judge.limits(), judge.way(), judge.mirror()]
+        out += [judge.shape(), judge.limits(), judge.way()]
+        out += [judge.mirror(), judge.conventional()]
     else:
         out.append(judge.bounds())
+    return out
+
+
+def rapid_limits(displacement: Array, machine: Machine) -> Array:
+    """Limits of the controller's own rapid over the displacement, shape (3, moves, 9)."""
+    rapid = np.full((3, len(AXES)), np.inf)
+    for axis in machine.axes:
+        own = axis.rapid
+        rapid[:, AXES.index(axis.name)] = own.velocity, own.acceleration, own.jerk
+    with np.errstate(divide="ignore"):
+        out: Array = rapid[:, np.newaxis, :] / np.abs(displacement)
     return out
 
 
@@ -79,6 +93,7 @@ class _Judge:
         self, paths: Paths, machine: Machine, t: Array, limits: Array, speed: Array, length: Array
     ) -> None:
         self.paths, self.t, self.limits_, self.length = paths, t, limits, length
+        self.machine = machine
         owner = self.owner = paths.owner
         self.first = np.zeros(len(t), dtype=np.bool_)
         self.first[paths.begin] = True
@@ -122,6 +137,12 @@ class _Judge:
     def most(self) -> tuple[Kind, Rows, str]:
         """F is not above what the axes can do along the path."""
         V = self.path_limits[0][self.owner]
+        if self.machine.positioning != "linear":
+            parts = [
+                np.where(self._refers_to(a), self.limits_[0, a], 0.0)
+                for a in np.flatnonzero((self.paths.displacement != 0.0).any(axis=0)).tolist()
+            ]
+            V = np.sqrt(sum(part**2 for part in parts))[self.owner]
         most = V * (1.0 + RELATIVE) + self.rounding
         return Kind.VELOCITY, most < self.F, "F is above the velocity limits"
 
@@ -181,16 +202,30 @@ class _Judge:
 
     def mirror(self) -> tuple[Kind, Rows, str]:
         """Hold a nearly symmetric stream to its symmetry."""
-        begin, end, owner = self.paths.begin, self.paths.end, self.owner
-        rows = np.arange(len(owner))
-        other = np.where(self.first, rows, begin[owner] + end[owner] - rows)
-        other = np.minimum(other, len(rows) - 1)
-        equal = np.abs(self.F - self.F[other]) <= 2.0 * self.rounding
-        equal_times = np.abs(self.h - self.h[other]) < 1e-9
-        alike = np.add.reduceat((equal & equal_times & ~self.first).astype(float), begin)
-        symmetric = alike >= MIRRORED * self.paths.count
-        bad = ~self.first & symmetric[owner] & ~equal
+        begin, end, rows = self.paths.begin, self.paths.end, np.arange(len(self.owner))
+        other = np.where(self.first, rows, begin[self.owner] + end[self.owner] - rows)
+        bad = self._odd_ones(self.F[other])
         return Kind.FEED, bad, "F differs from that of the mirrored block"
+
+    def conventional(self) -> tuple[Kind, Rows, str]:
+        """Hold what is nearly the controller's own rapid to it."""
+        V, A, J = rapid_limits(self.paths.displacement, self.machine).min(axis=2)
+        law = np.isfinite(J)
+        J = np.where(law, J, 1.0)
+        total, peak = rapid_time(V, A, J), peak_velocity(V, A, J)
+        t = self.t - self.t[self.paths.begin][self.owner]
+        columns = (column[self.owner] for column in (total, peak, A, J))
+        v = rapid_speed(t, *columns) * self.length[self.owner]
+        expected = np.where(self.first, 0.0, np.maximum(v, np.roll(v, 1)))
+        bad = self._odd_ones(expected) & law[self.owner]
+        return Kind.FEED, bad, "F differs from that of the controller's own rapid"
+
+    def _odd_ones(self, expected: Array) -> Rows:
+        """Find the few F words that differ where nearly all are as expected."""
+        equal = np.abs(self.F - expected) <= 2.0 * self.rounding
+        alike = np.add.reduceat((equal & ~self.first).astype(float), self.paths.begin)
+        odd: Rows = ~self.first & ~equal & (alike >= ALIKE * self.paths.count)[self.owner]
+        return odd
 
     def bounds(self) -> tuple[Kind, Rows, str]:
         """F between bounds of the speed at the ends of its block, axis by axis."""

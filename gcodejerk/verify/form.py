@@ -2,8 +2,8 @@
 
 This module owns the form: which lines may follow each other, and a small machine for the modal
 words that may stand in them (motion, distance, feed, path). It judges by meaning: a mode word
-more or less, the number of decimals and the order of words make no difference; anything that it does
-not know is a violation.
+more or less, the number of decimals and the order of words make no difference; anything that it
+does not know is a violation.
 
 Rule: what it cannot read it does not guess. `read_stream` then returns None, and the walk ends.
 """
