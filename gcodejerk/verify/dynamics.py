@@ -6,7 +6,8 @@ lasts `stride` intervals, and the remainder of the division lengthens one block 
 Velocity, acceleration and jerk are divided differences of the points. Times a factorial, such a
 difference is a weighted mean of the derivative, so exact points of a motion within its limits
 never exceed them, however short or long the blocks are; only the rounding of the points needs a
-tolerance."""
+tolerance.
+"""
 
 from __future__ import annotations
 
