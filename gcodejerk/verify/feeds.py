@@ -143,12 +143,13 @@ class _Judge:
     def _largest(self, quantity: int) -> Array:
         """Limit along the path, row by row; of axes on their own, the limits of all together."""
         if self.machine.positioning == "linear":
-            return self.path_limits[quantity][self.owner]
-        axes = np.arange(len(AXES))
-        used = np.array([self._refers_to(a) for a in axes]).T & (self.paths.displacement != 0.0)
+            row: Array = self.path_limits[quantity]
+            return row[self.owner]
+        refers = np.array([self._refers_to(axis) for axis in range(len(AXES))]).T
+        used = refers & (self.paths.displacement != 0.0)
         parts = np.where(used, self.limits_[quantity], 0.0)
         together: Array = np.sqrt((parts**2).sum(axis=1))
-        return together[self.owner]
+        return np.asarray(together[self.owner], dtype=np.float64)
 
     def speeds(self) -> Array:
         """Speed at each point: the smaller of the F words on both sides."""

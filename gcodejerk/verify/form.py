@@ -193,7 +193,7 @@ class StreamReader:
 
     def peek(self) -> bytes:
         """Look at the next line without its end."""
-        return self.window.peek_line().removesuffix(self.line_end)
+        return self.window.peek_line().rstrip(b"\r\n")
 
     def next(self) -> None:
         """Go to the next line; the end of this one must be the block's."""

@@ -117,6 +117,13 @@ class TableReader:
             problem = f"t is {rows[at, 1]:g}, expected {at * dt:g}"
             self.found.add(Kind.TIME, line + at, original, problem)
             return False
+        unknown = np.isnan(self.rapids.start[i, self.columns])
+        other = (np.isnan(rows[:, 2:]) != unknown).any(axis=1)
+        if other.any():
+            at = int(np.flatnonzero(other)[0])
+            problem = "nan stands for what the program does not tell, and only for that"
+            self.found.add(Kind.TABLE, line + at, original, problem)
+            return False
         for where, row, kind in (("start", 0, Kind.START), ("target", -1, Kind.END)):
             wanted = getattr(self.rapids, where)[i, self.columns]
             is_off = ~(np.abs(rows[row, 2:] - wanted) <= EXACT * np.maximum(1.0, np.abs(wanted)))
