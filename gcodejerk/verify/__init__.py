@@ -44,7 +44,7 @@ __all__ = [
 
 MOST = 100
 """Violations that are collected, unless asked otherwise."""
-BATCH_BYTES = 4 << 20
+BATCH_BYTES = 1 << 20
 """Text of streams that is judged at a time."""
 NAMES = ("<original>", "<processed>")
 

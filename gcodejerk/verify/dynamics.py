@@ -38,12 +38,15 @@ def stride_of(machine: Machine) -> int:
 def limits_of(machine: Machine) -> Array:
     """Velocity, acceleration and jerk that a design may use, shape (3, 9); infinite without axis.
 
-    Without a jerk limit full acceleration takes one interval at least.
+    An axis without a jerk limit stands any jerk; from one interval to the next its acceleration can
+    then go from one limit to the other.
     """
     out = np.full((3, len(AXES)), np.inf)
     for axis in machine.axes:
         limit = axis.limit
-        jerk = limit.jerk if np.isfinite(limit.jerk) else limit.acceleration / machine.interval
+        jerk = (
+            limit.jerk if np.isfinite(limit.jerk) else 2.0 * limit.acceleration / machine.interval
+        )
         out[:, AXES.index(axis.name)] = limit.velocity, limit.acceleration, jerk
     return out
 

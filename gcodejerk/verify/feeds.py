@@ -129,7 +129,7 @@ class _Judge:
 
     def mean(self) -> tuple[Kind, Rows, str]:
         """F is not below the mean speed of its block."""
-        sag = self._largest(2) * self.h**2 / 12.0
+        sag = self._largest(2) * self.h**2 / 8.0
         least = self.mean_ - sag - self.error_mean - self.rounding
         bad = ~self.first & (least > self.F)
         return Kind.FEED, bad, "F is below the mean speed of its block"
@@ -248,7 +248,7 @@ class _Judge:
             after = np.roll(slope, -1)
             inner = ~(self.first | self.last)
             v = np.abs(slope * h_after + after * self.h) / (self.h + h_after)
-            slack = self.limits_[2, a] * self.h * h_after / 6.0
+            slack = self.limits_[2, a] * self.h * h_after / 4.0
             slack = slack + 2.0 * self.step[self.owner, a] / np.minimum(self.h, h_after)
             v, slack = np.where(inner & used, v, 0.0), np.where(inner & used, slack, 0.0)
             low += np.maximum(v - slack, 0.0) ** 2

@@ -30,6 +30,8 @@ TINY = 1e-9
 """Rounding of float64 in positions. [mm] or [deg]"""
 FINEST = 1e-3
 """An axis that moves a few steps may be written this much finer. [steps]"""
+SUM_SCALE = 1e9
+"""Increments are summed in units of their ninth decimal."""
 _NUMBERS_ONLY = bytes(c if c in b"0123456789.+-" else 32 for c in range(256))
 LINEAR = np.array([axis not in "ABC" for axis in AXES])
 
@@ -135,12 +137,11 @@ class Reader:
         scale = np.where(LINEAR, unit[:, np.newaxis], 1.0)
         scale[:, 0] *= np.where(rapids.diameter[index], 0.5, 1.0)
         owner = np.repeat(np.arange(len(index)), counts + 1)
-        position = raw[:, :-1] * scale[owner]
         incremental = rapids.incremental[index]
         position = np.where(
             incremental[owner][:, np.newaxis],
-            _sum_up(position, begin, end) + start[owner],
-            _carry_on(position, begin, start),
+            _sum_up(raw[:, :-1], begin, end) * scale[owner] + start[owner],
+            _carry_on(raw[:, :-1] * scale[owner], begin, start),
         )
         return Paths(
             rapid=index,
@@ -181,10 +182,13 @@ def _fast_points(streams: Sequence[Stream]) -> list[Array]:
 
 
 def _sum_up(increments: Array, begin: Index, end: Index) -> Array:
-    """Distance from each stream's start, row by row."""
-    total = np.cumsum(np.nan_to_num(increments), axis=0)
-    at_start: Array = np.repeat(total[begin], end - begin, axis=0)
-    return total - at_start
+    """Distance from each stream's start, row by row.
+
+    Summed as whole numbers of the ninth decimal: rounding must not grow with the number of points.
+    """
+    whole = np.rint(np.nan_to_num(increments) * SUM_SCALE).astype(np.int64)
+    total = np.cumsum(whole, axis=0)
+    return (total - np.repeat(total[begin], end - begin, axis=0)) / SUM_SCALE
 
 
 def _carry_on(position: Array, begin: Index, start: Array) -> Array:
