@@ -238,10 +238,14 @@ class _Maker:
         velocity: dict[int, Array] = {}
         response = self._response(laws, self.grid.counts)
         for axis in self.axes:
-            exact[axis] = self.spelling.start[:, axis, np.newaxis] + self._gather(unit, axis)
+            # Where an axis stands still its position may be unknown, and nothing is written of it.
+            moving = self.plans.displacement[self.moves, axis] != 0.0
+            start = np.where(moving, self.spelling.start[:, axis], 0.0)
+            exact[axis] = start[:, np.newaxis] + self._gather(unit, axis)
             velocity[axis] = self._gather(speed, axis)
             active = np.abs(self.modes.participation[:, axis]) > 0.0
-            step, origin = self.spelling.step[:, axis], self.spelling.origin[:, axis]
+            step = self.spelling.step[:, axis]
+            origin = np.where(moving, self.spelling.origin[:, axis], 0.0)
             whole[axis] = round_positions(
                 exact[axis], self.grid, step, origin,
                 self.modes.poles[active], self.modes.participation[active, axis],
@@ -251,7 +255,6 @@ class _Maker:
             error = np.where(
                 begun & (self.grid.knots < self.grid.counts[:, np.newaxis]), error, 0.0
             )
-            moving = self.plans.displacement[self.moves, axis] != 0.0
             noise = knots_response(error * moving[:, np.newaxis], self.grid, self.modes.poles)
             response = response + noise * self.modes.participation[:, axis]
         return Batch(

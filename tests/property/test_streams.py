@@ -1,0 +1,113 @@
+"""Laws of planned streams, over drawn machines and moves."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, assume, given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from gcodejerk.errors import PlanError
+from gcodejerk.machine import AXES
+from gcodejerk.move import plan_move
+from gcodejerk.testing import assert_stream_valid, machines, moves
+
+# A machine is a large thing to shrink: minutes for a smaller example that says no more.
+PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
+slow = settings(
+    max_examples=60, deadline=None, phases=PHASES, suppress_health_check=list(HealthCheck)
+)
+
+
+@st.composite
+def cases(draw, **kwargs):
+    machine = draw(machines(**kwargs))
+    return machine, draw(moves(machine))
+
+
+def plan_or_skip(case):
+    machine, move = case
+    try:
+        return plan_move(move, machine)
+    except PlanError as error:
+        assume("not planned" not in str(error) and "segments of at least" not in str(error))
+        raise
+
+
+def simulate(t, q, omega, zeta):
+    """Envelope after arrival of q'' + 2 z w q' + w^2 q = -a, stepped through the samples.
+
+    Shares no code with the package: the polyline's velocity steps kick a mode that is turned by
+    its transition matrix from one sample to the next.
+    """
+    turn = expm(np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]]) * (t[1] - t[0]))
+    state = np.zeros(2)
+    velocity = np.diff(q) / (t[1] - t[0])
+    for step in np.diff(velocity, prepend=0.0, append=0.0):
+        state = turn @ state - np.array([0.0, step])
+    x, v = state
+    return np.hypot(x, (v + zeta * omega * x) / (omega * np.sqrt(1.0 - zeta**2)))
+
+
+@given(cases())
+@slow
+def test_every_stream_ends_exactly_and_keeps_line_direction_and_limits(case):
+    plan = plan_or_skip(case)
+    assert_stream_valid(plan, plan.machine)
+    for axis, q in plan.positions.items():
+        assert q[0] == 0.0
+        assert q[-1] == pytest.approx(plan.displacement.get(axis, 0.0), abs=1e-12)
+
+
+@given(cases())
+@slow
+def test_no_stream_takes_longer_than_the_conventional_time_but_where_limits_leave_no_room(case):
+    plan = plan_or_skip(case)
+    machine = plan.machine
+    whole = np.ceil(plan.conventional_time / machine.interval - 1e-6) * machine.interval
+    assert (
+        plan.time <= plan.conventional_time * (1 + machine.design.max_extension) + machine.interval
+    )
+    jerk_limited = all(np.isfinite(axis.rapid.jerk) for axis in machine.axes)
+    if jerk_limited:
+        assert plan.time == pytest.approx(whole, abs=1e-9)
+
+
+@given(cases())
+@settings(slow, max_examples=25)
+def test_residual_of_a_stream_is_that_of_a_simulated_mode(case):
+    plan = plan_or_skip(case)
+    modes = plan.plans.modes
+    for m, mode in enumerate(modes.modes):
+        driven = sum(
+            q * modes.participation[m, AXES.index(axis)] for axis, q in plan.positions.items()
+        )
+        expected = simulate(plan.t, driven, 2 * np.pi * mode.frequency, mode.damping)
+        size = np.abs(driven).max() + 1e-9
+        assert plan.residual[0, m] == pytest.approx(expected, rel=1e-6, abs=1e-9 * size)
+
+
+@given(cases(jerk_limited=True))
+@slow
+def test_no_stream_leaves_more_than_the_conventional_one(case):
+    plan = plan_or_skip(case)
+    worst = plan.residual.max(initial=0.0)
+    assert worst <= plan.conventional_residual.max(initial=0.0) * (1 + 1e-9)
+
+
+@given(cases(jerk_limited=True, positioning="linear"))
+@slow
+def test_segments_add_up_to_the_time_and_to_the_length(case):
+    plan = plan_or_skip(case)
+    position = velocity = acceleration = 0.0
+    total = 0.0
+    for d, j in plan.laws.segments(0):
+        position += velocity * d + acceleration * d**2 / 2 + j * d**3 / 6
+        velocity += acceleration * d + j * d**2 / 2
+        acceleration += j * d
+        total += d
+        if not plan.kept[0]:
+            assert d >= plan.machine.interval * (1 - 1e-9)
+    assert position == pytest.approx(1.0, rel=1e-9)
+    assert abs(velocity) * total < 1e-9
+    assert abs(acceleration) * total**2 < 1e-8
+    assert total <= plan.time + 1e-9
