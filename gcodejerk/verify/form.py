@@ -28,7 +28,8 @@ COMMENT_LENGTH = 69
 LONGEST_STREAM = 1 << 26
 """Bytes of one stream; more is not read."""
 
-_NUMBER = rb"[-+]?+(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)"
+# No axis needs more digits; numbers without bounds would be a way to stall the reading.
+_NUMBER = rb"[-+]?+(?:[0-9]{1,9}+(?:\.[0-9]{0,20}+)?+|\.[0-9]{1,20}+)(?![0-9.])"
 _WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
 _WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
 _IS_POINT = re.compile(rb"[ \t]*G0?1(?![0-9.])")

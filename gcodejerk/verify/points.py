@@ -140,7 +140,7 @@ class Reader:
         incremental = rapids.incremental[index]
         position = np.where(
             incremental[owner][:, np.newaxis],
-            _sum_up(raw[:, :-1], begin, end) * scale[owner] + start[owner],
+            sum_up(raw[:, :-1], begin, end) * scale[owner] + start[owner],
             _carry_on(raw[:, :-1] * scale[owner], begin, start),
         )
         return Paths(
@@ -181,7 +181,7 @@ def _fast_points(streams: Sequence[Stream]) -> list[Array]:
     return out
 
 
-def _sum_up(increments: Array, begin: Index, end: Index) -> Array:
+def sum_up(increments: Array, begin: Index, end: Index) -> Array:
     """Distance from each stream's start, row by row.
 
     Summed as whole numbers of the ninth decimal: rounding must not grow with the number of points.

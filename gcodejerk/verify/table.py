@@ -21,7 +21,7 @@ from gcodejerk.verify.points import STANDSTILL, Array, Paths
 PIECE = 1 << 20
 EXACT = 1e-11
 """A position in mm written in full. [mm]"""
-_NUMBER = rb"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
+_NUMBER = rb"-?(?:[0-9]{1,9}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})"
 
 
 class TableReader:
@@ -32,7 +32,9 @@ class TableReader:
         self.columns = [AXES.index(axis) for axis in machine.axis_names]
         self.known = sum(1 << column for column in self.columns)
         value = rb",(?:" + _NUMBER + rb"|nan)"
-        self.row = re.compile(rb"(?:[0-9]+," + _NUMBER + value * len(self.columns) + rb"\r?\n)*+")
+        self.row = re.compile(
+            rb"(?:[0-9]{1,12}," + _NUMBER + value * len(self.columns) + rb"\r?\n)*+"
+        )
         self.line = 1
         """Of the next row, in the table."""
         self.at = 0

@@ -9,11 +9,12 @@ from __future__ import annotations
 import io
 import itertools
 
+import numpy as np
 import pytest
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.verify import Kind, require, verify, verify_csv
+from gcodejerk.verify import Kind, points, require, verify, verify_csv
 
 TEXT = """
 interval: 0.001
@@ -216,6 +217,7 @@ DAMAGE = {
     "path tolerance lost": ("G0 F600.0\n", "G0 G64 F600\n", Kind.PATH),
     "end shifted": ("G1 Z1. F", "G1 Z1.0001 F", Kind.END),
     "end beyond the last decimal": ("G1 Z1. F", "G1 Z1.0000000000000000001 F", Kind.END),
+    "number of many digits": ("G1 Z1. F", f"G1 Z{'9' * 400} F", Kind.FORM),
     "increment shifted": (_nth(BACK, 5), _move(_nth(BACK, 5), 1), Kind.END),
     "point backwards": (*_with(5, lambda line: _move(line, -800)), Kind.BACKWARDS),
     "point beyond the end": (*_with(18, lambda line: _move(line, 100)), Kind.BACKWARDS),
@@ -386,6 +388,14 @@ def test_a_damaged_table_is_refused(before, after, kind):
     count = -1 if before == "3," else 1
     found = judge_table(table().replace(before, after, count))
     assert kind in {v.kind for v in found.violations}, found.violations
+
+
+def test_increments_add_up_without_rounding():
+    count = 100_000
+    increments = np.full((count + 1, 1), 0.1)
+    increments[0] = np.nan
+    total = points.sum_up(increments, np.array([0]), np.array([count + 1]))
+    assert (total[:, 0] == np.arange(count + 1) / 10).all()
 
 
 def test_require_names_place_problem_and_remedy():
