@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -297,7 +298,10 @@ def _machine(name: str, program: str | None) -> Machine:
     beside = None if program is None or program == "-" else Path(program).parent / name
     if beside is not None and not Path(name).exists() and beside.is_file():
         return Machine.load(beside)
-    return Machine.load(find_machine(name))
+    found = find_machine(name)
+    described = Machine.load(found)
+    # A shipped machine is called by its file's name, wherever it is installed.
+    return described if str(found) == name else replace(described, source=found.name)
 
 
 def _displacement(moves: list[str]) -> dict[str, float]:

@@ -1,0 +1,85 @@
+"""The JSON report: its schema, its numbers, and strict JSON."""
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from gcodejerk.machine import Machine, find_machine
+from gcodejerk.move import plan_move
+from gcodejerk.process import process
+from gcodejerk.reasons import Reason
+from gcodejerk.report.records import dump, move_record, process_record, stream_csv
+
+SCHEMA = json.loads(files("gcodejerk.report").joinpath("report.schema.json").read_text())
+PLATE = Path(__file__).parents[2] / "samples" / "plate.ngc"
+
+
+def report_of(data, machine):
+    result = process(data, machine, name="part.nc")
+    blocks = [
+        data[a:b].decode()
+        for a, b in zip(result.program.rapids.begin, result.program.rapids.end, strict=True)
+    ]
+    return json.loads(dump(process_record(result, machine, "part.jerk.nc", blocks)))
+
+
+@pytest.mark.parametrize("name", ["vmc", "router", "drill", "paper"])
+def test_report_of_a_program_keeps_the_schema(name):
+    record = report_of(PLATE.read_bytes(), Machine.load(find_machine(name)))
+    jsonschema.validate(record, SCHEMA)
+    assert len(record["rapids"]) == record["summary"]["rapids"]
+    assert record["summary"]["planned"] + record["summary"]["left"] == record["summary"]["rapids"]
+    assert {r["reason"] for r in record["rapids"] if r["reason"]} <= {str(r) for r in Reason}
+
+
+def test_report_of_a_program_without_rapids_keeps_the_schema():
+    record = report_of(b"G21 G90\nG1 X1 F100\nM2\n", Machine.load(find_machine("vmc")))
+    jsonschema.validate(record, SCHEMA)
+    assert record["summary"]["worst_residual"] is None
+
+
+def test_schema_refuses_a_planned_rapid_without_a_time():
+    record = report_of(PLATE.read_bytes(), Machine.load(find_machine("vmc")))
+    planned = next(r for r in record["rapids"] if r["status"] == "planned")
+    planned["time"] = None
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(record, SCHEMA)
+
+
+def test_report_of_the_papers_case_holds_the_papers_numbers():
+    plan = plan_move({"Z": 1.0}, Machine.load(find_machine("paper")), time=0.040, T1=0.001)
+    record = move_record(plan)
+    jsonschema.validate(json.loads(dump(record)), SCHEMA)
+    rapid = record["rapids"][0]
+    assert [s["duration"] for s in rapid["segments"]] == pytest.approx([0.001, 0.019, 0.019, 0.001])
+    assert rapid["segments"][0]["jerk"] == pytest.approx(3846153.8, rel=1e-7)
+    assert rapid["peak"]["Z"]["velocity"] == pytest.approx(38.4615, rel=1e-5)
+    (mode,) = rapid["residual"]
+    assert mode["profile_acceleration"] == pytest.approx(5696.8, abs=0.05)
+    assert mode["conventional_profile_acceleration"] == pytest.approx(13209.3, abs=0.05)
+    assert mode["acceleration"] == pytest.approx(5680, abs=1.0)
+    assert mode["conventional_acceleration"] == pytest.approx(13170, abs=1.0)
+
+
+def test_stream_of_a_plan_has_the_contracts_columns_and_exact_ends():
+    plan = plan_move({"Z": 1.0, "X": -2.5}, Machine.load(find_machine("vmc")))
+    rows = stream_csv(plan).decode().splitlines()
+    assert rows[0] == "t,X,Y,Z"
+    assert rows[1] == "0,0,0,0"
+    assert rows[-1] == f"{plan.time:.10g},-2.5,0,1"
+    assert len(rows) == 2 + round(plan.time / 0.001)
+
+
+def test_independent_positioning_reports_segments_for_each_axis():
+    text = (
+        find_machine("vmc").read_text().replace("positioning: linear", "positioning: independent")
+    )
+    plan = plan_move({"X": 30.0, "Z": 2.0}, Machine.loads(text))
+    record = move_record(plan)
+    jsonschema.validate(json.loads(dump(record)), SCHEMA)
+    segments = record["rapids"][0]["segments"]
+    assert set(segments) == {"X", "Z"}
+    assert sum(s["duration"] for s in segments["Z"]) < sum(s["duration"] for s in segments["X"])
