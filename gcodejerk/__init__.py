@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from gcodejerk.machine import Machine, find_machine
     from gcodejerk.motion import residual_acceleration
     from gcodejerk.move import Plan, plan_move
-    from gcodejerk.process import Result, process
+    from gcodejerk.pipeline import Result, process
     from gcodejerk.verify import Verification, verify
 
 __version__ = "0.1.0"
@@ -40,7 +40,7 @@ _HOMES = {
     "gcodejerk.machine": ("Machine", "find_machine"),
     "gcodejerk.motion": ("residual_acceleration",),
     "gcodejerk.move": ("Plan", "plan_move"),
-    "gcodejerk.process": ("Result", "process"),
+    "gcodejerk.pipeline": ("Result", "process"),
     "gcodejerk.verify": ("Verification", "verify"),
 }  # fmt: skip
 

@@ -16,7 +16,7 @@ from typing import BinaryIO
 from gcodejerk.errors import EmitError, GcodejerkError
 from gcodejerk.files import STANDARD, new_file, open_input, same_file
 from gcodejerk.machine import Machine
-from gcodejerk.process import Progress, Result, Settings, process_file
+from gcodejerk.pipeline import Progress, Result, Settings, process_file
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record
 from gcodejerk.report.tables import summary_line

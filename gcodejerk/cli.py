@@ -22,7 +22,7 @@ from gcodejerk.errors import GcodejerkError
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
-    from gcodejerk.process import Settings
+    from gcodejerk.pipeline import Settings
 
 app = typer.Typer(
     help="Rapids that do not shake the machine: re-times the G0 moves of an NC program.",
@@ -116,7 +116,7 @@ def process(
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
     from gcodejerk.batch import Job, run_jobs
-    from gcodejerk.process import Settings
+    from gcodejerk.pipeline import Settings
 
     if sum(map(bool, (output, output_dir, in_place))) > 1:
         raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
@@ -181,7 +181,7 @@ def inspect(
     """Show all rapids of a program: planned, or left alone and why."""
     from gcodejerk.batch import record_of
     from gcodejerk.files import open_input
-    from gcodejerk.process import Settings, process_file
+    from gcodejerk.pipeline import Settings, process_file
     from gcodejerk.report.tables import rapids_table, summary_line
 
     described = _machine(machine, file)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import BinaryIO
 
-from gcodejerk.process import TERMINATOR_LENGTH, Result
+from gcodejerk.pipeline import TERMINATOR_LENGTH, Result
 
 
 def difference(source: BinaryIO, target: BinaryIO, result: Result) -> bytes:

@@ -20,7 +20,7 @@ from gcodejerk.motion.laws import Array
 from gcodejerk.move import Plan
 from gcodejerk.nc import Rapids
 from gcodejerk.plans import Plans
-from gcodejerk.process import Result
+from gcodejerk.pipeline import Result
 from gcodejerk.reasons import REASONS
 
 Record = dict[str, Any]

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.process import process
+from gcodejerk.pipeline import process
 from gcodejerk.testing.machines import machines
 from gcodejerk.testing.programs import programs
 from gcodejerk.verify import verify, verify_csv

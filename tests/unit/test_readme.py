@@ -57,7 +57,7 @@ def test_readme_explains_every_reason_and_no_other():
 
 def test_stream_in_the_readme_is_the_samples(samples):
     from gcodejerk.machine import Machine, find_machine
-    from gcodejerk.process import process
+    from gcodejerk.pipeline import process
 
     data = (samples / "plate.ngc").read_bytes()
     output = process(data, Machine.load(find_machine("vmc"))).output.decode().splitlines()

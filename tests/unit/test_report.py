@@ -9,7 +9,7 @@ import pytest
 
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.move import plan_move
-from gcodejerk.process import process
+from gcodejerk.pipeline import process
 from gcodejerk.reasons import Reason
 from gcodejerk.report.records import dump, move_record, process_record, stream_csv
 
