@@ -1,0 +1,128 @@
+"""Samples of laws: exact where theory gives them, aligned at their end."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import PPoly
+
+from gcodejerk.motion import Grid, Laws, sample_laws
+
+INTERVAL = 0.0005
+SHAPES = {
+    "four segments": (7, 0, 23, 0),
+    "steep": (1, 0, 37, 0),
+    "seven segments": (6, 11, 19, 41),
+    "no cruise": (9, 14, 5, 0),
+    "no constant acceleration": (9, 0, 5, 33),
+    "trapezoid": (0, 35, 0, 12),
+    "triangle": (0, 35, 0, 0),
+    "cubic": (0, 0, 35, 0),
+    "off the grid": (6.37, 11.61, 19.02, 40.0),
+}
+
+
+def law_of(name):
+    """One law of the table, durations in intervals."""
+    return Laws(*(np.array([d * INTERVAL]) for d in SHAPES[name]))
+
+
+def integrated(name):
+    """Position and velocity of the same law from its acceleration, scaled to the length 1."""
+    T1, Ta, T2, Tv = (d * INTERVAL for d in SHAPES[name])
+    half = [(T1, 0.0, 1.0), (Ta, 1.0, 1.0), (T2, 1.0, 0.0)]
+    pieces = [*half, (Tv, 0.0, 0.0), *((d, -b, -a) for d, a, b in reversed(half))]
+    pieces = [p for p in pieces if p[0] > 0.0]
+    ends = np.concatenate([[0.0], np.cumsum([p[0] for p in pieces])])
+    a = PPoly(np.array([[(high - low) / d, low] for d, low, high in pieces]).T, ends)
+    q = a.antiderivative(2)
+    length = float(q(ends[-1]))
+    return lambda t: q(t) / length, lambda t: a.antiderivative()(t) / length
+
+
+def every(law):
+    """All whole intervals of a law."""
+    return np.arange(int(np.ceil(law.total[0] / INTERVAL - 1e-6)) + 1)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_samples_are_those_of_the_integrated_acceleration(name):
+    law = law_of(name)
+    moments = every(law)
+    position, velocity = sample_laws(law, moments[np.newaxis], INTERVAL)
+    q, v = integrated(name)
+    t = np.minimum(moments * INTERVAL, law.total[0])
+    np.testing.assert_allclose(position[0], q(t), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(velocity[0], v(t), rtol=1e-9, atol=1e-9 * velocity.max())
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_samples_are_antisymmetric_and_monotone_with_exact_ends(name):
+    law = law_of(name)
+    total = float(law.total[0])
+    count = round(total / INTERVAL)
+    position, velocity = sample_laws(law, every(law)[np.newaxis], INTERVAL)
+    assert position[0, 0] == 0.0
+    assert position[0, -1] == 1.0
+    assert velocity[0, 0] == 0.0
+    assert abs(velocity[0, -1]) < 1e-20
+    assert (np.diff(position[0]) > 0.0).all()
+    if count * INTERVAL == pytest.approx(total, rel=1e-12):
+        np.testing.assert_allclose(position[0] + position[0, ::-1], 1.0, atol=1e-14)
+        np.testing.assert_allclose(velocity[0], velocity[0, ::-1], rtol=1e-9, atol=1e-9)
+
+
+def test_a_law_rests_before_it_begins_and_after_it_has_ended():
+    law = law_of("four segments")
+    position, velocity = sample_laws(law, np.array([[-7, 0, 60, 61, 500]]), INTERVAL)
+    assert position.tolist() == [[0.0, 0.0, 1.0, 1.0, 1.0]]
+    assert velocity.tolist() == [[0.0] * 5]
+
+
+def test_the_paper_s_profile_has_the_paper_s_first_sample():
+    # J1 T1^3 / 6 with 3.846e6 mm/s^3 and 1 ms.
+    law = Laws(*(np.array([d]) for d in (0.001, 0.0, 0.019, 0.0)))
+    position, _ = sample_laws(law, np.array([[1]]), 0.001)
+    assert float(position[0, 0]) == pytest.approx(3846153.846 * 1e-9 / 6, rel=1e-9)
+
+
+def test_laws_of_different_kinds_are_sampled_together_as_alone():
+    laws = Laws(*(np.array(c) * INTERVAL for c in zip(*SHAPES.values(), strict=True)))
+    moments = np.tile(np.arange(0, 200, 3), (len(SHAPES), 1))
+    position, velocity = sample_laws(laws, moments, INTERVAL)
+    for row, name in enumerate(SHAPES):
+        alone = sample_laws(law_of(name), moments[:1], INTERVAL)
+        np.testing.assert_array_equal(position[row], alone[0][0])
+        np.testing.assert_array_equal(velocity[row], alone[1][0])
+
+
+@pytest.mark.parametrize("stride", [1, 2, 3, 4, 7, 50])
+def test_a_grid_reaches_from_start_to_end_in_blocks_of_the_stride(stride):
+    counts = np.arange(1, 90)
+    grid = Grid.every(counts, stride, INTERVAL)
+    for count, knots, blocks in zip(counts, grid.knots, grid.blocks, strict=True):
+        own = knots[len(knots) - 1 - blocks :]
+        assert own[0] == 0
+        assert own[-1] == count
+        assert not knots[: len(knots) - blocks].any()
+        lengths = np.diff(own)
+        assert len(lengths) == max(count // stride, 1)
+        usual, longer = min(stride, count), np.nonzero(lengths != min(stride, count))[0]
+        assert len(longer) <= 1
+        assert (np.delete(lengths, longer) == usual).all()
+        if count >= stride:
+            rest = count % stride
+            assert lengths[longer].tolist() == ([usual + rest] if rest else [])
+            # The longer block is the one around the middle.
+            for k in longer:
+                assert own[k] <= (count + stride) / 2
+                assert own[k + 1] >= (count - stride) / 2
+
+
+def test_a_grid_is_aligned_at_the_end():
+    grid = Grid.every(np.array([4, 7, 1]), 2, 0.001)
+    assert grid.knots.tolist() == [[0, 0, 2, 4], [0, 2, 5, 7], [0, 0, 0, 1]]
+    assert grid.blocks.tolist() == [2, 3, 1]
+
+
+def test_a_grid_of_no_moves_has_no_rows():
+    grid = Grid.every(np.zeros(0, dtype=np.int64), 2, 0.001)
+    assert len(grid.knots) == len(grid.blocks) == 0
