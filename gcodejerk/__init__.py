@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from gcodejerk.motion import residual_acceleration
     from gcodejerk.move import Plan, plan_move
     from gcodejerk.pipeline import Result, process
-    from gcodejerk.verify import Verification, verify
+    from gcodejerk.verification import Verification, verify
 
 __version__ = "0.1.0"
 
@@ -41,7 +41,7 @@ _HOMES = {
     "gcodejerk.motion": ("residual_acceleration",),
     "gcodejerk.move": ("Plan", "plan_move"),
     "gcodejerk.pipeline": ("Result", "process"),
-    "gcodejerk.verify": ("Verification", "verify"),
+    "gcodejerk.verification": ("Verification", "verify"),
 }  # fmt: skip
 
 __all__ = [

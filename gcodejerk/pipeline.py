@@ -28,7 +28,7 @@ from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
 from gcodejerk.start import program_start
 from gcodejerk.stream import Batch, make_streams
-from gcodejerk.verify import Verification, require, verify_csv, verify_files
+from gcodejerk.verification import Verification, require, verify_csv, verify_files
 
 TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
 """Bytes of a line end, by `Rapids.terminator`."""
@@ -228,7 +228,14 @@ def process_file(
         source.seek(0)
         target.seek(0)
         judge = verify_files if emitter.in_place else verify_csv
-        verification = judge(source, target, machine, start=program_start(machine))
+        verification = judge(
+            source,
+            target,
+            machine,
+            names=(name, f"the output for {name}"),
+            dialect=settings.dialect,
+            start=program_start(machine),
+        )
         require(verification)
         report("verifying", 1, 1)
     notes = [_finding(finding.line, finding.message) for finding in program.findings]

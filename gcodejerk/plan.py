@@ -156,6 +156,14 @@ def _is_rotary(machine: Machine, axis: str) -> bool:
     return axis in "ABC"
 
 
+def _squeezed(fastest: Laws, total: float, interval: float) -> Laws:
+    """One law squeezed into a shorter time, its segments no shorter than the interval."""
+    stretch = total / fastest.total
+    ramp = np.clip(fastest.T1 * stretch, interval, 0.25 * total)
+    Ta = np.clip(fastest.Ta * stretch, 0.0, 0.5 * total - 2.0 * ramp)
+    return Laws(ramp, Ta, ramp, total - 4.0 * ramp - 2.0 * Ta)
+
+
 def _rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -> None:
     """Give a reason to the moves that have none yet."""
     reason[where & (reason == CERTAIN)] = REASONS.index(why)
@@ -386,7 +394,7 @@ class _Planner:
                 f"give a T1 from {self.interval:g} to {0.5 * total - self.interval:g} s",
             )
         units = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
-        for quantity in ("jerk", "acceleration", "velocity"):
+        for quantity in ("velocity", "acceleration", "jerk"):
             for axis in self.machine.axes:
                 peak = float(
                     getattr(law, quantity)[0] * abs(self.share[row, AXES.index(axis.name)])
@@ -406,11 +414,10 @@ class _Planner:
         V, A, J = (limit[row : row + 1] for limit in self.limits)
         fastest = conventional_laws(V, A, J, self.interval)
         least = float(np.ceil(fastest.total[0] / self.interval - GRID_TOLERANCE) * self.interval)
-        stretch = total / float(fastest.total[0])
-        if stretch < 1.0:
-            law = Laws(*(column * stretch for column in fastest.columns()))
-            error = self._limit_error(law, 0, "") if float(law.T1[0]) >= self.interval else None
-            if error is not None:
+        if total >= 4.0 * self.interval:
+            law = _squeezed(fastest, total, self.interval)
+            if bool((law.velocity > V) | (law.acceleration > A) | (law.jerk > J)):
+                error = self._limit_error(law, row, "")
                 return PlanError(
                     error.problem, f"allow at least {least:.6g} s (--time {least:.6g})"
                 )

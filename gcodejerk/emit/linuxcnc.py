@@ -46,6 +46,7 @@ STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)
 FEED_GROUPS = ("XYZ", "UVW", "ABC")
 """F is the speed along the first of these groups that moves (LinuxCNC, G94)."""
 LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
+"""By `Rapids.terminator`."""
 
 
 class LinuxcncController:
@@ -98,9 +99,11 @@ class LinuxcncController:
     ) -> list[bytes]:
         """Text of each move."""
         moves = batch.moves
-        line_ends = [LINE_ENDS[t] or newline for t in rapids.terminator[moves]]
+        last_ends = [LINE_ENDS[t] for t in rapids.terminator[moves]]
+        # A lone CR ends no line for LinuxCNC; it can stand at the end of the file.
+        line_ends = [newline if end in (b"", b"\r") else end for end in last_ends]
         parsed = [parse_block(block) for block in blocks]
-        feed = _feed(_path_speed(batch, rapids))
+        feed = _feed(_path_speed(batch, rapids), batch, rapids)
         points = self._points(batch, rapids, line_ends, feed)
         out = []
         for row, move in enumerate(moves):
@@ -114,10 +117,7 @@ class LinuxcncController:
                 last,
                 *frame.tail(),
             ]
-            text = line_ends[row].join(line for line in lines if line) + line_ends[row]
-            if rapids.terminator[move] == 0:
-                text = text[: -len(line_ends[row])]
-            out.append(text)
+            out.append(line_ends[row].join(line for line in lines if line) + last_ends[row])
         return out
 
     def _points(
@@ -306,9 +306,17 @@ def _path_speed(batch: Batch, rapids: Rapids) -> NDArray[np.float64]:
     return out
 
 
-def _feed(speed: NDArray[np.float64]) -> NDArray[np.int64]:
+def _feed(speed: NDArray[np.float64], batch: Batch, rapids: Rapids) -> NDArray[np.int64]:
     """F of the block that ends at each knot, in whole units of its last decimal."""
     ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
+    # A stream of one block is at rest at both ends: only its mean speed is left.
+    single = batch.grid.blocks == 1
+    if single.any():
+        moves = batch.moves[single]
+        linear = (batch.plans.displacement[moves][:, :3] != 0.0).any(axis=1)
+        unit = np.where(rapids.inch[moves] & linear, MM_PER_INCH, 1.0)
+        time = batch.grid.counts[single] * batch.grid.interval
+        ends[single, -1] = batch.plans.length[moves] / time / unit
     # F0 is an error in LinuxCNC; a block that hardly moves still has its smallest F.
     feed: NDArray[np.int64] = np.maximum(
         np.rint(per_minute(1.0) * 10.0**FEED_DECIMALS * ends), 1.0

@@ -19,8 +19,8 @@ from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.move import Plan
 from gcodejerk.nc import Rapids
-from gcodejerk.plans import Plans
 from gcodejerk.pipeline import Result
+from gcodejerk.plans import Plans
 from gcodejerk.reasons import REASONS
 
 Record = dict[str, Any]

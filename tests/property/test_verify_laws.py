@@ -19,7 +19,7 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.pipeline import process
 from gcodejerk.testing.machines import machines
 from gcodejerk.testing.programs import programs
-from gcodejerk.verify import verify, verify_csv
+from gcodejerk.verification import verify, verify_csv
 
 CALM = settings(
     deadline=None,

@@ -14,7 +14,7 @@ import pytest
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.verify import Kind, points, require, verify, verify_csv
+from gcodejerk.verification import Kind, points, require, verify, verify_csv
 
 TEXT = """
 interval: 0.001

@@ -24,13 +24,13 @@ from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, read_program
 from gcodejerk.start import program_start
-from gcodejerk.verify.dynamics import check_dynamics, stride_of
-from gcodejerk.verify.findings import Findings, Kind, Verification, Violation, require
-from gcodejerk.verify.form import Stream
-from gcodejerk.verify.points import Paths, Reader, check_line, check_rapids
-from gcodejerk.verify.source import Window
-from gcodejerk.verify.table import TableReader
-from gcodejerk.verify.walk import Walk
+from gcodejerk.verification.dynamics import check_dynamics, stride_of
+from gcodejerk.verification.findings import Findings, Kind, Verification, Violation, require
+from gcodejerk.verification.form import Stream
+from gcodejerk.verification.points import Paths, Reader, check_line, check_rapids
+from gcodejerk.verification.source import Window
+from gcodejerk.verification.table import TableReader
+from gcodejerk.verification.walk import Walk
 
 __all__ = [
     "Kind",

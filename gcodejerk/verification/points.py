@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES, Rapids, parse_block
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from gcodejerk.verify.findings import Findings, Kind
-from gcodejerk.verify.form import Stream
+from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.form import Stream
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -17,8 +17,8 @@ from decimal import Context, Decimal
 from functools import lru_cache
 
 from gcodejerk.nc import AXES, Block, Rapids, parse_block
-from gcodejerk.verify.findings import Findings, Kind
-from gcodejerk.verify.source import PIECE, Window
+from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.source import PIECE, Window
 
 LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
 """By `Rapids.terminator`."""

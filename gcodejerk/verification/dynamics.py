@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES
-from gcodejerk.verify.conventional import rapid_time
-from gcodejerk.verify.feeds import judge_feeds, rapid_limits
-from gcodejerk.verify.findings import Findings, Kind
-from gcodejerk.verify.points import Array, Index, Paths, resolutions
+from gcodejerk.verification.conventional import rapid_time
+from gcodejerk.verification.feeds import judge_feeds, rapid_limits
+from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.points import Array, Index, Paths, resolutions
 
 BLOCK_TIME = 0.002
 """Of a G-code block. [s]"""

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES, CERTAIN, Rapids
-from gcodejerk.verify.findings import Findings, Kind
-from gcodejerk.verify.points import STANDSTILL, Array, Paths
+from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.points import STANDSTILL, Array, Paths
 
 PIECE = 1 << 20
 EXACT = 1e-11

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from gcodejerk.nc import CERTAIN, REASONS, Program
-from gcodejerk.verify.findings import Findings, Kind
-from gcodejerk.verify.form import LINE_ENDS, Stream, StreamReader
-from gcodejerk.verify.source import Window, skip_common
+from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.form import LINE_ENDS, Stream, StreamReader
+from gcodejerk.verification.source import Window, skip_common
 
 _STAMP = b"(gcodejerk stamp"
 _TRACES = (b"(gcodejerk: ", b"G1 ", b"G4 P0")

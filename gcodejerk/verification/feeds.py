@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES
 from gcodejerk.units import SECONDS_PER_MINUTE
-from gcodejerk.verify.conventional import peak_velocity, rapid_speed, rapid_time
-from gcodejerk.verify.findings import Kind
-from gcodejerk.verify.points import Array, Paths, feed_speed, resolutions
+from gcodejerk.verification.conventional import peak_velocity, rapid_speed, rapid_time
+from gcodejerk.verification.findings import Kind
+from gcodejerk.verification.points import Array, Paths, feed_speed, resolutions
 
 FEED_STEP = 1e-3
 """Rounding of F that is allowed for. [units/min]"""

@@ -1,0 +1,161 @@
+"""LinuxCNC's own interpreter on real programs before and after: the same end points and feeds."""
+
+import shutil
+import subprocess
+from bisect import bisect_right
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from gcodejerk.errors import ProgramError
+from gcodejerk.machine import Machine, find_machine
+from gcodejerk.pipeline import process
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+SHARED = ROOT.parent / "shared"
+INSTALLED = (Path("/usr/share/linuxcnc"), Path("/usr/share/doc/linuxcnc"))
+STARTUP = "G17 G21 G40 G49 G54 G64 G80 G90 G94 G97"
+TOLERANCE = 1e-6
+MOTION = {"FEED", "TRAVERSE", "ARC", "RIGID_TAP", "PROBE"}
+
+pytestmark = [
+    pytest.mark.linuxcnc,
+    pytest.mark.skipif(
+        shutil.which("rs274") is None, reason="LinuxCNC's interpreter (linuxcnc-uspace) is absent"
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def machine():
+    """The shipped machining centre with three rotary axes, so that five-axis programs count."""
+    limits = "{velocity: 120, acceleration: 900, jerk: 9.0e+4}"
+    rotary = "".join(f"  {axis}:
+    rapid: {limits}
+" for axis in "ABC")
+    text = find_machine("vmc").read_text().replace("axes:\n", f"axes:\n{rotary}", 1)
+    return Machine.loads(text, "five-axis")
+
+
+def events(path):
+    """The interpreter's calls as (line, what, values), or None where it refuses the program."""
+    table = HERE / "linuxcnc" / "sim.tbl"
+    command = ["/usr/bin/python3", HERE / "oracle.py", path, "--tool-table", table]
+    run = subprocess.run(
+        [*command, "--startup", STARTUP],
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=120,
+        check=False,
+    )
+    if run.returncode != 0:
+        return None
+    split = (line.split() for line in run.stdout.splitlines())
+    return [(int(w[0]), w[1], [number(x) for x in w[2:]]) for w in split if len(w) > 1]
+
+
+def number(text):
+    """A value of the interpreter's calls; a plane and the like stays text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def with_feeds(calls):
+    """The calls without FEEDRATE; feed moves carry the rate that is in force instead."""
+    rate = None
+    out = []
+    for line, what, values in calls:
+        if what == "FEEDRATE":
+            rate = values[0]
+        else:
+            out.append((line, what, values, rate if what in {"FEED", "ARC"} else None))
+    return out
+
+
+def programs():
+    """Distinct programs: what FreeCAD posted for LinuxCNC, LinuxCNC's own, and our samples."""
+    files = sorted(ROOT.glob("samples/*.ngc")) + sorted(SHARED.glob("hosts/nc/*__linuxcnc*.ngc"))
+    for folder in INSTALLED:
+        files += sorted(folder.rglob("*.ngc"))
+    return list({path.read_bytes(): path for path in reversed(files)}.values())[::-1]
+
+
+def assert_same_motion(path, machine, folder):
+    """Process one program and compare; gives (rewritten, rapids), or None where it is refused."""
+    original = events(path)
+    if original is None:
+        return None
+    data = path.read_bytes()
+    try:
+        result = process(data, machine, controller="linuxcnc", name=path.name)
+    except ProgramError:
+        # Refused as a whole (lines that the interpreter cuts without a word): nothing changes.
+        return None
+    target = folder / f"{abs(hash(path))}.ngc"
+    target.write_bytes(result.output)
+    after = events(target)
+    assert after is not None, f"the interpreter refuses what became of {path}"
+    # Lines of the output that are streams, and the line of the block that each replaces.
+    starts = [0]
+    for text in result.output.splitlines(keepends=True):
+        starts.append(starts[-1] + len(text))
+    spans = [
+        (bisect_right(starts, begin), bisect_right(starts, end - 1), row)
+        for begin, end, row in result.edits.tolist()
+    ]
+    first = [span[0] for span in spans]
+    streams = {}
+    kept = []
+    for line, what, values, rate in with_feeds(after):
+        k = bisect_right(first, line) - 1
+        if k >= 0 and spans[k][2] >= 0 and line <= spans[k][1]:
+            streams.setdefault(spans[k][2], []).append((what, values))
+        else:
+            kept.append((what, values, rate))
+    rows = {int(result.program.rapids.line[row]): row for _, _, row in spans if row >= 0}
+    expected = []
+    for line, what, values, rate in with_feeds(original):
+        if line not in rows:
+            expected.append((what, values, rate))
+            continue
+        stream = streams[rows[line]]
+        if what == "TRAVERSE":
+            feeds = [v for w, v in stream if w == "FEED"]
+            assert feeds[-1] == pytest.approx(values, abs=TOLERANCE), (path, line)
+            # A bare G0 is a move of no length to the interpreter.
+            others = [v for w, v in stream if w in MOTION - {"FEED"}]
+            assert all(v in (others[0], feeds[-1]) for v in others), (path, line)
+        else:
+            assert (what, values) in stream, (path, line, what)
+    assert [w for w, _, _ in kept] == [w for w, _, _ in expected], path
+    for (what, got, rate), (_, wanted, usual) in zip(kept, expected, strict=True):
+        if what in MOTION:
+            assert got == pytest.approx(wanted, abs=TOLERANCE), (path, what)
+        else:
+            assert got == wanted, (path, what)
+        assert rate == pytest.approx(usual), (path, what, got)
+    return result.planned, len(result.plans)
+
+
+def test_interpreter_finds_the_same_end_points_before_and_after(machine, tmp_path):
+    paths = programs()
+    with ThreadPoolExecutor(2) as pool:
+        done = list(pool.map(lambda path: assert_same_motion(path, machine, tmp_path), paths))
+    accepted = {path.name: counts for path, counts in zip(paths, done, strict=True) if counts}
+    assert accepted["plate.ngc"] == (19, 26)
+    assert sum(rewritten for rewritten, _ in accepted.values()) > 500
+    if SHARED.exists():
+        assert accepted["all__linuxcnc.ngc"][0] > 150
+        assert accepted["adaptive__linuxcnc.ngc"][0] > 300
+
+
+@pytest.mark.skipif(
+    not SHARED.exists(), reason="the shared material with FreeCAD's programs is absent"
+)
+def test_freecads_programs_are_there():
+    assert len(list(SHARED.glob("hosts/nc/*__linuxcnc*.ngc"))) >= 7
