@@ -347,7 +347,7 @@ def _output(
     path = Path(file)
     if output_dir is not None:
         return str(Path(output_dir) / (path.stem + suffix if suffix else path.name))
-    return str(path.with_name(f"{path.stem}.jerk{suffix or path.suffix}"))
+    return str(path.parent / f"{path.stem}.jerk{suffix or path.suffix}")
 
 
 def _console() -> Any:

@@ -32,9 +32,7 @@ pytestmark = [
 def machine():
     """The shipped machining centre with three rotary axes, so that five-axis programs count."""
     limits = "{velocity: 120, acceleration: 900, jerk: 9.0e+4}"
-    rotary = "".join(f"  {axis}:
-    rapid: {limits}
-" for axis in "ABC")
+    rotary = "".join(f"  {axis}:\n    rapid: {limits}\n" for axis in "ABC")
     text = find_machine("vmc").read_text().replace("axes:\n", f"axes:\n{rotary}", 1)
     return Machine.loads(text, "five-axis")
 

@@ -125,8 +125,8 @@ def test_played_positions_follow_the_plan(tmp_path):
         for row, (late, deviation, residual) in play(result, result.output, tmp_path).items():
             error = float(np.abs(residual - result.residual[row])[0] / tolerance[row])
             best[row] = min(best.get(row, (np.inf,)), (error, int(late), float(deviation)))
-    # Blocks of G-code are close, never exact: each rapid arrives in time and on its way. Most shake as
-    # planned; where LinuxCNC's own steps hurt most, what is left is a quarter of today's vibration.
+    # Blocks of G-code are close, never exact: each rapid arrives in time and on its way. Most shake
+    # as planned; where LinuxCNC's own steps hurt most, a quarter of today's vibration is left.
     assert all(abs(late) <= LATE for _, late, _ in best.values()), best
     assert all(deviation <= DEVIATION for _, _, deviation in best.values()), best
     assert sum(error <= 1.0 for error, _, _ in best.values()) >= 4, best
