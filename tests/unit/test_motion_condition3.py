@@ -318,7 +318,8 @@ def test_without_modes_general_designs_have_low_jerk():
     conventional = conventional_laws([V], [A], [J / 10])
     none = mode_poles([], [])
     total = float(np.ceil(conventional.total[0] / INTERVAL)) * INTERVAL
-    laws, _, feasible = design(total, V, A, J, none, np.ones(0), conventional)
+    laws, worst, feasible = design(total, V, A, J, none, np.ones(0), conventional)
     assert feasible[0]
+    assert worst.tolist() == [0.0]
     stretch = total / float(conventional.total[0])
     assert float(laws.jerk[0]) <= J / 10 / stretch**3 * (1 + 1e-6)
