@@ -1,0 +1,427 @@
+"""The planner's decisions: how long, which law, and why not."""
+
+import io
+
+import numpy as np
+import pytest
+
+from gcodejerk.errors import PlanError
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.motion import Laws, laws_response, mode_poles
+from gcodejerk.nc import read_program
+from gcodejerk.plan import path_length, plan_moves, plan_rapids
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.start import program_start
+
+Z_AXIS = "{resolution: 1.0e-4, rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}"
+ROCKING = "modes: [{name: rocking, frequency: 30, damping: 0}]"
+
+
+def machine_of(axes, *, interval=0.001, positioning="linear", extra=""):
+    """A machine from the lines of its axes."""
+    lines = "\n".join(f"  {letter}: {text}" for letter, text in axes.items())
+    return Machine.loads(
+        f"interval: {interval}\npositioning: {positioning}\naxes:\n{lines}\n{extra}\n"
+    )
+
+
+PAPER = machine_of({"Z": f"{Z_AXIS}, {ROCKING}}}"})
+
+
+def moves(*rows):
+    """Displacements by axis as the planner takes them."""
+    out = np.zeros((len(rows), len(AXES)))
+    for k, row in enumerate(rows):
+        for axis, value in row.items():
+            out[k, AXES.index(axis)] = value
+    return out
+
+
+def reasons(plans):
+    """Reasons as words, None for planned moves."""
+    return [None if r == CERTAIN else REASONS[r] for r in plans.reason]
+
+
+def four_jerk_segments(T, J=5e5):
+    """Length that a conventional law of four segments covers in a time."""
+    return 2.0 * J * (T / 4.0) ** 3
+
+
+@pytest.mark.parametrize(
+    ("time", "intervals"),
+    [(0.040, 40), (0.0400001, 41), (0.0399999, 40), (0.0391, 40), (0.02851, 29), (0.0220, 22)],
+)
+def test_the_time_is_rounded_up_to_whole_intervals(time, intervals):
+    plans = plan_moves(moves({"Z": four_jerk_segments(time)}), PAPER)
+    assert float(plans.conventional_time[0]) == pytest.approx(time, rel=1e-9)
+    assert plans.counts.tolist() == [intervals]
+
+
+@pytest.mark.parametrize("interval", [0.0005, 0.001, 0.002])
+def test_no_jerk_limited_rapid_takes_an_interval_longer(interval):
+    machine = machine_of({"Z": f"{Z_AXIS}, {ROCKING}}}"}, interval=interval)
+    lengths = np.geomspace(0.06, 700.0, 300)
+    plans = plan_moves(moves(*({"Z": x} for x in lengths)), machine)
+    assert plans.planned.all()
+    longer = plans.counts * interval - plans.conventional_time
+    assert longer.min() >= -1e-8
+    assert longer.max() < interval
+    law_time = plans.laws.total
+    kept = plans.kept
+    np.testing.assert_allclose(law_time[~kept], plans.counts[~kept] * interval, rtol=1e-9)
+    np.testing.assert_allclose(law_time[kept], plans.conventional_time[kept], rtol=1e-12)
+
+
+def test_the_common_law_of_a_straight_line_keeps_the_limits_of_every_axis():
+    machine = machine_of(
+        {
+            "X": "{rapid: {velocity: 100, acceleration: 9000, jerk: 9.0e+6}}",
+            "Y": "{rapid: {velocity: 900, acceleration: 1000, jerk: 9.0e+6}}",
+            "Z": f"{Z_AXIS}, {ROCKING}}}",
+        }
+    )
+    row = {"X": 30.0, "Y": -40.0, "Z": 20.0}
+    plans = plan_moves(moves(row), machine)
+    assert len(plans.laws) == 1
+    assert plans.share.tolist() == moves(row).tolist()
+    law = plans.laws
+    for axis in machine.axes:
+        size = abs(row[axis.name])
+        assert float(law.velocity[0]) * size <= axis.limit.velocity * (1 + 1e-8)
+        assert float(law.acceleration[0]) * size <= axis.limit.acceleration * (1 + 1e-8)
+        assert float(law.jerk[0]) * size <= axis.limit.jerk * (1 + 1e-8)
+    # The conventional law runs into two of its limits: X's velocity, Y's acceleration.
+    conventional = plans.conventional
+    assert float(conventional.velocity[0]) * 30.0 == pytest.approx(100.0)
+    assert float(conventional.acceleration[0]) * 40.0 == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize(("extension", "planned"), [(0.0, False), (0.005, False), (0.1, True)])
+def test_a_trapezoid_at_its_limit_takes_an_interval_longer_or_is_left(extension, planned):
+    machine = machine_of(
+        {"X": "{rapid: {velocity: 100, acceleration: 500}, modes: [{frequency: 17, damping: 0}]}"},
+        extra=f"design: {{max_extension: {extension}}}",
+    )
+    plans = plan_moves(moves({"X": 30.0}), machine)
+    conventional = 30.0 / 100.0 + 100.0 / 500.0
+    if planned:
+        assert float(plans.conventional_time[0]) == pytest.approx(conventional)
+        # Acceleration that rises and falls within an interval takes one interval more.
+        assert plans.counts.tolist() == [round(conventional * 1000) + 1]
+        assert float(plans.laws.acceleration[0]) * 30 <= 500 * (1 + 1e-8)
+    elif extension == 0.0:
+        assert reasons(plans) == [Reason.LIMITS]
+    else:
+        # 0.5 % of 0.5 s are two intervals: enough.
+        assert plans.counts.tolist() == [501]
+
+
+def test_a_trapezoid_that_shakes_nothing_is_planned_too():
+    machine = machine_of({"X": "{rapid: {velocity: 100, acceleration: 500}}"})
+    plans = plan_moves(moves({"X": 30.0}, {"X": 3.0}), machine)
+    assert reasons(plans) == [None, None]
+    assert plans.counts.tolist() == [501, 156]
+
+
+def test_an_extension_is_at_most_what_the_machine_allows():
+    text = "{rapid: {velocity: 100, acceleration: 500}, limit: {jerk: 1.0e+4}}"
+    machine = machine_of({"X": text}, extra="design: {max_extension: 0.1}")
+    # 500 mm/s^2 at 1e4 mm/s^3 take 50 ms more, 10 % of half a second.
+    lengths = np.array([2.0, 10.0, 20.0, 29.0, 31.0, 60.0, 400.0])
+    plans = plan_moves(moves(*({"X": x} for x in lengths)), machine)
+    planned = plans.planned
+    assert planned.tolist() == [False, False, False, False, True, True, True]
+    assert set(reasons(plans)) == {None, Reason.LIMITS}
+    extension = plans.counts[planned] * 0.001 - plans.conventional_time[planned]
+    assert extension.max() <= 0.1 * plans.conventional_time[planned].max()
+    np.testing.assert_allclose(extension, 0.050, atol=0.001)
+    assert plans.counts[~planned].tolist() == [0] * 4
+
+
+def test_a_trapezoid_with_reserve_keeps_its_time():
+    text = "{rapid: {velocity: 100, acceleration: 500}, limit: {acceleration: 1000}}"
+    machine = machine_of({"X": text.replace("}}", "}, modes: [{frequency: 17, damping: 0}]}")})
+    plans = plan_moves(moves(*({"X": x} for x in (3.0, 30.0, 301.0))), machine)
+    assert plans.planned.all()
+    longer = plans.counts * 0.001 - plans.conventional_time
+    assert longer.max() < 0.001
+
+
+def test_an_axis_that_no_mode_feels_gets_the_lowest_jerk():
+    machine = machine_of({"X": f"{Z_AXIS}}}", "Z": f"{Z_AXIS}, {ROCKING}}}"})
+    plans = plan_moves(moves({"X": 1.0}, {"Z": 1.0}), machine)
+    assert float(plans.laws.T1[0]) == pytest.approx(0.01, rel=1e-6)
+    assert float(plans.laws.T2[0]) == pytest.approx(0.01, rel=1e-6)
+    assert float(plans.laws.T1[1]) == 0.001
+
+
+def test_designs_are_never_worse_than_the_conventional_law():
+    machine = machine_of(
+        {
+            "Z": f"{Z_AXIS}, modes: "
+            "[{frequency: 30, damping: 0.02}, {frequency: 97, damping: 0}]}"
+        }
+    )
+    lengths = np.geomspace(0.06, 700.0, 400)
+    plans = plan_moves(moves(*({"Z": x} for x in lengths)), machine)
+    poles = plans.modes.poles
+    worst = [
+        (np.abs(laws_response(laws, poles)) / poles.imag).max(axis=1) * lengths
+        for laws in (plans.laws, plans.conventional)
+    ]
+    assert (worst[0] <= worst[1] * (1 + 1e-9)).all()
+    assert np.median(worst[0] / worst[1]) < 0.6
+
+
+def test_where_the_conventional_law_is_still_already_it_stays():
+    # 80 ms is two periods of 25 Hz: the conventional law has its null there.
+    machine = machine_of(
+        {
+            "Z": "{resolution: 1.0e-4, rapid: {velocity: 600, acceleration: 5000, jerk: 1.0e+5}, "
+            "modes: [{frequency: 25, damping: 0}]}"
+        }
+    )
+    plans = plan_moves(moves({"Z": four_jerk_segments(0.080, 1e5)}), machine)
+    assert plans.kept.tolist() == [True]
+    assert plans.profile(0) == "conventional"
+    assert [float(c[0]) for c in plans.laws.columns()] == pytest.approx([0.02, 0, 0.02, 0])
+
+
+def test_independent_axes_have_laws_and_times_of_their_own():
+    axes = {
+        "X": f"{Z_AXIS}, modes: [{{frequency: 41, damping: 0}}]}}",
+        "Y": f"{Z_AXIS}}}",
+        "Z": f"{Z_AXIS}, {ROCKING}}}",
+    }
+    machine = machine_of(axes, positioning="independent")
+    plans = plan_moves(moves({"X": 20.0, "Z": -1.0}, {"Y": 3.0}), machine)
+    assert plans.move.tolist() == [0, 0, 1]
+    assert list(plans.laws_of(0)) == [0, 1]
+    assert list(plans.laws_of(1)) == [2]
+    assert plans.share.tolist() == moves({"X": 20.0}, {"Z": -1.0}, {"Y": 3.0}).tolist()
+    alone = [plan_moves(moves(row), machine) for row in ({"X": 20.0}, {"Z": -1.0}, {"Y": 3.0})]
+    for k, own in enumerate(alone):
+        assert plans.law_counts[k] == own.counts[0]
+        for mine, theirs in zip(plans.laws.columns(), own.laws.columns(), strict=True):
+            assert float(mine[k]) == pytest.approx(float(theirs[0]), rel=1e-12)
+    assert plans.law_counts[1] == 40
+    assert plans.counts.tolist() == [plans.law_counts[0], plans.law_counts[2]]
+    assert plans.law_counts[0] > plans.law_counts[1]
+    assert float(plans.conventional_time[0]) == pytest.approx(float(plans.conventional.total[0]))
+
+
+def test_one_axis_that_cannot_be_planned_leaves_the_whole_rapid():
+    hard = "{rapid: {velocity: 100, acceleration: 500}}"
+    machine = machine_of(
+        {"X": hard, "Z": f"{Z_AXIS}}}"},
+        positioning="independent",
+        extra="design: {max_extension: 0}",
+    )
+    plans = plan_moves(moves({"X": 5.0, "Z": 1.0}, {"Z": 1.0}), machine)
+    assert reasons(plans) == [Reason.LIMITS, None]
+    assert plans.move.tolist() == [1]
+
+
+STRUCTURE = machine_of(
+    {"Y": f"{Z_AXIS}}}", "Z": f"{Z_AXIS}}}"},
+    extra="modes: [{frequency: 30, damping: 0, participation: {Y: 0.4, Z: 1.0}}]",
+)
+
+
+def worst_by_hand(plans, weights):
+    """Largest residual of each law by jerk steps, weights [mm] given."""
+    out = []
+    for k, weight in enumerate(weights):
+        segments = plans.laws.segments(k)
+        times = np.cumsum([0.0, *(d for d, _ in segments)])
+        steps = np.diff([j for _, j in segments], prepend=0.0, append=0.0)
+        omega = 2 * np.pi * 30.0
+        ringing = (steps * np.exp(1j * omega * (times[-1] - times))).sum()
+        out.append(abs(weight) * abs(ringing) / omega**3)
+    return out
+
+
+def test_a_structure_mode_feels_axes_added_with_their_signs():
+    rows = [{"Z": 1.0}, {"Y": 2.5}, {"Y": 2.5, "Z": 1.0}, {"Y": 2.5, "Z": -1.0}]
+    plans = plan_moves(moves(*rows), STRUCTURE)
+    felt = plans.share @ plans.modes.participation.T
+    np.testing.assert_allclose(felt[:, 0], [1.0, 1.0, 2.0, 0.0], atol=1e-12)
+    assert plans.modes.labels == ("Y+Z",)
+    # What nothing feels gets the lowest jerk, although both axes alone would be felt.
+    assert float(plans.laws.T1[3]) == pytest.approx(float(plans.laws.T2[3]), rel=1e-6)
+    assert float(plans.laws.T1[0]) == 0.001
+    by_hand = worst_by_hand(plans, felt[:, 0])
+    pole = mode_poles([30.0], [0.0])
+    D = np.abs(laws_response(plans.laws, pole)[:, 0]) / pole[0].imag * np.abs(felt[:, 0])
+    np.testing.assert_allclose(by_hand, D, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("time", "said"),
+    [
+        (0.029, r"axis Z reaches \S+ mm/s\^2 of acceleration in 0.029 s, above its limit of 5000"),
+        (0.0005, r"segments of at least 0.001 s"),
+    ],
+)
+def test_a_time_that_is_too_short_is_refused_with_the_least_that_will_do(time, said):
+    with pytest.raises(PlanError, match=said) as caught:
+        plan_moves(moves({"Z": 1.0}), PAPER, time=time)
+    assert "--time" in caught.value.remedy
+    least = float(caught.value.remedy.split("at least ")[1].split(" s")[0])
+    assert plan_moves(moves({"Z": 1.0}), PAPER, time=least).counts[0] == round(least / 0.001)
+    with pytest.raises(PlanError):
+        plan_moves(moves({"Z": 1.0}), PAPER, time=least - 0.001)
+
+
+@pytest.mark.parametrize(
+    ("row", "time", "quantity", "limit"),
+    [
+        ({"X": 1.0, "Z": 300.0}, 0.55, "velocity", "600 mm/s"),
+        ({"X": 9.0, "Z": 1.0}, 0.04, "acceleration", "4000 mm/s^2"),
+    ],
+)
+def test_a_time_names_the_axis_the_value_and_the_limit(row, time, quantity, limit):
+    slower = "{rapid: {velocity: 500, acceleration: 4000, jerk: 4.0e+5}}"
+    machine = machine_of({"X": slower, "Z": f"{Z_AXIS}}}"})
+    with pytest.raises(PlanError) as caught:
+        plan_moves(moves(row), machine, time=time)
+    axis = max(row, key=lambda a: row[a])
+    assert caught.value.problem.startswith(f"axis {axis} reaches ")
+    assert f"of {quantity} in {time:.3f} s, above its limit of {limit}" in caught.value.problem
+    value = float(caught.value.problem.split("reaches ")[1].split()[0])
+    assert value > float(limit.split()[0])
+
+
+def test_a_longer_time_is_used_as_it_is():
+    plans = plan_moves(moves({"Z": 1.0}, {"Z": 2.0}), PAPER, time=0.0905)
+    assert plans.counts.tolist() == [91, 91]
+    np.testing.assert_allclose(plans.laws.total, 0.091)
+
+
+@pytest.mark.parametrize(
+    ("T1", "said"),
+    [
+        (0.0, r"T1 is 0 s, outside 0 < T1 < T_SUM/2 = 0.02 s"),
+        (0.02, r"T1 is 0.02 s, outside 0 < T1 < T_SUM/2 = 0.02 s"),
+        (-0.001, r"T1 is -0.001 s, outside"),
+        (float("nan"), r"T1 is nan s, outside"),
+        (0.0005, r"T1 = 0.0005 s leaves a segment shorter than the interval of 0.001 s"),
+        (0.0195, r"T1 = 0.0195 s leaves a segment shorter than the interval of 0.001 s"),
+        (0.015, r"with T1 = 0.015 s axis Z reaches 6000 mm/s\^2 of acceleration in 0.040 s, "
+                r"above its limit of 5000 mm/s\^2"),
+    ],
+)  # fmt: skip
+def test_a_T1_that_is_not_possible_is_refused_with_the_limit(T1, said):  # noqa: N802
+    with pytest.raises(PlanError, match=said):
+        plan_moves(moves({"Z": 1.0}), PAPER, T1=T1)
+
+
+def test_a_T1_within_limits_is_used_as_it_is():  # noqa: N802
+    plans = plan_moves(moves({"Z": 1.0}), PAPER, T1=0.0037)
+    assert [float(c[0]) for c in plans.laws.columns()] == pytest.approx([0.0037, 0, 0.0163, 0])
+
+
+def test_the_profile_conventional_is_what_the_controller_does():
+    plans = plan_moves(moves({"Z": 1.0}, {"Z": 200.0}), PAPER, "conventional")
+    assert plans.kept.all()
+    for a, b in zip(plans.laws.columns(), plans.conventional.columns(), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_trapezoid_cannot_be_written_as_it_is():
+    machine = machine_of({"X": "{rapid: {velocity: 100, acceleration: 500}}"})
+    assert reasons(plan_moves(moves({"X": 30.0}), machine, "conventional")) == [Reason.LIMITS]
+
+
+def test_an_unknown_profile_is_refused_with_those_there_are():
+    with pytest.raises(PlanError, match="'optimal' is not available") as caught:
+        plan_moves(moves({"Z": 1.0}), PAPER, "optimal")
+    assert "condition3" in caught.value.remedy
+
+
+def test_reasons_given_are_kept_and_those_rows_not_looked_at():
+    displacement = moves({"Z": 1.0}, {"Z": np.nan}, {}, {"X": 1.0})
+    given = np.array([CERTAIN, REASONS.index(Reason.START_UNKNOWN), CERTAIN, CERTAIN], np.uint8)
+    plans = plan_moves(displacement, PAPER, reason=given)
+    expected = [None, Reason.START_UNKNOWN, Reason.NO_MOTION, Reason.AXIS_UNKNOWN]
+    assert reasons(plans) == expected
+    assert plans.move.tolist() == [0]
+    assert given.tolist()[2:] == [CERTAIN, CERTAIN], "the caller's array was changed"
+
+
+def test_no_moves_make_an_empty_plan():
+    plans = plan_moves(moves(), PAPER)
+    assert len(plans) == len(plans.laws) == 0
+
+
+def test_moves_planned_together_are_planned_as_alone():
+    machine = machine_of(
+        {
+            "X": f"{Z_AXIS}, modes: [{{frequency: 41, damping: 0.01}}]}}",
+            "Z": f"{Z_AXIS}, {ROCKING}}}",
+        }
+    )
+    rng = np.random.default_rng(4)
+    rows = [
+        {"X": 10 ** rng.uniform(-1, 2.7), "Z": -(10 ** rng.uniform(-1, 2.7))} for _ in range(25)
+    ]
+    together = plan_moves(moves(*rows), machine)
+    for k, row in enumerate(rows):
+        alone = plan_moves(moves(row), machine)
+        assert alone.counts[0] == together.counts[k]
+        for a, b in zip(alone.laws.columns(), together.laws.columns(), strict=True):
+            assert float(a[0]) == pytest.approx(float(b[k]), rel=1e-9, abs=1e-15)
+
+
+def test_length_is_that_of_the_linear_axes_unless_only_rotary_ones_move():
+    rotary = "{type: rotary, rapid: {velocity: 60, acceleration: 600, jerk: 6000}}"
+    machine = machine_of({"X": f"{Z_AXIS}}}", "Z": f"{Z_AXIS}}}", "A": rotary})
+    rows = moves({"X": 3.0, "Z": -4.0}, {"X": 3.0, "Z": 4.0, "A": 90.0}, {"A": -90.0}, {})
+    assert path_length(rows, machine).tolist() == [5.0, 5.0, 90.0, 0.0]
+
+
+def rapids_of(text, machine):
+    """The rapids of a program."""
+    return read_program(io.BytesIO(text.encode()), start=program_start(machine)).rapids
+
+
+KNOWN = machine_of(
+    {"X": f"{Z_AXIS}, travel: [-10, 50]}}", "Z": f"{Z_AXIS}, travel: [-20, 5]}}"},
+    extra="program: {offsets: {G54: {X: 5, Z: 0}}}\ndesign: {minimum_length: 0.05}",
+)
+
+
+@pytest.mark.parametrize(
+    ("block", "reason"),
+    [
+        ("G0 X9 Z-1", None),
+        ("G0 X45", None),
+        ("G0 X45.1", Reason.BEYOND_TRAVEL),
+        ("G0 X-15", None),
+        ("G0 X-15.1", Reason.BEYOND_TRAVEL),
+        ("G0 X9 Z5.1", Reason.BEYOND_TRAVEL),
+        ("G0 X0", Reason.NO_MOTION),
+        ("G0 X0.05", None),
+        ("G0 X0.0499", Reason.TOO_SHORT),
+        ("G0 X9 A5", Reason.AXIS_UNKNOWN),
+        ("G0 X9 Y0", Reason.AXIS_UNKNOWN),
+    ],
+)
+def test_rapids_are_left_for_the_machine_s_reasons(block, reason):
+    rapids = rapids_of(f"G21 G90 G94 G64\nG1 X0 Y0 Z0 A0 F600\n{block}\nM2\n", KNOWN)
+    assert reasons(plan_rapids(rapids, KNOWN)) == [reason]
+
+
+def test_travel_counts_only_where_the_offset_is_known():
+    rapids = rapids_of("G21 G90 G94 G64 G55\nG1 X0 Z0 F600\nG0 X4500\nM2\n", KNOWN)
+    assert reasons(plan_rapids(rapids, KNOWN)) == [None]
+
+
+def test_laws_of_a_plan_stand_for_the_moves_they_belong_to():
+    rapids = rapids_of("G21 G90 G94 G64\nG1 X0 Z0 F600\nG0 X0\nG0 X9\nG0 Z-4\nM2\n", KNOWN)
+    plans = plan_rapids(rapids, KNOWN)
+    assert plans.move.tolist() == [1, 2]
+    assert list(plans.laws_of(0)) == []
+    assert list(plans.laws_of(2)) == [1]
+    assert plans.share[1].tolist() == moves({"Z": -4.0})[0].tolist()
+    assert isinstance(plans.laws, Laws)
