@@ -33,7 +33,7 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def run(folder):
-    def command(*arguments, input=None):  # noqa: A002
+    def command(*arguments, input=None):
         result = CliRunner().invoke(cli.app, [str(a) for a in arguments], input=input)
         if isinstance(result.exception, GcodejerkError):
             # `main` turns these into a message on standard error and exit status 1.
@@ -124,7 +124,7 @@ def test_several_programs_go_to_a_folder_and_one_bad_one_stops_none(run, folder)
     (folder / "out").mkdir()
     for jobs in ("1", "2"):
         done = run(
-            "process", "part.nc", "bad.nc", "b.nc", "-m", "vmc", "--output-dir", "out", "--jobs", jobs
+            *("process", "part.nc", "bad.nc", "b.nc", "-m", "vmc"), "--output-dir", "out", "--jobs", jobs
         )  # fmt: skip
         assert done.code == 1
         assert "bad.nc:1" in done.err
