@@ -1,0 +1,237 @@
+"""Streams: whole steps, exact ends, and the residual of exactly what is written."""
+
+import numpy as np
+import pytest
+
+from gcodejerk import stream
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.motion import polyline_response, sample_laws
+from gcodejerk.plan import plan_moves
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.stream import FINE_DECIMALS, Spelling, make_streams
+
+MACHINE = Machine.loads(
+    """
+interval: 0.001
+positioning: linear
+axes:
+  X:
+    resolution: 0.001
+    rapid: {velocity: 500, acceleration: 4000, jerk: 2.0e+5}
+    modes: [{frequency: 41, damping: 0.03, participation: 0.5}]
+  Z:
+    resolution: 0.001
+    rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}
+    modes: [{frequency: 30, damping: 0.02}]
+modes: [{frequency: 13, damping: 0.01, participation: {X: 0.2, Z: -0.3}}]
+"""
+)
+INDEPENDENT = Machine.loads(
+    "interval: 0.001\npositioning: independent\naxes:\n"
+    "  X: {resolution: 0.001, rapid: {velocity: 500, acceleration: 4000, jerk: 2.0e+5}}\n"
+    "  Z: {resolution: 0.001, rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}}\n"
+    "modes: [{frequency: 13, damping: 0.01, participation: {X: 0.2, Z: -0.3}}]\n"
+)
+X, Z = AXES.index("X"), AXES.index("Z")
+
+
+def drawn_moves(count, seed=1):
+    """Displacements of X and Z, some of them of one axis only."""
+    rng = np.random.default_rng(seed)
+    out, resting = np.zeros((count, len(AXES))), rng.integers(0, 3, count)
+    for k, axis in enumerate((X, Z)):
+        size = 10 ** rng.uniform(-1, 2.3, count) * rng.choice([-1.0, 1.0], count)
+        out[:, axis] = np.where(resting == k, 0.0, size)
+    return out
+
+
+def spelling_of(displacement, start=0.0, step=0.001, origin=0.0):
+    """The same step and origin for all axes."""
+    shape = displacement.shape
+    return Spelling(*(np.broadcast_to(np.asarray(x, float), shape) for x in (start, step, origin)))
+
+
+def streams(displacement, machine=MACHINE, stride=1, profile=None, **spelling):
+    """All batches of some moves."""
+    plans = plan_moves(displacement, machine, profile)
+    return list(make_streams(plans, spelling_of(displacement, **spelling), stride))
+
+
+@pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
+@pytest.mark.parametrize("stride", [1, 2])
+def test_points_are_whole_steps_between_exact_ends(machine, stride):
+    displacement = drawn_moves(30)
+    start = np.random.default_rng(2).uniform(-9, 9, displacement.shape)
+    (batch,) = streams(displacement, machine, stride, start=start)
+    assert batch.moves.tolist() == list(range(30))
+    for row in range(30):
+        t, q = batch.positions(row)
+        np.testing.assert_allclose(q[0], start[row], atol=0)
+        np.testing.assert_allclose(q[-1], start[row] + displacement[row], atol=0)
+        assert t[0] == 0.0
+        assert t[-1] == pytest.approx(batch.plans.counts[row] * 0.001)
+        assert np.diff(t).min() >= stride * 0.001 - 1e-9
+        for axis in (X, Z):
+            if displacement[row, axis] == 0.0:
+                assert (q[:, axis] == start[row, axis]).all()
+                continue
+            steps = q[1:-1, axis] / 0.001
+            np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
+            assert (np.diff(q[:, axis]) * np.sign(displacement[row, axis]) >= -1e-9).all()
+
+
+@pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
+def test_the_residual_is_that_of_the_points_as_written(machine):
+    displacement = drawn_moves(12, seed=5)
+    (batch,) = streams(displacement, machine, start=0.00037)
+    modes = batch.plans.modes
+    for row in range(12):
+        t, q = batch.positions(row)
+        driven = q @ modes.participation.T
+        for m, pole in enumerate(modes.poles):
+            D = abs(polyline_response(t, driven[:, m], modes.poles[m : m + 1])[0]) / pole.imag
+            assert float(batch.residual[row, m]) == pytest.approx(float(D), rel=1e-7, abs=1e-9)
+
+
+def test_the_conventional_residual_is_that_of_the_controller_s_samples():
+    displacement = drawn_moves(12, seed=6)
+    (batch,) = streams(displacement, INDEPENDENT)
+    plans, modes = batch.plans, batch.plans.modes
+    for row in range(12):
+        laws = list(plans.laws_of(row))
+        counts = [int(np.ceil(plans.conventional.total[k] / 0.001 - 1e-6)) for k in laws]
+        moments = np.arange(max(counts) + 1)
+        driven = np.zeros(len(moments))
+        for k in laws:
+            unit, _ = sample_laws(
+                plans.conventional.take(slice(k, k + 1)), moments[np.newaxis], 1e-3
+            )
+            driven += unit[0] * (plans.share[k] @ modes.participation[0])
+        D = np.abs(polyline_response(moments * 1e-3, driven, modes.poles)) / modes.poles.imag
+        if not batch.kept[row]:
+            assert float(batch.conventional_residual[row, 0]) == pytest.approx(
+                float(D[0]), rel=1e-7
+            )
+
+
+def test_velocities_are_those_of_the_law():
+    (batch,) = streams(drawn_moves(10, seed=7))
+    for axis, velocity in batch.velocity.items():
+        for row in range(10):
+            t, _ = batch.positions(row)
+            n = len(t)
+            q, v = batch.exact[axis][row, -n:], velocity[row, -n:]
+            slope, mean = np.diff(q) / np.diff(t), 0.5 * (v[1:] + v[:-1])
+            # The acceleration changes within an interval by no more than the jerk allows.
+            np.testing.assert_allclose(slope, mean, atol=5e6 * 1e-6)
+
+
+@pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
+@pytest.mark.parametrize("samples", [1, 500, 2000])
+def test_many_small_batches_are_the_same_as_one(machine, samples, monkeypatch):
+    displacement = drawn_moves(25, seed=3)
+    displacement[4] = 0.0
+    (whole,) = streams(displacement, machine, 2)
+    monkeypatch.setattr(stream, "BATCH_SAMPLES", samples)
+    parts = streams(displacement, machine, 2)
+    assert len(parts) > 3
+    if samples == 1:
+        assert [len(part) for part in parts] == [1] * 24
+    assert np.concatenate([part.moves for part in parts]).tolist() == whole.moves.tolist()
+    row = 0
+    for part in parts:
+        for k in range(len(part)):
+            (t, q), (expected_t, expected_q) = part.positions(k), whole.positions(row)
+            np.testing.assert_array_equal(t, expected_t)
+            np.testing.assert_array_equal(q, expected_q)
+            np.testing.assert_allclose(part.residual[k], whole.residual[row], rtol=1e-6, atol=1e-12)
+            np.testing.assert_allclose(
+                part.conventional_residual[k], whole.conventional_residual[row], rtol=1e-6
+            )
+            assert part.kept[k] == whole.kept[row]
+            row += 1
+    assert row == 24
+
+
+def test_a_batch_holds_about_as_many_samples_as_it_may(monkeypatch):
+    monkeypatch.setattr(stream, "BATCH_SAMPLES", 3000)
+    for batch in streams(drawn_moves(60, seed=8)):
+        assert len(batch) == 1 or len(batch) * batch.plans.counts[batch.moves].max() <= 3000
+
+
+def test_moves_that_are_not_planned_have_no_stream():
+    displacement = drawn_moves(4)
+    reason = np.full(4, CERTAIN, np.uint8)
+    reason[[0, 2]] = REASONS.index(Reason.EXPRESSION)
+    plans = plan_moves(displacement, MACHINE, reason=reason)
+    batches = list(make_streams(plans, spelling_of(displacement), 1))
+    assert [batch.moves.tolist() for batch in batches] == [[1, 3]]
+    reason[:] = REASONS.index(Reason.EXPRESSION)
+    plans = plan_moves(displacement, MACHINE, reason=reason)
+    assert list(make_streams(plans, spelling_of(displacement), 1)) == []
+
+
+def test_an_axis_that_moves_a_few_steps_is_written_finer():
+    displacement = np.zeros((2, len(AXES)))
+    displacement[:, X], displacement[:, Z] = 20.0, (0.0079, 0.0081)
+    (batch,) = streams(displacement)
+    assert batch.fine[:, Z].tolist() == [True, False]
+    assert not batch.fine[:, X].any()
+    step = 0.001 / 10**FINE_DECIMALS
+    _, q = batch.positions(0)
+    np.testing.assert_allclose(q[1:-1, Z] / step, np.rint(q[1:-1, Z] / step), atol=1e-5)
+    assert len(np.unique(q[:, Z])) > 20
+    assert len(np.unique(batch.positions(1)[1][:, Z])) <= 10
+
+
+def test_increments_are_counted_from_the_start():
+    displacement = drawn_moves(5, seed=9)
+    start = np.full(displacement.shape, 1.23456)
+    (batch,) = streams(displacement, start=start, origin=start)
+    for row in range(5):
+        _, q = batch.positions(row)
+        for axis in (X, Z):
+            steps = (q[1:-1, axis] - 1.23456) / 0.001
+            np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
+
+
+def test_an_axis_that_stands_at_an_unknown_place_spoils_nothing():
+    displacement = np.zeros((2, len(AXES)))
+    displacement[0, X], displacement[1, Z] = 5.0, -3.0
+    start = np.zeros(displacement.shape)
+    start[0, Z] = start[1, X] = np.nan
+    (batch,) = streams(displacement, start=start)
+    assert np.isfinite(batch.residual).all()
+    _, q = batch.positions(0)
+    assert np.isfinite(q[:, X]).all()
+    assert np.isnan(q[:, Z]).all()
+
+
+def test_where_rounding_spoils_a_design_the_conventional_law_is_written():
+    # Steps of 1 mm: whatever was designed, the rounding decides, and never for the worse.
+    displacement = np.zeros((40, len(AXES)))
+    displacement[:, Z] = np.linspace(9.0, 60.0, 40)
+    (batch,) = streams(displacement, step=1.0)
+    design_kept = batch.plans.kept
+    fallen_back = batch.kept & ~design_kept
+    assert fallen_back.any(), "no case of the fallback among these moves"
+    for row in np.nonzero(fallen_back)[0]:
+        for written, conventional in zip(
+            batch.laws.columns(), batch.plans.conventional.columns(), strict=True
+        ):
+            assert written[row] == conventional[row]
+        np.testing.assert_array_equal(batch.residual[row], batch.conventional_residual[row])
+    kept = batch.kept
+    assert (
+        batch.residual[~kept].max(axis=1) <= batch.conventional_residual[~kept].max(axis=1)
+    ).all()
+
+
+def test_a_kept_law_reaches_its_end_before_the_last_interval_has_passed():
+    displacement = np.zeros((1, len(AXES)))
+    displacement[0, Z] = 1.07
+    (batch,) = streams(displacement, profile="conventional")
+    assert batch.kept.all()
+    t, q = batch.positions(0)
+    assert t[-1] == pytest.approx(np.ceil(float(batch.plans.conventional_time[0]) * 1e3) / 1e3)
+    assert q[-1, Z] == 1.07
