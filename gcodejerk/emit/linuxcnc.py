@@ -61,7 +61,7 @@ class LinuxcncController:
             "stream",
             "measured",
             "LinuxCNC 2.9: follows within 0.02 mm and 3 ms; needs G64, ARC_BLEND_ENABLE = 1 and "
-            "MAX_ACCELERATION 1.3 to 2 times the axis's limit.acceleration",
+            "MAX_ACCELERATION a little (5 %) above the axis's limit.acceleration",
         ),
     )
 

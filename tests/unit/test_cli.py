@@ -122,10 +122,9 @@ def test_several_programs_go_to_a_folder_and_one_bad_one_stops_none(run, folder)
     (folder / "bad.nc").write_bytes(b"G0 X1\0\n")
     (folder / "b.nc").write_bytes(PROGRAM)
     (folder / "out").mkdir()
+    files = ("part.nc", "bad.nc", "b.nc")
     for jobs in ("1", "2"):
-        done = run(
-            *("process", "part.nc", "bad.nc", "b.nc", "-m", "vmc"), "--output-dir", "out", "--jobs", jobs
-        )  # fmt: skip
+        done = run("process", *files, "-m", "vmc", "--output-dir", "out", "--jobs", jobs)
         assert done.code == 1
         assert "bad.nc:1" in done.err
         assert sorted(p.name for p in (folder / "out").iterdir()) == ["b.nc", "part.nc"]
