@@ -1,0 +1,54 @@
+"""Whole programs with their whole output, compared as bytes.
+
+A case is a folder with `in.ngc`, `machine.yaml` and `out.ngc` (`out.csv` where the machine's
+controller is `csv`); a new folder is a new test. `pytest --update-golden` writes the outputs anew.
+The intervals are long, so that a move is a dozen points that a reader can follow by eye.
+"""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from gcodejerk import Machine, ProgramError, process
+
+HERE = Path(__file__).parent
+CASES = sorted(path.parent.name for path in HERE.glob("*/in.ngc"))
+
+
+def made(case):
+    """The machine, the program and what becomes of it."""
+    machine = Machine.load(HERE / case / "machine.yaml")
+    program = (HERE / case / "in.ngc").read_bytes()
+    return machine, program, process(program, machine, name=f"{case}/in.ngc")
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_output_is_the_golden_one(case, request):
+    machine, _, result = made(case)
+    golden = HERE / case / ("out.csv" if machine.controller == "csv" else "out.ngc")
+    if request.config.getoption("--update-golden"):
+        golden.write_bytes(result.output)
+    assert golden.exists(), f"{case} has no {golden.name} yet: run pytest --update-golden"
+    assert result.output == golden.read_bytes()
+    assert result.verification.ok
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_golden_outputs_are_not_processed_again(case):
+    golden = HERE / case / "out.ngc"
+    if not golden.exists() or b"gcodejerk stamp" not in golden.read_bytes():
+        pytest.skip("not a program with a stamp")
+    machine = Machine.load(HERE / case / "machine.yaml")
+    with pytest.raises(ProgramError, match="processed by gcodejerk before"):
+        process(golden.read_bytes(), machine)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_golden_programs_say_what_they_are_about(case):
+    program = (HERE / case / "in.ngc").read_bytes()
+    assert re.match(rb"(%\r?\n)?\([^)]{10,}\)", program), "begin in.ngc with a comment that says so"
+
+
+def test_there_are_cases():
+    assert len(CASES) >= 10
