@@ -35,7 +35,6 @@ def can_run(state: State) -> bool:
         and state.plane in ARC_CENTRES
         and state.feed_mode is not None
         and state.touched is None
-        and not state.ended
     )
 
 
@@ -134,7 +133,8 @@ def run_plain(
         feed=history[np.searchsorted(feeds, rapid, side="right")],
         reason=_reasons(state, named[rapid], start, target),
     )
-    log.add_many(columns, events, rapid)
+    # What stands behind the end of the program uses no F.
+    log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
     state.motion = int(motion[-1]) * 10
     state.feed = float(history[-1])
     certain = np.flatnonzero(columns["reason"] == CERTAIN)
@@ -165,6 +165,8 @@ def _reasons(
     target: NDArray[np.float64],
 ) -> NDArray[np.uint8]:
     """Why each rapid has to be left alone, as `execute` would decide."""
+    if state.ended:
+        return np.full(len(named), _INDEX[Reason.AFTER_END], dtype=np.uint8)
     if state.rotated is not False:
         return np.full(len(named), _INDEX[Reason.ROTATION], dtype=np.uint8)
     is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
