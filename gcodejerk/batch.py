@@ -18,7 +18,7 @@ from gcodejerk.files import STANDARD, new_file, open_input, same_file
 from gcodejerk.machine import Machine
 from gcodejerk.pipeline import Progress, Result, Settings, process_file
 from gcodejerk.report.difference import difference
-from gcodejerk.report.records import Record, dump, process_record
+from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line
 
 
@@ -101,16 +101,12 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         else:
             target = stack.enter_context(tempfile.TemporaryFile())
         result = process_file(source, target, machine, settings, job.input, progress)
-        record = record_of(result, machine, job.output, source)
+        summary = summary_line(job.input, summary_of(result))
         if job.strict and result.left:
-            raise EmitError(
-                f"{job.input}: {summary_line(record)}",
-                "--strict refuses this; `gcodejerk inspect` shows every rapid",
-            )
+            raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
-            report.write(dump(record))
+            report.write(dump(record_of(result, machine, job.output, source)))
         diff = difference(source, target, result) if job.mode == "diff" else b""
-    summary = summary_line(record)
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}"
     changed = result.planned > 0

@@ -196,7 +196,7 @@ def inspect(
     console.print(rapids_table(record))
     for note in record["notes"]:
         print(f"note: {note}")
-    print(summary_line(record).replace(" rewritten", " would be rewritten"))
+    print(summary_line(file, record["summary"]).replace(" rewritten", " would be rewritten"))
 
 
 @app.command()

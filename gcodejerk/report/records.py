@@ -142,6 +142,12 @@ class Records:
         return out
 
 
+def summary_of(result: Result) -> Record:
+    """The summary of a report, without the records of its rapids."""
+    records = Records(result.plans, result.kept, result.residual, result.conventional_residual)
+    return {"blocks": result.program.blocks} | records.summary()
+
+
 def process_record(
     result: Result, machine: Machine, output: str | None, blocks: list[str]
 ) -> Record:
@@ -175,12 +181,11 @@ def process_record(
         | records.motion(row)
         for row in range(len(rapids))
     ]
-    summary = {"blocks": result.program.blocks} | records.summary()
     return _head(machine, result.controller, result.form, result.profile) | {
         "input": result.program.name,
         "output": output,
         "dialect": result.program.dialect,
-        "summary": summary,
+        "summary": summary_of(result),
         "notes": list(result.notes),
         "verified": None if result.verification is None else result.verification.ok,
         "rapids": rows,

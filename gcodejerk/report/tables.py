@@ -56,13 +56,12 @@ def rapids_table(record: Record) -> Table:
     return table
 
 
-def summary_line(record: Record) -> str:
+def summary_line(name: str, summary: Record) -> str:
     """One line: how many rapids were rewritten, what that gains, what was left alone and why."""
-    summary = record["summary"]
     rapids = _count(summary["rapids"], "rapid")
     if not summary["rapids"]:
-        return f"{record['input']}: 0 rapids found, nothing to do"
-    parts = [f"{record['input']}: {rapids}, {summary['planned']} rewritten"]
+        return f"{name}: 0 rapids found, nothing to do"
+    parts = [f"{name}: {rapids}, {summary['planned']} rewritten"]
     if summary["planned"] and summary["worst_conventional_residual"]:
         now = summary["worst_conventional_residual"] * UM_PER_MM
         then = summary["worst_residual"] * UM_PER_MM

@@ -1,3 +1,3 @@
-"""The kit that runs LinuxCNC is no test: it needs Debian's own Python, or is started by LinuxCNC."""
+"""The kit that runs LinuxCNC is no test: LinuxCNC starts parts of it with Python of its own."""
 
 collect_ignore = ["linuxcnc", "oracle.py"]
