@@ -192,6 +192,16 @@ def test_modes_that_do_not_count_leave_the_lowest_jerk():
     assert float(laws.T1[0]) == pytest.approx(0.007)
 
 
+def test_residuals_too_small_to_matter_are_ties_and_leave_the_lowest_jerk():
+    pole = mode_poles([30.0], [0.0])
+    # All residuals of the map are below 0.1 nm, though some are ten times others.
+    laws, worst = design_four_segments(
+        *columns(0.04, 0.001, 0.019), pole, np.full((1, 1), 0.9 * TIE)
+    )
+    assert float(laws.T1[0]) == pytest.approx(0.01)
+    assert 0.0 < float(worst[0]) < TIE
+
+
 def drawn_long_moves(seed, count):
     """Limits and modes of moves whose conventional law has more than four segments."""
     rng = np.random.default_rng(seed)
