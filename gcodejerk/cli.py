@@ -116,6 +116,7 @@ def process(
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
     from gcodejerk.batch import Job, run_jobs
+    from gcodejerk.files import make_folder
     from gcodejerk.pipeline import Settings
 
     if sum(map(bool, (output, output_dir, in_place))) > 1:
@@ -148,6 +149,8 @@ def process(
         )
         for file in files
     ]
+    if output_dir is not None and mode == "write":
+        make_folder(output_dir)
     to_stdout = diff or any(job.output == "-" for job in jobs_list)
     failed = changed = False
     with _progress(quiet or jobs > 1) as show:

@@ -125,6 +125,16 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
                 os.unlink(temporary)
 
 
+def make_folder(path: str) -> None:
+    """Make a folder for outputs, and those above it, where they are missing."""
+    try:
+        os.makedirs(path, exist_ok=True)
+    except OSError as error:
+        raise EmitError(
+            f"{path} cannot be made a folder: {error.strerror}", "choose another --output-dir"
+        ) from error
+
+
 def same_file(one: str, other: str) -> bool:
     """Whether two names are the same file."""
     if STANDARD in (one, other):

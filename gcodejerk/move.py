@@ -180,5 +180,5 @@ def plan_move(
     for described in machine.axes:
         step[AXES.index(described.name)] = described.resolution
     zero = np.zeros((1, len(AXES)))
-    batch = next(make_streams(plans, Spelling(zero, step[np.newaxis, :], zero), 1))
+    ((batch,),) = make_streams(plans, Spelling(zero, step[np.newaxis, :], zero), 1)
     return Plan(machine, {a.upper(): float(x) for a, x in displacement.items()}, plans, batch)

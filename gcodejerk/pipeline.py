@@ -35,6 +35,8 @@ TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
 Progress = Callable[[str, int, int], None]
 """Called with a step's name, how much of it is done, and of how much."""
 COPY_SIZE = 1 << 20
+STAMP_LENGTH = 69
+"""Controllers and senders with short lines choke on longer comments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,12 +216,13 @@ def process_file(
     collected = _Residuals(plans)
     writer = _Writer(source, target, program, machine, emitter, settings)
     done = 0
-    for batch in make_streams(
+    for window in make_streams(
         plans, emitter.spelling(program.rapids, machine), emitter.stride(machine.interval)
     ):
-        collected.add(batch)
-        writer.write(batch)
-        done += len(batch)
+        for batch in window:
+            collected.add(batch)
+        writer.write(window)
+        done += sum(map(len, window))
         report("writing", done, int(np.count_nonzero(plans.planned)))
     writer.finish()
     verification = None
@@ -250,7 +253,7 @@ def process_file(
         kept=collected.kept,
         verification=verification,
         edits=np.array(writer.edits, dtype=np.int64).reshape(-1, 3),
-        notes=(*notes, *emitter.notes(machine)),
+        notes=(*notes, *emitter.notes(program.rapids, plans)),
     )
 
 
@@ -262,7 +265,7 @@ def stamp_comment(machine: Machine, settings: Settings, emitter: Controller) -> 
     plain = "".join(
         c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name
     )
-    return f"(gcodejerk stamp {__version__} {digest} {plain[:28]})".encode()
+    return f"{f'(gcodejerk stamp {__version__} {digest} {plain}'[: STAMP_LENGTH - 1]})".encode()
 
 
 def _with_output(result: Result, output: bytes) -> Result:
@@ -328,21 +331,30 @@ class _Writer:
         if target is not None:
             target.write(emitter.header(machine))
 
-    def write(self, batch: Batch) -> None:
-        """Write one batch; batches come in the order of the file."""
+    def write(self, window: list[Batch]) -> None:
+        """Write the streams of a window; windows come in the order of the file."""
         if self.target is None:
             return
-        rapids, moves = self.program.rapids, batch.moves
         if self.emitter.in_place and not self.edits:
             self._copy(self.program.insert_at)
             self._put(self.stamp, -1)
-        blocks = [self._block(int(rapids.begin[move]), int(rapids.end[move])) for move in moves]
+        texts: dict[int, bytes] = {}
+        rapids = self.program.rapids
+        for batch in window:
+            blocks = [self._block(move) for move in batch.moves]
+            new = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
+            texts.update(zip(batch.moves.tolist(), new, strict=True))
         self.source.seek(self.at)
-        texts = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
-        for move, text in zip(moves, texts, strict=True):
+        for move in sorted(texts):
             self._copy(int(rapids.begin[move]))
             self._read(int(rapids.end[move] + TERMINATOR_LENGTH[rapids.terminator[move]]))
-            self._put(text, int(move))
+            self._put(texts[move], move)
+
+    def _block(self, move: int) -> bytes:
+        """The block of a rapid."""
+        begin, end = int(self.program.rapids.begin[move]), int(self.program.rapids.end[move])
+        self.source.seek(begin)
+        return self.source.read(end - begin)
 
     def _put(self, text: bytes, move: int) -> None:
         """Write what is not the source's, and note where."""
@@ -351,11 +363,6 @@ class _Writer:
         self.target.write(text)
         if self.emitter.in_place:
             self.edits.append((begin, begin + len(text), move))
-
-    def _block(self, begin: int, end: int) -> bytes:
-        """One block of the source."""
-        self.source.seek(begin)
-        return self.source.read(end - begin)
 
     def finish(self) -> None:
         """Copy what follows the last stream, and see that the source is still what was planned."""

@@ -131,7 +131,10 @@ def plan_rapids(rapids: Rapids, machine: Machine, profile: str | None = None) ->
     """
     reason = rapids.reason.copy()
     known = sum(1 << AXES.index(name) for name in machine.axis_names)
-    _rule_out(reason, (rapids.words & ~np.uint16(known)) != 0, Reason.AXIS_UNKNOWN)
+    foreign = (rapids.words & ~np.uint16(known)) != 0
+    # The machine file is what the user can mend, whatever the program leaves open besides.
+    reason[foreign & (reason == REASONS.index(Reason.START_UNKNOWN))] = CERTAIN
+    _rule_out(reason, foreign, Reason.AXIS_UNKNOWN)
     for axis in machine.axes:
         if axis.travel is None:
             continue

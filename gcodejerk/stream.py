@@ -126,8 +126,8 @@ class Batch:
         return knots[begin:] * self.grid.interval, out
 
 
-def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[Batch]:
-    """Streams of all planned moves, batch by batch, in the order of the moves.
+def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[list[Batch]]:
+    """Streams of all planned moves, window by window.
 
     Parameters
     ----------
@@ -140,17 +140,23 @@ def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[Batc
 
     Yields
     ------
-    Batch
-        Together they hold each planned move once.
+    list of Batch
+        The moves of a window, each once; windows come in the order of the moves. A batch is a
+        matrix as wide as its longest move, so those of a window hold moves of like duration.
     """
     planned = np.nonzero(plans.planned)[0]
+    samples = np.cumsum(plans.counts[planned])
     begin = 0
     while begin < len(planned):
-        # A batch is a matrix: as wide as its longest move.
-        widest = np.maximum.accumulate(plans.counts[planned[begin : begin + BATCH_SAMPLES]])
-        cells = widest * np.arange(1, len(widest) + 1)
-        end = begin + max(1, int(np.searchsorted(cells, BATCH_SAMPLES, side="right")))
-        yield _make_batch(plans, planned[begin:end], spelling.take(planned[begin:end]), stride)
+        before = samples[begin - 1] if begin else 0
+        end = max(begin + 1, int(np.searchsorted(samples, before + BATCH_SAMPLES, side="right")))
+        window = planned[begin:end]
+        # Of like duration: within a factor of two.
+        octave = np.frexp(plans.counts[window].astype(float))[1]
+        yield [
+            _make_batch(plans, moves, spelling.take(moves), stride)
+            for moves in (window[octave == k] for k in np.unique(octave))
+        ]
         begin = end
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.nc import Rapids
+from gcodejerk.plans import Plans
 from gcodejerk.stream import Batch, Spelling
 from gcodejerk.units import MM_PER_INCH
 
@@ -66,8 +67,8 @@ class Controller(Protocol):
         """Steps and origins for all rapids of a program."""
         ...
 
-    def notes(self, machine: Machine) -> list[str]:
-        """What a user of this machine file has to know."""
+    def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
+        """What a user of these streams has to know."""
         ...
 
     def header(self, machine: Machine) -> bytes:

@@ -17,6 +17,7 @@ from gcodejerk.emit.base import Form, Options, decimal_step, step_sizes
 from gcodejerk.emit.digits import Column, format_lines
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.nc import Rapids
+from gcodejerk.plans import Plans
 from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
 
 
@@ -38,7 +39,7 @@ class CsvController:
         step = np.broadcast_to(step_sizes(machine, inch=False), rapids.start.shape)
         return Spelling(rapids.start, step, np.zeros_like(rapids.start))
 
-    def notes(self, machine: Machine) -> list[str]:
+    def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """Nothing to say."""
         return []
 

@@ -32,6 +32,7 @@ from gcodejerk.emit.base import Form, Options, axis_steps, step_sizes
 from gcodejerk.emit.digits import Column, format_lines
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.nc import Block, Rapids, parse_block
+from gcodejerk.plans import Plans
 from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
 from gcodejerk.units import MM_PER_INCH, per_minute
 
@@ -76,14 +77,23 @@ class LinuxcncController:
         origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
         return Spelling(rapids.start, step, origin)
 
-    def notes(self, machine: Machine) -> list[str]:
-        """Where the machine file contradicts how LinuxCNC moves."""
-        if machine.positioning == "linear":
-            return []
-        return [
-            "LinuxCNC itself moves G0 in a straight line, but the machine file says positioning: "
-            "independent; rapids of several axes are written as the dogleg of the machine file"
-        ]
+    def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
+        """Where the machine file contradicts how LinuxCNC moves; what the program leaves open."""
+        notes = []
+        if plans.machine.positioning != "linear":
+            notes.append(
+                "LinuxCNC itself moves G0 in a straight line, but the machine file says "
+                "positioning: independent; rapids of several axes are written as its dogleg"
+            )
+        open_mode = plans.planned & (rapids.path == 0)
+        if open_mode.any():
+            line = int(rapids.line[np.argmax(open_mode)])
+            notes.append(
+                f"line {line}: no G61 or G64 before this rapid: streams rely on G64, in which "
+                "LinuxCNC usually starts; state it in the program, or in the machine file's "
+                "program.startup"
+            )
+        return notes
 
     def header(self, machine: Machine) -> bytes:
         """Nothing: the streams stand in the program."""
@@ -109,7 +119,7 @@ class LinuxcncController:
         for row, move in enumerate(moves):
             frame = _Frame(rapids, int(move), parsed[row], blocks[row])
             last = frame.last_point(points[row].before_end, int(feed[row, -1]))
-            follows = row > 0 and _adjacent(batch, rapids, row)
+            follows = _follows_stream(batch.plans, rapids, int(move))
             lines = [
                 *frame.head(options.comments),
                 *frame.setup(follows),
@@ -281,10 +291,12 @@ def _plain(number: Decimal) -> bytes:
     return (text if "." in text else text + ".").encode()
 
 
-def _adjacent(batch: Batch, rapids: Rapids, row: int) -> bool:
-    """Whether the block directly before this one is a stream too: the machine then rests."""
-    before, move = batch.moves[row - 1], batch.moves[row]
-    return bool(rapids.line[before] + 1 == rapids.line[move])
+def _follows_stream(plans: Plans, rapids: Rapids, move: int) -> bool:
+    """Whether the block directly before is a stream too: the machine then rests."""
+    before = move - 1
+    return bool(
+        before >= 0 and plans.planned[before] and rapids.line[before] + 1 == rapids.line[move]
+    )
 
 
 def _path_speed(batch: Batch, rapids: Rapids) -> NDArray[np.float64]:

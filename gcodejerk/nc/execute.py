@@ -41,6 +41,8 @@ class Step:
     fault: bool = False
     unknown: bool = False
     """A code that the dialect does not know."""
+    ends: bool = False
+    """The program ends behind the block's motion."""
 
 
 class Executor:
@@ -125,6 +127,9 @@ class Executor:
         step.fault = True
         before, state.touched, ended = state.touched, set(), state.ended
         self._act(codes, step)
+        if step.ends:
+            state.forget()
+            step.ends = False
         touched, state.touched = state.touched, before
         state.ended = ended
         state.forget_touched(touched)
@@ -190,7 +195,7 @@ class Executor:
         self._move(codes, step)
         for m in codes.m:
             if m in (2, 30, 99) and self.dialect.m_groups[m] == "stop":
-                self.end()
+                step.ends = True
 
     def _miscellaneous(self, m: int, step: Step) -> None:
         """Execute an M code, the end of the program excepted."""

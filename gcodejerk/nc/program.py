@@ -168,6 +168,8 @@ class Reader:
             self.log.feed_event(step.feed_event)
         if step.rapid:
             self._rapid(step, (number, begin, begin + len(text), terminator))
+        if step.ends:
+            executor.end()
         if state.ended:
             self.flow.end_of_subprogram()
             if before is not None:

@@ -29,7 +29,7 @@ LONGEST_STREAM = 1 << 26
 """Bytes of one stream; more is not read."""
 
 # No axis needs more digits; numbers without bounds would be a way to stall the reading.
-_NUMBER = rb"[-+]?+(?:[0-9]{1,9}+(?:\.[0-9]{0,20}+)?+|\.[0-9]{1,20}+)(?![0-9.])"
+_NUMBER = rb"[-+]?+(?:[0-9]{1,9}+(?:\.[0-9]{0,250}+)?+|\.[0-9]{1,250}+)(?![0-9.])"
 _WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
 _WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
 _IS_POINT = re.compile(rb"[ \t]*G0?1(?![0-9.])")

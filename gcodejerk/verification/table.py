@@ -21,7 +21,7 @@ from gcodejerk.verification.points import STANDSTILL, Array, Paths
 PIECE = 1 << 20
 EXACT = 1e-11
 """A position in mm written in full. [mm]"""
-_NUMBER = rb"-?(?:[0-9]{1,9}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})"
+_NUMBER = rb"-?(?:[0-9]{1,9}(?:\.[0-9]{0,250})?|\.[0-9]{1,250})"
 
 
 class TableReader:

@@ -42,8 +42,8 @@ def best_of(function, repeats=3):
 def points_of(plans, displacement):
     """Sample and round every planned move; how many points that are."""
     zero = np.zeros_like(displacement)
-    batches = make_streams(plans, Spelling(zero, np.full_like(zero, 1e-4), zero), 2)
-    return sum(int(batch.grid.blocks.sum()) for batch in batches)
+    windows = make_streams(plans, Spelling(zero, np.full_like(zero, 1e-4), zero), 2)
+    return sum(int(batch.grid.blocks.sum()) for window in windows for batch in window)
 
 
 def main():

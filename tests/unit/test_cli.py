@@ -121,7 +121,6 @@ def test_diff_shows_what_patch_would_apply(run, folder):
 def test_several_programs_go_to_a_folder_and_one_bad_one_stops_none(run, folder):
     (folder / "bad.nc").write_bytes(b"G0 X1\0\n")
     (folder / "b.nc").write_bytes(PROGRAM)
-    (folder / "out").mkdir()
     files = ("part.nc", "bad.nc", "b.nc")
     for jobs in ("1", "2"):
         done = run("process", *files, "-m", "vmc", "--output-dir", "out", "--jobs", jobs)

@@ -74,15 +74,7 @@ def test_the_rest_of_a_block_stands_before_its_stream(block, kept):
     assert before == ([] if kept is None else [kept]) + [b"G4 P0"]
 
 
-LEFT = pytest.mark.xfail(
-    strict=True, reason="read as the state after the end: 'cutter compensation active'"
-)
-
-
-@pytest.mark.parametrize(
-    "stop",
-    [b"M0", b"M1", b"M60", pytest.param(b"M2", marks=LEFT), pytest.param(b"M30", marks=LEFT)],
-)
+@pytest.mark.parametrize("stop", [b"M0", b"M1", b"M60", b"M2", b"M30"])
 def test_the_program_stops_after_the_stream(stop):
     program = HEAD + b"G0 X3 " + stop + b"\n"
     _, _, after = parts(stream_of(program))

@@ -7,14 +7,14 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.machine.find import shipped_machines
 
 
-def test_three_machines_are_shipped():
-    assert list(shipped_machines()) == ["drill", "router", "vmc"]
+def test_three_machines_and_the_papers_example_are_shipped():
+    assert list(shipped_machines()) == ["drill", "paper", "router", "vmc"]
 
 
 @pytest.mark.parametrize("name", sorted(shipped_machines()))
 def test_a_shipped_machine_is_found_by_name_and_read_without_findings(name):
     machine = Machine.load(find_machine(name))
-    assert machine.axis_names == ("X", "Y", "Z")
+    assert machine.axis_names == (("Z",) if name == "paper" else ("X", "Y", "Z"))
     assert machine.all_modes()
 
 
@@ -35,7 +35,7 @@ def test_an_unknown_name_is_refused_with_the_shipped_ones_and_the_nearest():
     with pytest.raises(MachineError) as caught:
         find_machine("vcm")
     assert str(caught.value) == (
-        "no machine is called 'vcm', shipped are drill, router, vmc; did you mean 'vmc'?\n"
+        "no machine is called 'vcm', shipped are drill, paper, router, vmc; did you mean 'vmc'?\n"
         "  for a file of your own give its path and suffix, for example ./vcm.yaml"
     )
 

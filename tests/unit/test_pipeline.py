@@ -107,6 +107,12 @@ def test_independent_positioning_on_linuxcnc_is_noted():
     assert any("straight line" in note for note in result.notes)
 
 
+def test_a_path_mode_that_nobody_states_is_noted():
+    assert not any("G64" in note for note in process(PROGRAM, VMC).notes)
+    (note,) = process(PROGRAM.replace(b" G64", b""), VMC).notes
+    assert note.startswith("line 3: no G61 or G64")
+
+
 def test_progress_goes_through_all_steps():
     seen = []
     process_file(
