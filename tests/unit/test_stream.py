@@ -51,10 +51,24 @@ def spelling_of(displacement, start=0.0, step=0.001, origin=0.0):
     return Spelling(*(np.broadcast_to(np.asarray(x, float), shape) for x in (start, step, origin)))
 
 
+def by_move(batches):
+    """The batch and row of each move."""
+    return {int(move): (batch, k) for batch in batches for k, move in enumerate(batch.moves)}
+
+
 def streams(displacement, machine=MACHINE, stride=1, profile=None, **spelling):
     """All batches of some moves."""
     plans = plan_moves(displacement, machine, profile)
-    return list(make_streams(plans, spelling_of(displacement, **spelling), stride))
+    windows = make_streams(plans, spelling_of(displacement, **spelling), stride)
+    return [batch for window in windows for batch in window]
+
+
+def one_batch(displacement, machine=MACHINE, stride=1, profile=None, **spelling):
+    """All planned moves in one batch, short ones behind much padding."""
+    plans = plan_moves(displacement, machine, profile)
+    moves = np.nonzero(plans.planned)[0]
+    spelling = spelling_of(displacement, **spelling).take(moves)
+    return stream._make_batch(plans, moves, spelling, stride)
 
 
 @pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
@@ -62,7 +76,7 @@ def streams(displacement, machine=MACHINE, stride=1, profile=None, **spelling):
 def test_points_are_whole_steps_between_exact_ends(machine, stride):
     displacement = drawn_moves(30)
     start = np.random.default_rng(2).uniform(-9, 9, displacement.shape)
-    (batch,) = streams(displacement, machine, stride, start=start)
+    batch = one_batch(displacement, machine, stride, start=start)
     assert batch.moves.tolist() == list(range(30))
     for row in range(30):
         t, q = batch.positions(row)
@@ -83,7 +97,7 @@ def test_points_are_whole_steps_between_exact_ends(machine, stride):
 @pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
 def test_the_residual_is_that_of_the_points_as_written(machine):
     displacement = drawn_moves(12, seed=5)
-    (batch,) = streams(displacement, machine, start=0.00037)
+    batch = one_batch(displacement, machine, start=0.00037)
     modes = batch.plans.modes
     for row in range(12):
         t, q = batch.positions(row)
@@ -95,7 +109,7 @@ def test_the_residual_is_that_of_the_points_as_written(machine):
 
 def test_the_conventional_residual_is_that_of_the_controller_s_samples():
     displacement = drawn_moves(12, seed=6)
-    (batch,) = streams(displacement, INDEPENDENT)
+    batch = one_batch(displacement, INDEPENDENT)
     plans, modes = batch.plans, batch.plans.modes
     for row in range(12):
         laws = list(plans.laws_of(row))
@@ -115,7 +129,7 @@ def test_the_conventional_residual_is_that_of_the_controller_s_samples():
 
 
 def test_velocities_are_those_of_the_law():
-    (batch,) = streams(drawn_moves(10, seed=7))
+    batch = one_batch(drawn_moves(10, seed=7))
     for axis, velocity in batch.velocity.items():
         for row in range(10):
             t, _ = batch.positions(row)
@@ -131,32 +145,39 @@ def test_velocities_are_those_of_the_law():
 def test_many_small_batches_are_the_same_as_one(machine, samples, monkeypatch):
     displacement = drawn_moves(25, seed=3)
     displacement[4] = 0.0
-    (whole,) = streams(displacement, machine, 2)
+    whole = by_move(streams(displacement, machine, 2))
     monkeypatch.setattr(stream, "BATCH_SAMPLES", samples)
     parts = streams(displacement, machine, 2)
     assert len(parts) > 3
     if samples == 1:
         assert [len(part) for part in parts] == [1] * 24
-    assert np.concatenate([part.moves for part in parts]).tolist() == whole.moves.tolist()
-    row = 0
-    for part in parts:
-        for k in range(len(part)):
-            (t, q), (expected_t, expected_q) = part.positions(k), whole.positions(row)
-            np.testing.assert_array_equal(t, expected_t)
-            np.testing.assert_array_equal(q, expected_q)
-            np.testing.assert_allclose(part.residual[k], whole.residual[row], rtol=1e-6, atol=1e-12)
-            np.testing.assert_allclose(
-                part.conventional_residual[k], whole.conventional_residual[row], rtol=1e-6
-            )
-            assert part.kept[k] == whole.kept[row]
-            row += 1
-    assert row == 24
+    made = by_move(parts)
+    assert sorted(made) == sorted(whole) == [k for k in range(25) if k != 4]
+    for move, (part, k) in made.items():
+        other, row = whole[move]
+        (t, q), (expected_t, expected_q) = part.positions(k), other.positions(row)
+        np.testing.assert_array_equal(t, expected_t)
+        np.testing.assert_array_equal(q, expected_q)
+        np.testing.assert_allclose(part.residual[k], other.residual[row], rtol=1e-6, atol=1e-12)
+        np.testing.assert_allclose(
+            part.conventional_residual[k], other.conventional_residual[row], rtol=1e-6
+        )
+        assert part.kept[k] == other.kept[row]
 
 
-def test_a_batch_holds_about_as_many_samples_as_it_may(monkeypatch):
+def test_a_window_holds_about_as_many_samples_as_it_may(monkeypatch):
     monkeypatch.setattr(stream, "BATCH_SAMPLES", 3000)
-    for batch in streams(drawn_moves(60, seed=8)):
-        assert len(batch) == 1 or len(batch) * batch.plans.counts[batch.moves].max() <= 3000
+    displacement = drawn_moves(60, seed=8)
+    plans = plan_moves(displacement, MACHINE)
+    last = -1
+    for window in make_streams(plans, spelling_of(displacement), 1):
+        moves = np.sort(np.concatenate([batch.moves for batch in window]))
+        assert len(moves) == 1 or plans.counts[moves].sum() <= 3000
+        assert moves[0] > last, "windows come in the order of the moves"
+        last = moves[-1]
+        for batch in window:
+            counts = plans.counts[batch.moves]
+            assert counts.max() < 2 * counts.min(), "a batch is a matrix of little padding"
 
 
 def test_moves_that_are_not_planned_have_no_stream():
@@ -164,8 +185,8 @@ def test_moves_that_are_not_planned_have_no_stream():
     reason = np.full(4, CERTAIN, np.uint8)
     reason[[0, 2]] = REASONS.index(Reason.EXPRESSION)
     plans = plan_moves(displacement, MACHINE, reason=reason)
-    batches = list(make_streams(plans, spelling_of(displacement), 1))
-    assert [batch.moves.tolist() for batch in batches] == [[1, 3]]
+    windows = list(make_streams(plans, spelling_of(displacement), 1))
+    assert sorted(m for (*batches,) in windows for b in batches for m in b.moves) == [1, 3]
     reason[:] = REASONS.index(Reason.EXPRESSION)
     plans = plan_moves(displacement, MACHINE, reason=reason)
     assert list(make_streams(plans, spelling_of(displacement), 1)) == []
@@ -174,7 +195,7 @@ def test_moves_that_are_not_planned_have_no_stream():
 def test_an_axis_that_moves_a_few_steps_is_written_finer():
     displacement = np.zeros((2, len(AXES)))
     displacement[:, X], displacement[:, Z] = 20.0, (0.0079, 0.0081)
-    (batch,) = streams(displacement)
+    batch = one_batch(displacement)
     assert batch.fine[:, Z].tolist() == [True, False]
     assert not batch.fine[:, X].any()
     step = 0.001 / 10**FINE_DECIMALS
@@ -187,7 +208,7 @@ def test_an_axis_that_moves_a_few_steps_is_written_finer():
 def test_increments_are_counted_from_the_start():
     displacement = drawn_moves(5, seed=9)
     start = np.full(displacement.shape, 1.23456)
-    (batch,) = streams(displacement, start=start, origin=start)
+    batch = one_batch(displacement, start=start, origin=start)
     for row in range(5):
         _, q = batch.positions(row)
         for axis in (X, Z):
@@ -200,7 +221,7 @@ def test_an_axis_that_stands_at_an_unknown_place_spoils_nothing():
     displacement[0, X], displacement[1, Z] = 5.0, -3.0
     start = np.zeros(displacement.shape)
     start[0, Z] = start[1, X] = np.nan
-    (batch,) = streams(displacement, start=start)
+    batch = one_batch(displacement, start=start)
     assert np.isfinite(batch.residual).all()
     _, q = batch.positions(0)
     assert np.isfinite(q[:, X]).all()
@@ -211,7 +232,7 @@ def test_where_rounding_spoils_a_design_the_conventional_law_is_written():
     # Steps of 1 mm: whatever was designed, the rounding decides, and never for the worse.
     displacement = np.zeros((40, len(AXES)))
     displacement[:, Z] = np.linspace(9.0, 60.0, 40)
-    (batch,) = streams(displacement, step=1.0)
+    batch = one_batch(displacement, step=1.0)
     design_kept = batch.plans.kept
     fallen_back = batch.kept & ~design_kept
     assert fallen_back.any(), "no case of the fallback among these moves"
@@ -230,7 +251,7 @@ def test_where_rounding_spoils_a_design_the_conventional_law_is_written():
 def test_a_kept_law_reaches_its_end_before_the_last_interval_has_passed():
     displacement = np.zeros((1, len(AXES)))
     displacement[0, Z] = 1.07
-    (batch,) = streams(displacement, profile="conventional")
+    batch = one_batch(displacement, profile="conventional")
     assert batch.kept.all()
     t, q = batch.positions(0)
     assert t[-1] == pytest.approx(np.ceil(float(batch.plans.conventional_time[0]) * 1e3) / 1e3)
