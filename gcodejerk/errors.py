@@ -74,6 +74,8 @@ class VerifyError(GcodejerkError):
 
 def _excerpt(text: str, column: int | None, width: int = 76) -> list[str]:
     """The offending line and a caret below it, cut to a window around the column."""
+    if column is not None and column > len(text) + 1:
+        return []
     begin = 0
     if column is not None and column > width - 10:
         begin = column - width // 2

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, BinaryIO
 
 from gcodejerk.errors import EmitError, ProgramError
 
@@ -92,14 +92,15 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
     EmitError
         It cannot be written: a full disk, a folder that is missing or read-only.
     """
-    if path == STANDARD:
+    place = Path(path)
+    # A pipe or a device is written to; only a file can be replaced by another one.
+    special = path != STANDARD and place.exists() and not (place.is_file() or place.is_dir())
+    if path == STANDARD or special:
         with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:
             yield spool  # type: ignore[misc]
             spool.seek(0)
-            shutil.copyfileobj(spool, sys.stdout.buffer)
-            sys.stdout.buffer.flush()
+            _pass_on(spool, path)
         return
-    place = Path(path)
     # A link stays a link: what it points to is replaced.
     place = Path(os.path.realpath(place)) if place.is_symlink() else place
     temporary: str | None = None
@@ -123,6 +124,24 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
         if temporary is not None:
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
+
+
+def _pass_on(spool: IO[bytes], path: str) -> None:
+    """Copy a finished output to standard output, a pipe or a device."""
+    try:
+        if path == STANDARD:
+            shutil.copyfileobj(spool, sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+        else:
+            with open(path, "wb") as file:
+                shutil.copyfileobj(spool, file)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        name = "standard output" if path == STANDARD else path
+        raise EmitError(
+            f"{name} cannot be written: {error.strerror}", "what was written of it is incomplete"
+        ) from error
 
 
 def make_folder(path: str) -> None:

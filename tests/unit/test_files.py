@@ -53,6 +53,23 @@ def test_a_link_stays_a_link(tmp_path):
     assert (tmp_path / "real.nc").read_bytes() == b"new"
 
 
+def test_a_device_is_written_to_and_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    reader = subprocess.Popen(["cat", tmp_path / "pipe"], stdout=subprocess.PIPE)
+    with new_file(str(tmp_path / "pipe")) as file:
+        file.write(b"G0 X1\n")
+    assert reader.communicate()[0] == b"G0 X1\n"
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_full_device_is_an_error():
+    with (
+        pytest.raises(EmitError, match="/dev/full cannot be written"),
+        new_file("/dev/full") as out,
+    ):
+        out.write(b"G0 X1\n")
+
+
 def test_a_missing_folder_is_an_error_with_the_name(tmp_path):
     with pytest.raises(EmitError, match=r"no/out\.nc cannot be written"), new_file("no/out.nc"):
         pass
