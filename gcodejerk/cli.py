@@ -30,6 +30,7 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 machine_app = typer.Typer(help="Check machine files.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(machine_app, name="machine")
