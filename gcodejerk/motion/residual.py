@@ -167,9 +167,11 @@ def _exponential(pole: complex, duration: Array) -> Complex:
 
 def _ramp(pole: complex, duration: Array, power: Complex) -> Complex:
     """What a ramp of the acceleration does, seen from its end: (exp(x) - 1)/x, 1 for a step."""
+    x = pole * duration
     step = duration == 0.0
-    x = np.where(step, 1.0, pole * duration)
-    power = np.where(step, 2.0, power)
+    if step.any():
+        x = np.where(step, 1.0, x)
+        power = np.where(step, 2.0, power)
     factor: Complex = (power - 1.0) / x
     return factor
 
