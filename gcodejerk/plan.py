@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import (
+    GRID_TOLERANCE,
     Laws,
     conventional_laws,
     design_condition3,
     design_four_segments,
     four_segment_range,
     laws_response,
+    whole_intervals,
 )
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Rapids
@@ -29,8 +31,6 @@ PROFILES = ("condition3", "conventional")
 """The profiles that this version designs."""
 STANDSTILL = 1e-9
 """An axis that moves less than this does not move [mm] or [deg]."""
-GRID_TOLERANCE = 1e-6
-"""A time this little above a whole number of intervals is that number [intervals]."""
 
 
 def path_length(displacement: Array, machine: Machine) -> Array:
@@ -208,7 +208,7 @@ class _Planner:
         total = (
             self.conventional.total if self.time is None else np.full(len(self.share), self.time)
         )
-        counts = np.ceil(total / self.interval - GRID_TOLERANCE).astype(np.int64)
+        counts = whole_intervals(total, self.interval)
         counts = np.maximum(counts, 1)
         if self.profile == "conventional":
             laws, feasible = self._conventional(counts)
@@ -326,7 +326,7 @@ class _Planner:
         longest = (1.0 + self.machine.design.max_extension) * self.conventional.total
         most = np.floor(longest / self.interval + GRID_TOLERANCE).astype(np.int64)
         fastest = conventional_laws(*self.limits, self.interval).total
-        least = np.ceil(fastest / self.interval - GRID_TOLERANCE).astype(np.int64)
+        least = whole_intervals(fastest, self.interval)
         counts[rows] = np.maximum(counts[rows] + 1, least[rows])
         for _ in range(8):
             rows = rows[counts[rows] <= most[rows]]
@@ -416,7 +416,7 @@ class _Planner:
         """A time too short for the limits, with the least that would do."""
         V, A, J = (limit[row : row + 1] for limit in self.limits)
         fastest = conventional_laws(V, A, J, self.interval)
-        least = float(np.ceil(fastest.total[0] / self.interval - GRID_TOLERANCE) * self.interval)
+        least = float(whole_intervals(fastest.total, self.interval)[0] * self.interval)
         if total >= 4.0 * self.interval:
             law = _squeezed(fastest, total, self.interval)
             if bool((law.velocity > V) | (law.acceleration > A) | (law.jerk > J)):

@@ -25,6 +25,7 @@ from gcodejerk.motion import (
     round_positions,
     sample_laws,
     sampled_response,
+    whole_intervals,
 )
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.residual import Complex
@@ -230,7 +231,7 @@ class _Maker:
     def conventional_residual(self) -> Array:
         """Of the controller's own rapid, sampled at the interval, shape (b, m) [mm]."""
         laws = self.plans.conventional.take(self.rows)
-        counts = np.ceil(laws.total / self.interval - 1e-6).astype(np.int64)
+        counts = whole_intervals(laws.total, self.interval)
         longest = np.zeros(len(self.moves), dtype=np.int64)
         np.maximum.at(longest, self.row_of, counts)
         return residual_displacement(self._response(laws, longest), self.modes.poles)

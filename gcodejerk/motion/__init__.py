@@ -16,9 +16,17 @@ from gcodejerk.motion.residual import (
     residual_displacement,
 )
 from gcodejerk.motion.rounding import round_positions
-from gcodejerk.motion.sampling import Grid, knots_response, sample_laws, sampled_response
+from gcodejerk.motion.sampling import (
+    GRID_TOLERANCE,
+    Grid,
+    knots_response,
+    sample_laws,
+    sampled_response,
+    whole_intervals,
+)
 
 __all__ = [
+    "GRID_TOLERANCE",
     "Grid",
     "Laws",
     "conventional_laws",
@@ -34,4 +42,5 @@ __all__ = [
     "round_positions",
     "sample_laws",
     "sampled_response",
+    "whole_intervals",
 ]

@@ -18,9 +18,6 @@ from gcodejerk.motion.laws import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.sampling import Counts, Grid
 
-MINIMUM_STEPS = 4.0
-"""A move of fewer steps than this has no room between its ends."""
-
 
 def round_positions(
     positions: Array, grid: Grid, step: Array, origin: Array, poles: Complex, weights: Array

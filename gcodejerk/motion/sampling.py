@@ -18,6 +18,9 @@ from gcodejerk.motion.residual import Complex
 
 Counts = NDArray[np.int64]
 
+GRID_TOLERANCE = 1e-6
+"""A time this little above a whole number of intervals is that number [intervals]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
@@ -63,6 +66,20 @@ class Grid:
         """Number of written points of each move, the start not counted."""
         blocks: Counts = np.count_nonzero(self.knots, axis=1)
         return blocks
+
+
+def whole_intervals(time: Array, interval: float) -> Counts:
+    """A time rounded up to whole intervals.
+
+    A time that is longer than a whole number by rounding errors alone is that number.
+
+    Examples
+    --------
+    >>> whole_intervals(np.array([0.04 + 1e-12, 0.0401]), 0.001).tolist()
+    [40, 41]
+    """
+    counts: Counts = np.ceil(time / interval - GRID_TOLERANCE).astype(np.int64)
+    return counts
 
 
 def sample_laws(laws: Laws, moments: Counts, interval: float) -> tuple[Array, Array]:

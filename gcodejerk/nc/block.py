@@ -42,8 +42,3 @@ class Block:
     problem: str | None = None
     column: int | None = None
     """Where the problem is, counted from 1."""
-
-    @property
-    def o_word_flag(self) -> bool:
-        """Whether the line is an O-word line."""
-        return self.o_word is not None

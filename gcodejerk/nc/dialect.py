@@ -43,8 +43,6 @@ class Dialect:
     """Letter -> codes ("G43", "M66") one of which has to stand in the block or be in force."""
     line_limit: int
     """Longest line that the controller reads, in bytes."""
-    start_of_file: bytes = b"%"
-    percent_alone: bool = True
     rapid: int = 0
     cycles: frozenset[int] = field(default_factory=frozenset)
     frame_changes: frozenset[int] = field(default_factory=frozenset)

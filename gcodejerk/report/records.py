@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gcodejerk import __version__
 from gcodejerk.machine import AXES, Machine
+from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.laws import Array
 from gcodejerk.move import Plan
 from gcodejerk.nc import Rapids
@@ -37,7 +38,7 @@ class Records:
         self.plans, self.kept = plans, kept
         self.residual, self.conventional = residual, conventional
         interval = plans.machine.interval
-        usual = np.ceil(plans.conventional_time / interval - 1e-6)
+        usual = whole_intervals(plans.conventional_time, interval)
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
         self.extension = extra * interval
         written = kept[plans.move] if len(plans) else np.zeros(0, dtype=bool)

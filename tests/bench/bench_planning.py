@@ -8,9 +8,9 @@ for all of them over that of the one call.
 """
 
 import argparse
-import time
 
 import numpy as np
+from timing import best_of
 
 from gcodejerk.machine import AXES, Machine, find_machine
 from gcodejerk.plan import plan_moves
@@ -27,16 +27,6 @@ def moves(machine, axes, count, longest):
     for k, axis in enumerate(axes):
         out[:, AXES.index(axis)] = length * direction[:, k]
     return random.permutation(out)
-
-
-def best_of(function, repeats=3):
-    """Least of some wall times, and the result."""
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        result = function()
-        times.append(time.perf_counter() - begin)
-    return min(times), result
 
 
 def points_of(plans, displacement):

@@ -14,9 +14,9 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 
 import numpy as np
+from timing import best_of
 
 from gcodejerk.nc import CERTAIN, read_program
 
@@ -74,16 +74,6 @@ def plain_tracker(data):
         if motion == 0 and start is not None:
             rapids.append((number, start, dict(position)))
     return rapids
-
-
-def best_of(function, repeats=3):
-    """Least of some wall times, and the result."""
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        result = function()
-        times.append(time.perf_counter() - begin)
-    return min(times), result
 
 
 def main():

@@ -9,22 +9,12 @@ in points too.
 """
 
 import argparse
-import time
 
 import numpy as np
+from timing import best_of
 
 from gcodejerk import Machine, find_machine, process
 from gcodejerk.emit.digits import Column, format_lines
-
-
-def best_of(function, repeats=3):
-    """Least of some wall times, and the result."""
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        result = function()
-        times.append(time.perf_counter() - begin)
-    return min(times), result
 
 
 def numbers(axes, count):

@@ -117,7 +117,7 @@ def test_words_and_comments_of_a_block_are_where_they_say(text):
     for begin, end in block.comments:
         assert text[begin : begin + 1] in (b"(", b";")
         assert end <= len(text)
-    if block.problem is None and not block.o_word_flag and not block.percent:
+    if block.problem is None and block.o_word is None and not block.percent:
         read = sum(w.end - w.begin for w in block.words)
         read += sum(end - begin for begin, end in block.comments)
         assert read <= len(text)
