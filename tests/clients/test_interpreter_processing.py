@@ -83,7 +83,7 @@ def programs():
 
 
 def assert_same_motion(path, machine, folder):
-    """Process one program and compare; gives (rewritten, rapids), or None where LinuxCNC refuses it."""
+    """Process one program and compare: (rewritten, rapids), or None where LinuxCNC refuses it."""
     original = events(path)
     if original is None:
         return None
