@@ -1,0 +1,65 @@
+"""The command line: arguments, files, printing, exit codes. It decides nothing.
+
+Exit status: 0 done, 1 refused or failed (with a message, and nothing half-written), 2 wrong usage.
+Heavy modules are imported inside the commands, so that `--help` answers at once. The commands stand
+in one module per group; this one puts them together and owns what becomes of an error.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from gcodejerk import __version__
+from gcodejerk.cli.machines import controllers, machine_check, machine_schema
+from gcodejerk.cli.moves import plan
+from gcodejerk.cli.programs import inspect, process
+from gcodejerk.errors import GcodejerkError
+
+app = typer.Typer(
+    help="Rapids that do not shake the machine: re-times the G0 moves of an NC program.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+machine_app = typer.Typer(help="Check machine files.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(machine_app, name="machine")
+
+for command in (process, inspect, plan, controllers):
+    app.command()(command)
+machine_app.command("check")(machine_check)
+machine_app.command("schema")(machine_schema)
+
+
+def main() -> None:
+    """Run the command line; every mistake of a user is a message, every other one a traceback."""
+    try:
+        app(standalone_mode=True)
+    except GcodejerkError as error:
+        sys.stdout.flush()
+        print(error, file=sys.stderr)
+        sys.exit(1)
+    except BrokenPipeError:
+        # Whoever read our output has enough. Nothing more can be printed, not even at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def _version(value: bool) -> None:
+    if value:
+        print(f"gcodejerk {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="show the version")
+    ] = False,
+) -> None:
+    """Options of all commands."""
