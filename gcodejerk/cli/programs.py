@@ -1,0 +1,171 @@
+"""The commands that take programs: `process` and `inspect`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
+
+if TYPE_CHECKING:
+    from gcodejerk.machine import Machine
+    from gcodejerk.pipeline import Settings
+
+
+def process(
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="programs; - is standard input")
+    ],
+    machine: MachineOption,
+    output: Annotated[
+        str | None,
+        typer.Option("-o", "--output", metavar="OUT", help="output file; - is standard output"),
+    ] = None,
+    output_dir: Annotated[
+        str | None, typer.Option(metavar="DIR", help="write each program under its own name here")
+    ] = None,
+    in_place: Annotated[bool, typer.Option("--in-place", help="replace each program")] = False,
+    controller: Annotated[
+        str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
+    ] = None,
+    form: Annotated[str, typer.Option("--as", help="stream, pvt or parameters")] = "stream",
+    profile: ProfileOption = None,
+    dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    report: Annotated[str | None, typer.Option(metavar="FILE.json", help="write a report")] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="refuse a program with rapids left alone")
+    ] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="write nothing; exit 1 if anything would change")
+    ] = False,
+    diff: Annotated[
+        bool, typer.Option("--diff", help="write nothing; print what would change")
+    ] = False,
+    no_verify: Annotated[
+        bool, typer.Option("--no-verify", help="do not read the output back")
+    ] = False,
+    no_comments: Annotated[
+        bool, typer.Option("--no-comments", help="do not name replaced blocks")
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="accept a program processed before")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
+) -> None:
+    """Rewrite every rapid that is certain; verify; write the result in one move."""
+    from gcodejerk.batch import Job, run_jobs
+    from gcodejerk.files import make_folder
+    from gcodejerk.pipeline import Settings
+
+    if sum(map(bool, (output, output_dir, in_place))) > 1:
+        raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
+    if len(files) > 1 and (output is not None or report is not None):
+        raise typer.BadParameter("-o and --report take one program; use --output-dir for several")
+    if report is not None and not report.endswith(".json"):
+        raise typer.BadParameter(f"--report {report}: a report is a .json file in this version")
+    if in_place and "-" in files:
+        raise typer.BadParameter("--in-place needs a file, not standard input")
+    settings = Settings(
+        controller=controller,
+        form=form,
+        profile=profile,
+        dialect=dialect,
+        comments=not no_comments,
+        verify=not no_verify,
+        force=force,
+    )
+    mode = "check" if check else "diff" if diff else "write"
+    described = load_machine(machine, files[0])
+    jobs_list = [
+        Job(
+            file,
+            _output(file, output, output_dir, in_place, described, settings),
+            report,
+            mode,
+            in_place,
+            strict,
+        )
+        for file in files
+    ]
+    if output_dir is not None and mode == "write":
+        make_folder(output_dir)
+    to_stdout = diff or any(job.output == "-" for job in jobs_list)
+    failed = changed = False
+    with progress(quiet or jobs > 1) as show:
+        for done in run_jobs(jobs_list, described, settings, jobs, show):
+            if done.error is not None:
+                print(done.error, file=sys.stderr)
+                failed = True
+                continue
+            changed |= done.changed
+            if done.diff:
+                sys.stdout.flush()
+                sys.stdout.buffer.write(done.diff)
+            for note in () if quiet else done.notes:
+                print(f"{done.input}: note: {note}", file=sys.stderr)
+            if check and done.changed:
+                print(f"{done.input}: would be changed", file=sys.stdout)
+            elif not quiet:
+                print(done.summary, file=sys.stderr if to_stdout else sys.stdout)
+    if failed or (check and changed):
+        raise typer.Exit(1)
+
+
+def inspect(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="a program; - is standard input")],
+    machine: MachineOption,
+    profile: ProfileOption = None,
+    dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print the report as JSON")] = False,
+) -> None:
+    """Show all rapids of a program: planned, or left alone and why."""
+    from gcodejerk.batch import record_of
+    from gcodejerk.files import open_input
+    from gcodejerk.pipeline import Settings, process_file
+    from gcodejerk.report.tables import rapids_table, summary_line
+
+    described = load_machine(machine, file)
+    settings = Settings(profile=profile, dialect=dialect, force=True)
+    with open_input(file) as source, progress(as_json) as show:
+        result = process_file(source, None, described, settings, file, show)
+        record = record_of(result, described, None, source)
+    if as_json:
+        print(json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False))
+        return
+    console().print(rapids_table(record))
+    for note in record["notes"]:
+        print(f"note: {note}")
+    print(summary_line(file, record["summary"]).replace(" rewritten", " would be rewritten"))
+
+
+def _output(
+    file: str,
+    output: str | None,
+    output_dir: str | None,
+    in_place: bool,
+    machine: Machine,
+    settings: Settings,
+) -> str:
+    """Where the result of a program goes."""
+    from gcodejerk.emit import load_controller
+
+    suffix = load_controller(settings.controller or machine.controller).suffix
+    if in_place:
+        if suffix:
+            raise typer.BadParameter(
+                "--in-place: this controller's streams are a file of their own"
+            )
+        return file
+    if output is not None:
+        return output
+    if file == "-":
+        return "-"
+    path = Path(file)
+    if output_dir is not None:
+        return str(Path(output_dir) / (path.stem + suffix if suffix else path.name))
+    return str(path.parent / f"{path.stem}.jerk{suffix or path.suffix}")
