@@ -14,12 +14,12 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import (
     GRID_TOLERANCE,
-    Laws,
+    SymmetricLaws,
     conventional_laws,
     design_condition3,
     design_four_segments,
     four_segment_range,
-    laws_response,
+    symmetric_response,
     whole_intervals,
 )
 from gcodejerk.motion.laws import Array
@@ -159,12 +159,12 @@ def _is_rotary(machine: Machine, axis: str) -> bool:
     return axis in "ABC"
 
 
-def _squeezed(fastest: Laws, total: float, interval: float) -> Laws:
+def _squeezed(fastest: SymmetricLaws, total: float, interval: float) -> SymmetricLaws:
     """One law squeezed into a shorter time, its segments no shorter than the interval."""
     stretch = total / fastest.total
     ramp = np.clip(fastest.T1 * stretch, interval, 0.25 * total)
     Ta = np.clip(fastest.Ta * stretch, 0.0, 0.5 * total - 2.0 * ramp)
-    return Laws(ramp, Ta, ramp, total - 4.0 * ramp - 2.0 * Ta)
+    return SymmetricLaws(ramp, Ta, ramp, total - 4.0 * ramp - 2.0 * Ta)
 
 
 def _rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -> None:
@@ -231,21 +231,21 @@ class _Planner:
                 columns.append((axes / np.abs(self.share)).min(axis=1, initial=np.inf))
         return columns[0], columns[1], columns[2]
 
-    def _conventional(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
+    def _conventional(self, counts: NDArray[np.int64]) -> tuple[SymmetricLaws, NDArray[np.bool_]]:
         """The controller's own laws; a trapezoid cannot be written with finite jerk."""
         laws = self.conventional
         if self.time is not None:
             stretch = counts * self.interval / laws.total
-            laws = Laws(*(column * stretch for column in laws.columns()))
+            laws = SymmetricLaws(*(column * stretch for column in laws.columns()))
         return laws, self._within_limits(laws)
 
-    def _within_limits(self, laws: Laws) -> NDArray[np.bool_]:
+    def _within_limits(self, laws: SymmetricLaws) -> NDArray[np.bool_]:
         """Whether laws keep the limits of a designed profile."""
         V, A, J = (limit * (1.0 + 1e-9) for limit in self.limits)
         jerk = laws.jerk
         return (laws.velocity <= V) & (laws.acceleration <= A) & (jerk <= J) & np.isfinite(jerk)
 
-    def _given_T1(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
+    def _given_T1(self, counts: NDArray[np.int64]) -> tuple[SymmetricLaws, NDArray[np.bool_]]:
         """Four segments with the T1 that the user asked for."""
         assert self.T1 is not None
         total: Array = np.asarray(counts * self.interval, dtype=float)
@@ -258,7 +258,7 @@ class _Planner:
         low, high = four_segment_range(total, *self.limits, self.interval)
         T1 = np.full(len(total), self.T1)
         zero = np.zeros(len(total))
-        laws = Laws(T1, zero, 0.5 * total - T1, zero)
+        laws = SymmetricLaws(T1, zero, 0.5 * total - T1, zero)
         tolerance = 1e-9 * self.interval
         bad = ~((low - tolerance <= T1) & (high + tolerance >= T1))
         if bad.any():
@@ -268,7 +268,7 @@ class _Planner:
 
     def _designed(
         self, counts: NDArray[np.int64]
-    ) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    ) -> tuple[SymmetricLaws, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Condition III of unchanged time; longer only where the limits leave no room."""
         laws, worst = self._search(counts, np.arange(len(counts)))
         kept = np.zeros(len(counts), dtype=bool)
@@ -288,7 +288,9 @@ class _Planner:
             raise self._time_error(row, counts[row] * self.interval)
         return laws, counts, np.isfinite(worst), kept
 
-    def _search(self, counts: NDArray[np.int64], rows: NDArray[np.intp]) -> tuple[Laws, Array]:
+    def _search(
+        self, counts: NDArray[np.int64], rows: NDArray[np.intp]
+    ) -> tuple[SymmetricLaws, Array]:
         """The best laws for these rows; the worst residual is infinite where there is none."""
         total: Array = np.asarray(counts[rows] * self.interval, dtype=float)
         V, A, J = (limit[rows] for limit in self.limits)
@@ -299,7 +301,7 @@ class _Planner:
         four &= low <= high
         poles = self.modes.poles
         zero = np.zeros(len(rows))
-        laws, worst = Laws(zero, zero, zero, zero), np.full(len(rows), np.inf)
+        laws, worst = SymmetricLaws(zero, zero, zero, zero), np.full(len(rows), np.inf)
         for chosen, part in ((four, "four"), (~four, "general")):
             index = np.nonzero(chosen)[0]
             if part == "four":
@@ -316,8 +318,8 @@ class _Planner:
         return laws, worst
 
     def _extend(
-        self, laws: Laws, counts: NDArray[np.int64], worst: Array
-    ) -> tuple[Laws, NDArray[np.int64], Array]:
+        self, laws: SymmetricLaws, counts: NDArray[np.int64], worst: Array
+    ) -> tuple[SymmetricLaws, NDArray[np.int64], Array]:
         """The least feasible time, at most `max_extension` longer, where T_SUM is impossible."""
         rows = np.nonzero(~np.isfinite(worst))[0]
         if not len(rows):
@@ -340,10 +342,10 @@ class _Planner:
             counts[rows] += 1
         return laws, counts, worst
 
-    def _worst(self, laws: Laws) -> Array:
+    def _worst(self, laws: SymmetricLaws) -> Array:
         """Largest residual displacement of laws over the modes [mm]."""
         poles = self.modes.poles
-        amplitude = np.abs(laws_response(laws, poles)) / poles.imag * self.weights
+        amplitude = np.abs(symmetric_response(laws, poles)) / poles.imag * self.weights
         worst: Array = amplitude.max(axis=1, initial=0.0)
         return worst
 
@@ -363,7 +365,9 @@ class _Planner:
         moves[self.move[where]] = True
         _rule_out(self.reason, moves, why)
 
-    def _plans(self, laws: Laws, counts: NDArray[np.int64], kept: NDArray[np.bool_]) -> Plans:
+    def _plans(
+        self, laws: SymmetricLaws, counts: NDArray[np.int64], kept: NDArray[np.bool_]
+    ) -> Plans:
         """The laws of planned moves, and the moves' own columns."""
         conventional_time = np.zeros(len(self.reason))
         np.maximum.at(conventional_time, self.move, self.conventional.total)
@@ -380,13 +384,13 @@ class _Planner:
             counts=move_counts,
             move=self.move[keep],
             share=self.share[keep],
-            laws=laws.take(keep),
-            conventional=self.conventional.take(keep),
+            laws=laws.take(keep).general(),
+            conventional=self.conventional.take(keep).general(),
             law_counts=counts[keep],
             kept=kept[keep],
         )
 
-    def _limit_error(self, laws: Laws, row: int, how: str) -> PlanError:
+    def _limit_error(self, laws: SymmetricLaws, row: int, how: str) -> PlanError:
         """Which axis passes which limit, in the words of its unit."""
         law = laws.take(slice(row, row + 1))
         total = float(law.total[0])

@@ -219,7 +219,7 @@ class _Maker:
     def writable(self, laws: Laws) -> NDArray[np.bool_]:
         """Whether the moves' laws, all of them, have finite jerk within the limits."""
         out = np.ones(len(self.moves), dtype=bool)
-        jerk = laws.jerk
+        jerk = laws.peak_jerk
         finite = np.isfinite(jerk)
         np.logical_and.at(out, self.row_of, finite)
         jerk = np.where(finite, jerk, 0.0)

@@ -7,13 +7,14 @@ a straight line.
 """
 
 from gcodejerk.motion.condition3 import design_condition3, design_four_segments, four_segment_range
-from gcodejerk.motion.laws import Laws, conventional_laws
+from gcodejerk.motion.laws import Laws, joined
 from gcodejerk.motion.residual import (
     laws_response,
     mode_poles,
     polyline_response,
     residual_acceleration,
     residual_displacement,
+    symmetric_response,
 )
 from gcodejerk.motion.rounding import round_positions
 from gcodejerk.motion.sampling import (
@@ -24,15 +25,18 @@ from gcodejerk.motion.sampling import (
     sampled_response,
     whole_intervals,
 )
+from gcodejerk.motion.symmetric import SymmetricLaws, conventional_laws
 
 __all__ = [
     "GRID_TOLERANCE",
     "Grid",
     "Laws",
+    "SymmetricLaws",
     "conventional_laws",
     "design_condition3",
     "design_four_segments",
     "four_segment_range",
+    "joined",
     "knots_response",
     "laws_response",
     "mode_poles",
@@ -42,5 +46,6 @@ __all__ = [
     "round_positions",
     "sample_laws",
     "sampled_response",
+    "symmetric_response",
     "whole_intervals",
 ]

@@ -22,8 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.laws import Array, Laws, conventional_laws
-from gcodejerk.motion.residual import Complex, laws_response
+from gcodejerk.motion.laws import Array
+from gcodejerk.motion.residual import Complex, symmetric_response
+from gcodejerk.motion.symmetric import SymmetricLaws, conventional_laws
 
 MAP_COLUMNS = 257
 """Values of T1 on the map of four-segment laws, T_SUM/4 among them."""
@@ -90,7 +91,7 @@ def four_segment_range(
 
 def design_four_segments(
     total: Array, low: Array, high: Array, poles: Complex, weights: Array
-) -> tuple[Laws, Array]:
+) -> tuple[SymmetricLaws, Array]:
     """The four-segment law with the least worst residual, T1 within a range.
 
     Parameters
@@ -104,7 +105,7 @@ def design_four_segments(
 
     Returns
     -------
-    laws : Laws
+    laws : SymmetricLaws
         n laws.
     worst : ndarray, shape (n,)
         Largest residual displacement. [mm]
@@ -174,8 +175,8 @@ def design_condition3(
     poles: Complex,
     weights: Array,
     interval: float,
-    conventional: Laws,
-) -> tuple[Laws, Array, NDArray[np.bool_]]:
+    conventional: SymmetricLaws,
+) -> tuple[SymmetricLaws, Array, NDArray[np.bool_]]:
     """The general law of given duration with the least worst residual within limits.
 
     Parameters
@@ -190,13 +191,13 @@ def design_condition3(
         Participation times displacement. [mm]
     interval : float
         Command interval, the least duration of a segment. [s]
-    conventional : Laws
+    conventional : SymmetricLaws
         The laws to improve on; stretched to T_SUM they are candidates, where they are within
         limits.
 
     Returns
     -------
-    laws : Laws
+    laws : SymmetricLaws
         n laws; meaningless where `feasible` is False.
     worst : ndarray, shape (n,)
         Largest residual displacement, infinite where no law is feasible. [mm]
@@ -224,7 +225,7 @@ def design_condition3(
     if not len(poles):
         # The search went by the jerk; nothing vibrates.
         worst = np.where(feasible, 0.0, np.inf)
-    return Laws(*columns), worst, feasible
+    return SymmetricLaws(*columns), worst, feasible
 
 
 COMPASS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
@@ -259,7 +260,7 @@ class _GeneralSearch:
         # V = 1/(T_SUM - 2 centroid): the velocity limit is a limit of the centroid.
         self.centroid = 0.5 * (total - 1.0 / self.V)
 
-    def run(self, known: list[Laws]) -> tuple[Laws, Array]:
+    def run(self, known: list[SymmetricLaws]) -> tuple[SymmetricLaws, Array]:
         """Known laws stretched to T_SUM, the map, and the refinement of the best of them."""
         n = len(self.total)
         best = _Points(np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf))
@@ -291,8 +292,8 @@ class _GeneralSearch:
         index, chosen = np.arange(len(value)), np.argmin(value, axis=1)
         return _Points(*(x[index, chosen] for x in (T1, T2, share, value)))
 
-    def _stretched(self, laws: Laws) -> _Points:
-        """Laws stretched to T_SUM, as points of the search."""
+    def _stretched(self, laws: SymmetricLaws) -> _Points:
+        """SymmetricLaws stretched to T_SUM, as points of the search."""
         stretch = self.total / laws.total
         T1 = np.maximum(laws.T1 * stretch, self.interval)
         T2 = np.maximum(laws.T2 * stretch, self.interval)
@@ -333,7 +334,7 @@ class _GeneralSearch:
             low = p - np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
         return np.maximum(low, 0.0), high
 
-    def _laws(self, T1: Array, T2: Array, share: Array) -> tuple[Laws, NDArray[np.bool_]]:
+    def _laws(self, T1: Array, T2: Array, share: Array) -> tuple[SymmetricLaws, NDArray[np.bool_]]:
         """The laws of these coordinates, and whether each keeps limits and segment durations."""
         T = self.total.reshape((len(self.total),) + (1,) * (T1.ndim - 1))
         J = self.J.reshape(T.shape)
@@ -351,7 +352,7 @@ class _GeneralSearch:
         Tv = 2.0 * (room - Ta)
         Tv = np.where(np.abs(Tv) < 1e-12, 0.0, Tv)
         with np.errstate(invalid="ignore", divide="ignore"):
-            laws = Laws(T1, Ta, T2, Tv)
+            laws = SymmetricLaws(T1, Ta, T2, Tv)
             tolerance = 1e-12
             legal = (
                 (low <= high + tolerance)
@@ -369,7 +370,7 @@ class _GeneralSearch:
         laws, legal = self._laws(T1, T2, share)
         value = np.full(T1.shape, np.inf)
         rows = np.nonzero(legal)[0]
-        flat = Laws(*(column[legal] for column in laws.columns()))
+        flat = SymmetricLaws(*(column[legal] for column in laws.columns()))
         if len(self.poles):
             value[legal] = _worst_flat(flat, self.poles, self.weights, rows)
         else:
@@ -378,18 +379,18 @@ class _GeneralSearch:
         return value
 
 
-def _four(T1: Array, total: Array) -> Laws:
+def _four(T1: Array, total: Array) -> SymmetricLaws:
     """Four-segment laws of these T1 and T_SUM."""
     T1, T = np.broadcast_arrays(T1, total)
     zero = np.zeros(T1.shape)
-    return Laws(np.array(T1), zero, 0.5 * T - T1, zero)
+    return SymmetricLaws(np.array(T1), zero, 0.5 * T - T1, zero)
 
 
-def _displacement(laws: Laws, poles: Complex) -> Array:
+def _displacement(laws: SymmetricLaws, poles: Complex) -> Array:
     """Displacement envelopes of unit laws for weight 1, shape (..., m) [-]."""
     shape = laws.T1.shape
-    flat = Laws(*(column.ravel() for column in laws.columns()))
-    amplitude: Array = np.abs(laws_response(flat, poles)) / poles.imag
+    flat = SymmetricLaws(*(column.ravel() for column in laws.columns()))
+    amplitude: Array = np.abs(symmetric_response(flat, poles)) / poles.imag
     return amplitude.reshape(*shape, len(poles))
 
 
@@ -401,9 +402,11 @@ def _worst(amplitude: Array, weights: Array) -> Array:
     return worst
 
 
-def _worst_flat(laws: Laws, poles: Complex, weights: Array, rows: NDArray[np.intp]) -> Array:
+def _worst_flat(
+    laws: SymmetricLaws, poles: Complex, weights: Array, rows: NDArray[np.intp]
+) -> Array:
     """The same for a flat list of laws, the law k belonging to row rows[k] of the weights."""
-    response = np.abs(laws_response(laws, poles)) / poles.imag
+    response = np.abs(symmetric_response(laws, poles)) / poles.imag
     worst: Array = (response * weights[rows]).max(axis=1)
     return worst
 

@@ -1,25 +1,12 @@
-r"""The time law of a rapid: four numbers, from which everything else follows.
+r"""Time laws of rapids: rest-to-rest motions from 0 to 1, as segments of constant jerk.
 
-This module owns the family of laws that the planner chooses from (Condition III of Sato and
-Shirase and its generalisation) and the conventional law of a controller, which belongs to it::
+This module owns the one form in which a law leaves the planner, whatever designed it: Condition
+III, a shaper, or an optimum with a jerk of its own in every interval. It is sampled, judged, drawn
+and reported in this form alone. The acceleration is linear in each segment; between segments it
+may step, so that a trapezoid of velocity is a law too.
 
-    acceleration
-      A |    ______
-        |   /|    |\
-        |  / |    | \
-        | /  |    |  \          deceleration: the mirror image
-      --+----+----+---+-------+---+----+----+-->  t
-        | T1 | Ta | T2|  Tv   | \ |    |   /
-        |                     |  \|    |  /
-     -A |                     |   ------ /
-                              |T2 | Ta |T1
-
-Rising acceleration takes T1, falling acceleration T2; Ta at constant acceleration and Tv at
-constant velocity are zero in a four-segment law. In the paper's count of segments T3 = T2 and
-T4 = T1. The law is odd about its middle: what accelerates in the order T1, Ta, T2 brakes in the
-order T2, Ta, T1, and the velocity is even.
-
-Rule: laws are unit laws, from 0 to 1 in rest-to-rest motion; all quantities scale with the length.
+Rule: laws are unit laws; all quantities scale with the length, and limits divided by the length are
+the limits of the law.
 """
 
 from __future__ import annotations
@@ -27,151 +14,194 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Laws:
-    """Unit laws as columns; entry i of every array is law i.
+    """Unit laws as columns: n laws, and the s segments of all of them, one law after the other.
 
     Attributes
     ----------
-    T1, Ta, T2, Tv : ndarray, shape (n,)
-        Durations of rising, constant and falling acceleration, and of constant velocity. [s]
-        T1 = T2 = 0 is a trapezoid of velocity: acceleration steps, no finite jerk.
+    first : ndarray of int, shape (n + 1,)
+        Law i has the segments ``first[i]`` to ``first[i + 1]``, at least one.
+    begin : ndarray, shape (s,)
+        When each segment begins, since the law's start. [s]
+    duration : ndarray, shape (s,)
+        Its length, above zero. [s]
+    position, velocity, acceleration : ndarray, shape (s,)
+        At its begin. [-], [1/s], [1/s^2]
+    jerk : ndarray, shape (s,)
+        Throughout it. [1/s^3]
     """
 
-    T1: Array
-    Ta: Array
-    T2: Array
-    Tv: Array
+    first: Index
+    begin: Array
+    duration: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    @classmethod
+    def of(cls, first: Index, duration: Array, acceleration: Array, jerk: Array) -> Laws:
+        """Laws from their segments; what they add up to is integrated here.
+
+        Parameters
+        ----------
+        first : ndarray of int, shape (n + 1,)
+            As in `Laws`.
+        duration, acceleration, jerk : ndarray, shape (s,)
+            Of the segments; the acceleration is that at a segment's begin. [s], [1/s^2], [1/s^3]
+
+        Returns
+        -------
+        Laws
+
+        Examples
+        --------
+        One second of acceleration 1 and one of -1:
+
+        >>> law = Laws.of(*(np.array(x) for x in ([0, 2], [1.0, 1.0], [1.0, -1.0], [0.0, 0.0])))
+        >>> law.position.tolist(), law.peak_velocity.tolist()
+        ([0.0, 0.5], [1.0])
+        """
+        first = np.asarray(first, dtype=np.int64)
+        begin, position, velocity = (np.zeros(len(duration)) for _ in range(3))
+        count = np.diff(first)
+        d = duration
+        gained = (acceleration + 0.5 * jerk * d) * d
+        passed = (0.5 * acceleration + jerk * d / 6.0) * d * d
+        # Segment k of every law that has one: few steps where laws are short, and no sum over laws.
+        for k in range(1, int(count.max(initial=1))):
+            here = first[:-1][count > k] + k
+            before = here - 1
+            begin[here] = begin[before] + d[before]
+            velocity[here] = velocity[before] + gained[before]
+            position[here] = position[before] + velocity[before] * d[before] + passed[before]
+        return cls(first, begin, duration, position, velocity, acceleration, jerk)
 
     def __len__(self) -> int:
-        return len(self.T1)
-
-    @property
-    def ramp(self) -> Array:
-        """Duration of the acceleration, T1 + Ta + T2 [s]."""
-        return self.T1 + self.Ta + self.T2
+        return len(self.first) - 1
 
     @property
     def total(self) -> Array:
-        """Duration of the move, T_SUM [s]."""
-        return 2.0 * self.ramp + self.Tv
+        """Duration of each law, T_SUM, shape (n,) [s]."""
+        last = self.first[1:] - 1
+        total: Array = self.begin[last] + self.duration[last]
+        return total
 
     @property
-    def area(self) -> Array:
-        """Velocity gained per unit of peak acceleration [s]."""
-        return self.Ta + 0.5 * (self.T1 + self.T2)
+    def owner(self) -> Index:
+        """The law of each segment, shape (s,)."""
+        return np.repeat(np.arange(len(self)), np.diff(self.first))
 
     @property
-    def centroid(self) -> Array:
-        """Moment at which the acceleration's area is balanced [s].
-
-        The length of a law is V (T_SUM - 2 centroid): the acceleration acts as if it all happened
-        at its centroid, and so, by symmetry, does the deceleration.
-        """
-        T1, Ta, T2 = self.T1, self.Ta, self.T2
-        moment = T1 * T1 / 3.0 + Ta * (T1 + 0.5 * Ta) + 0.5 * T2 * (T1 + Ta + T2 / 3.0)
-        return moment / self.area
+    def end_acceleration(self) -> Array:
+        """Acceleration at each segment's end, shape (s,) [1/s^2]."""
+        return self.acceleration + self.jerk * self.duration
 
     @property
-    def velocity(self) -> Array:
-        """Peak velocity of the unit law [1/s]."""
-        return 1.0 / (self.total - 2.0 * self.centroid)
+    def turning_velocity(self) -> Array:
+        """Velocity where the acceleration is zero inside a segment, or at its begin, shape (s,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.where(self.jerk != 0.0, -self.acceleration / self.jerk, 0.0)
+        t = np.where((t > 0.0) & (t < self.duration), t, 0.0)
+        turning: Array = self.velocity + 0.5 * self.acceleration * t
+        return turning
 
     @property
-    def acceleration(self) -> Array:
-        """Peak acceleration of the unit law [1/s^2]."""
-        return self.velocity / self.area
+    def peak_velocity(self) -> Array:
+        """Largest velocity of each law, shape (n,) [1/s]."""
+        return self._largest(np.maximum(self.velocity, self.turning_velocity))
 
     @property
-    def jerk(self) -> Array:
-        """Peak jerk of the unit law; infinite where T1 or T2 is zero [1/s^3]."""
-        with np.errstate(divide="ignore"):
-            return self.acceleration / np.minimum(self.T1, self.T2)
+    def least_velocity(self) -> Array:
+        """Least velocity of each law, shape (n,); below zero it would go backwards [1/s]."""
+        return -self._largest(-np.minimum(self.velocity, self.turning_velocity))
 
-    def take(self, index: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Laws:
+    @property
+    def peak_acceleration(self) -> Array:
+        """Largest modulus of the acceleration of each law, shape (n,) [1/s^2]."""
+        return self._largest(np.maximum(np.abs(self.acceleration), np.abs(self.end_acceleration)))
+
+    @property
+    def peak_jerk(self) -> Array:
+        """Largest modulus of the jerk, infinite where the acceleration steps, shape (n,)."""
+        stepped = (
+            np.abs(self.acceleration_steps()) > 1e-6 * self.peak_acceleration[self._of_steps()]
+        )
+        peak = self._largest(np.abs(self.jerk))
+        return np.where(np.isin(np.arange(len(self)), self._of_steps()[stepped]), np.inf, peak)
+
+    def _largest(self, value: Array) -> Array:
+        """Largest of a column within each law."""
+        if not len(self):
+            return np.zeros(0)
+        largest: Array = np.maximum.reduceat(value, self.first[:-1])
+        return largest
+
+    def _of_steps(self) -> Index:
+        """The law of each step: one at every segment's begin and one at the law's end."""
+        return np.repeat(np.arange(len(self)), np.diff(self.first) + 1)
+
+    def step_times(self) -> Array:
+        """Moments of the steps, shape (s + n,): every segment's begin, and the law's end [s]."""
+        return self._with_ends(self.begin, self.total)
+
+    def acceleration_steps(self) -> Array:
+        """Jumps of the acceleration at these moments; all zero but for trapezoids [1/s^2]."""
+        before = np.concatenate([[0.0], self.end_acceleration])
+        step = self.acceleration - before[:-1]
+        step[self.first[:-1]] = self.acceleration[self.first[:-1]]
+        return self._with_ends(step, -before[self.first[1:]])
+
+    def jerk_steps(self) -> Array:
+        """Changes of the jerk at these moments [1/s^3]."""
+        step = np.diff(self.jerk, prepend=0.0)
+        step[self.first[:-1]] = self.jerk[self.first[:-1]]
+        return self._with_ends(step, -self.jerk[self.first[1:] - 1])
+
+    def _with_ends(self, at_begins: Array, at_ends: Array) -> Array:
+        """A column of the steps, from those at the segments' begins and at the laws' ends."""
+        return np.insert(at_begins, self.first[1:], at_ends)
+
+    def take(self, index: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Laws:
         """Some of the laws."""
-        return Laws(self.T1[index], self.Ta[index], self.T2[index], self.Tv[index])
+        rows = np.arange(len(self))[index]
+        count = np.diff(self.first)[rows]
+        first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+        segment = np.arange(first[-1]) + np.repeat(self.first[rows] - first[:-1], count)
+        return Laws(first, *(column[segment] for column in self._columns()))
 
-    def replaced(self, index: NDArray[np.intp] | NDArray[np.bool_], other: Laws) -> Laws:
+    def replaced(self, index: NDArray[np.integer] | NDArray[np.bool_], other: Laws) -> Laws:
         """These laws with those at `index` taken from `other` (of the same shape as the index)."""
-        columns = []
-        for own, new in zip(self.columns(), other.columns(), strict=True):
-            column = own.copy()
-            column[index] = new
-            columns.append(column)
-        return Laws(*columns)
+        order = np.arange(len(self))
+        order[index] = len(self) + np.arange(len(other))
+        return joined([self, other]).take(order)
 
-    def columns(self) -> tuple[Array, Array, Array, Array]:
-        """T1, Ta, T2, Tv."""
-        return self.T1, self.Ta, self.T2, self.Tv
+    def _columns(self) -> tuple[Array, ...]:
+        """The columns of segments, in the order of the attributes."""
+        return (
+            self.begin, self.duration, self.position, self.velocity, self.acceleration, self.jerk,
+        )  # fmt: skip
 
     def segments(self, index: int) -> list[tuple[float, float]]:
-        """(duration [s], unit jerk [1/s^3]) of each segment of one law, empty ones left out.
+        """(duration [s], unit jerk [1/s^3]) of each segment of one law.
 
         A trapezoid of velocity has jerk 0 throughout: its acceleration steps are no segments.
         """
-        T1, Ta, T2, Tv = (float(column[index]) for column in self.columns())
-        A = float(self.take(slice(index, index + 1)).acceleration[0])
-        rising = A / T1 if T1 else 0.0
-        falling = -A / T2 if T2 else 0.0
-        accelerating = [(T1, rising), (Ta, 0.0), (T2, falling)]
-        every = [*accelerating, (Tv, 0.0), *reversed(accelerating)]
-        return [(duration, jerk) for duration, jerk in every if duration > 0.0]
+        part = slice(self.first[index], self.first[index + 1])
+        return list(zip(self.duration[part].tolist(), self.jerk[part].tolist(), strict=True))
 
 
-def conventional_laws(
-    velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike, shortest_ramp: float = 0.0
-) -> Laws:
-    r"""The fastest symmetric law within limits: what controllers do today.
-
-    Parameters
-    ----------
-    velocity, acceleration, jerk : array_like, shape (n,)
-        Limits of the unit law; the limits of an axis divided by its displacement. Jerk may be
-        infinite: the velocity is then a trapezoid. [1/s], [1/s^2], [1/s^3]
-    shortest_ramp : float, optional
-        Least duration of T1 = T2, for the fastest law that a command interval allows. [s]
-
-    Returns
-    -------
-    Laws
-        Four segments where neither velocity nor acceleration is reached, up to seven otherwise.
-
-    Notes
-    -----
-    With :math:`t_j` the duration of a jerk phase and :math:`t_a` that of constant acceleration the
-    unit length is :math:`V (2 t_j + t_a + t_v)`, :math:`V = A (t_j + t_a)`. The phases are
-    filled in this order: jerk alone, :math:`2 J t_j^3 = 1`; then constant acceleration,
-    :math:`A (t_j + t_a)(2 t_j + t_a) = 1`; then cruise.
-
-    Examples
-    --------
-    1 mm with 600 mm/s, 5000 mm/s^2 and 5e5 mm/s^3 takes four times 10 ms:
-
-    >>> law = conventional_laws([600.0], [5000.0], [5e5])
-    >>> [round(float(t[0]), 6) for t in law.columns()]
-    [0.01, 0.0, 0.01, 0.0]
-    """
-    V, A, J = np.broadcast_arrays(
-        *(np.asarray(x, dtype=float) for x in (velocity, acceleration, jerk))
-    )
-    with np.errstate(divide="ignore"):
-        # Jerk alone: the ramp ends where the length, the velocity or the acceleration is reached.
-        by_length, by_velocity, by_acceleration = np.cbrt(0.5 / J), np.sqrt(V / J), A / J
-    tj = np.minimum(np.minimum(by_length, by_velocity), by_acceleration)
-    tj = np.maximum(tj, shortest_ramp)
-    # Constant acceleration, where the ramp reached A: as long as length and velocity need it.
-    to_length = 0.5 * (np.sqrt(tj * tj + 4.0 / A) - 3.0 * tj)
-    to_velocity = V / A - tj
-    reaches = by_acceleration <= np.maximum(np.minimum(by_length, by_velocity), shortest_ramp)
-    ta = np.where(reaches, np.maximum(np.minimum(to_length, to_velocity), 0.0), 0.0)
-    # A rounding error must not make a segment of 1e-17 s.
-    ta = np.where(ta < 1e-12, 0.0, ta)
-    tv = 1.0 / V - (2.0 * tj + ta)
-    tv = np.where(tv < 1e-12, 0.0, tv)
-    return Laws(tj, ta, tj.copy(), tv)
+def joined(parts: list[Laws]) -> Laws:
+    """All laws of several `Laws`, in their order."""
+    offsets = np.cumsum([0, *(len(part.begin) for part in parts)])
+    firsts = [part.first[:-1] + offset for part, offset in zip(parts, offsets[:-1], strict=True)]
+    first = np.concatenate([*firsts, offsets[-1:]]).astype(np.int64)
+    columns = zip(*(part._columns() for part in parts), strict=True)
+    return Laws(first, *(np.concatenate(column) for column in columns))

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcodejerk.errors import PlanError
 from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.symmetric import SymmetricLaws
 
 Complex = NDArray[np.complex128]
 
@@ -124,6 +125,39 @@ def laws_response(laws: Laws, poles: Complex) -> Complex:
     Parameters
     ----------
     laws : Laws
+        n laws.
+    poles : ndarray of complex, shape (m,)
+        From `mode_poles`. [rad/s]
+
+    Returns
+    -------
+    ndarray of complex, shape (n, m)
+        The integral of a(t) exp(lambda (T - t)). [1/s]
+
+    Notes
+    -----
+    With the steps of acceleration and jerk at the moments :math:`t_k`,
+    :math:`\sum_k (\Delta a_k/\lambda + \Delta j_k/\lambda^2)\, e^{\lambda (T - t_k)}`: what the
+    integration leaves besides is zero where a law ends at rest.
+    """
+    response = np.empty((len(laws), len(poles)), dtype=np.complex128)
+    if not len(laws):
+        return response
+    first = laws.first[:-1] + np.arange(len(laws))
+    left = np.repeat(laws.total, np.diff(laws.first) + 1) - laws.step_times()
+    a, j = laws.acceleration_steps(), laws.jerk_steps()
+    for m, pole in enumerate(poles):
+        each = (a + j / pole) * (_exponential(pole, left) / pole)
+        response[:, m] = np.add.reduceat(each, first)
+    return response
+
+
+def symmetric_response(laws: SymmetricLaws, poles: Complex) -> Complex:
+    r"""The same for symmetric laws, from their four durations: what searches evaluate.
+
+    Parameters
+    ----------
+    laws : SymmetricLaws
         n laws.
     poles : ndarray of complex, shape (m,)
         From `mode_poles`. [rad/s]

@@ -99,30 +99,20 @@ def sample_laws(laws: Laws, moments: Counts, interval: float) -> tuple[Array, Ar
     tuple of ndarray, shape (n, k)
         Position [-] and velocity [1/s]. The position is 1 exactly from the law's end on.
     """
-    total = laws.total[:, np.newaxis]
-    t = np.clip(moments * interval, 0.0, total)
-    late = t > 0.5 * total
-    t = np.where(late, total - t, t)
-    A = laws.acceleration[:, np.newaxis]
-    T1, Ta, T2 = (column[:, np.newaxis] for column in (laws.T1, laws.Ta, laws.T2))
-    # The time spent in each of the phases so far; each phase adds its part to what came before.
-    in_1 = np.minimum(t, T1)
-    in_a = np.clip(t - T1, 0.0, Ta)
-    in_2 = np.clip(t - T1 - Ta, 0.0, T2)
-    in_v = np.maximum(t - T1 - Ta - T2, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        rising = np.where(T1 > 0.0, A / T1, 0.0)
-        falling = np.where(T2 > 0.0, A / T2, 0.0)
-    a1 = np.where(T1 > 0.0, rising * in_1, A)
-    v1 = 0.5 * rising * in_1 * in_1
-    s1 = v1 * in_1 / 3.0
-    va = v1 + a1 * in_a
-    sa = s1 + (v1 + 0.5 * a1 * in_a) * in_a
-    v2 = va + (a1 - 0.5 * falling * in_2) * in_2
-    s2 = sa + (va + (0.5 * a1 - falling * in_2 / 6.0) * in_2) * in_2
-    position = s2 + v2 * in_v
-    position = np.where(late, 1.0 - position, position)
-    return position, v2
+    total = laws.total
+    row = np.arange(len(laws))[:, np.newaxis]
+    t = np.clip(moments * interval, 0.0, total[:, np.newaxis])
+    # The segment of each moment: laws one behind the other on a common clock.
+    clock = float(total.max(initial=0.0)) + 1.0
+    segment = np.searchsorted(laws.owner * clock + laws.begin, row * clock + t, side="right") - 1
+    segment = np.clip(segment, laws.first[:-1, np.newaxis], laws.first[1:, np.newaxis] - 1)
+    tau = t - laws.begin[segment]
+    a, j = laws.acceleration[segment], laws.jerk[segment]
+    v = laws.velocity[segment]
+    position = laws.position[segment] + (v + (0.5 * a + j * tau / 6.0) * tau) * tau
+    velocity = v + (a + 0.5 * j * tau) * tau
+    arrived = t >= total[:, np.newaxis] - GRID_TOLERANCE * interval
+    return np.where(arrived, 1.0, np.minimum(position, 1.0)), np.where(arrived, 0.0, velocity)
 
 
 def sampled_response(positions: Array, interval: float, poles: Complex) -> Complex:

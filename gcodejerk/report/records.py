@@ -43,7 +43,7 @@ class Records:
         self.extension = extra * interval
         written = kept[plans.move] if len(plans) else np.zeros(0, dtype=bool)
         self.laws = plans.laws.replaced(written, plans.conventional.take(written))
-        self.peaks = (self.laws.velocity, self.laws.acceleration, self.laws.jerk)
+        self.peaks = (self.laws.peak_velocity, self.laws.peak_acceleration, self.laws.peak_jerk)
 
     def summary(self) -> Record:
         """The counts and totals of all moves."""

@@ -27,6 +27,7 @@ class Ran:
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("COLUMNS", raising=False)
     (tmp_path / "part.nc").write_bytes(PROGRAM)
     return tmp_path
 

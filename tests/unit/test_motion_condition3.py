@@ -5,14 +5,14 @@ import pytest
 from scipy.optimize import differential_evolution
 
 from gcodejerk.motion import (
-    Laws,
+    SymmetricLaws,
     conventional_laws,
     design_condition3,
     design_four_segments,
     four_segment_range,
-    laws_response,
     mode_poles,
     residual_acceleration,
+    symmetric_response,
 )
 from gcodejerk.motion.condition3 import TIE
 
@@ -55,11 +55,11 @@ def displacement(T1, Ta, T2, Tv, poles, weights):
 
 def test_the_second_way_to_a_residual_is_right_itself():
     T1, Ta, T2, Tv = 0.0031, 0.0057, 0.0113, 0.0211
-    law = Laws(*columns(T1, Ta, T2, Tv))
+    law = SymmetricLaws(*columns(T1, Ta, T2, Tv))
     poles = mode_poles([30.0, 71.0], [0.02, 0.0])
     weights = np.array([1.0, 0.3])
     worst, A = displacement(*columns(T1, Ta, T2, Tv), poles, weights)
-    by_law = (np.abs(laws_response(law, poles)) / poles.imag * weights).max()
+    by_law = (np.abs(symmetric_response(law, poles)) / poles.imag * weights).max()
     assert float(worst[0]) == pytest.approx(by_law, rel=1e-9)
     assert float(A[0]) == pytest.approx(float(law.acceleration[0]), rel=1e-12)
 
@@ -286,7 +286,7 @@ def test_rows_do_not_know_each_other():
     rng = np.random.default_rng(9)
     weights = rng.uniform(0, 1, (7, 2))
     numbers = [np.array(c) for c in zip(*((t, V, A, J) for t, V, A, J, *_ in cases), strict=True)]
-    conventional = Laws(
+    conventional = SymmetricLaws(
         *(np.concatenate(c) for c in zip(*(case[-1].columns() for case in cases), strict=True))
     )
     together, worst, _ = design_condition3(*numbers, poles, weights, INTERVAL, conventional)

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from gcodejerk.errors import PlanError
 from gcodejerk.motion import (
     Grid,
-    Laws,
+    SymmetricLaws,
     knots_response,
     laws_response,
     mode_poles,
@@ -32,7 +32,7 @@ MS = 1e-3
 
 def one(*durations):
     """One law of given T1, Ta, T2, Tv."""
-    return Laws(*(np.array([float(d)]) for d in durations))
+    return SymmetricLaws(*(np.array([float(d)]) for d in durations)).general()
 
 
 def condition3(T1, T=TOTAL, L=LENGTH):
@@ -212,12 +212,13 @@ def test_the_response_to_a_law_is_what_a_differential_equation_solver_finds(dura
 
 
 def test_the_response_has_a_row_a_law_and_a_column_a_mode():
-    laws = Laws(*np.array([[1.0, 3, 0], [0, 5, 9], [9, 2, 0], [0, 7, 4]]) * MS)
+    symmetric = SymmetricLaws(*np.array([[1.0, 3, 0], [0, 5, 9], [9, 2, 0], [0, 7, 4]]) * MS)
+    laws = symmetric.general()
     poles = mode_poles([17.0, 61.0], [0.01, 0.0])
     together = residual_displacement(laws_response(laws, poles), poles)
     assert together.shape == (3, 2)
     for i, m in itertools.product(range(3), range(2)):
-        durations = [float(c[i]) for c in laws.columns()]
+        durations = [float(c[i]) for c in symmetric.columns()]
         alone = simulate(durations, abs(poles[m]), -poles[m].real / abs(poles[m]))
         assert together[i, m] == pytest.approx(alone, rel=1e-9)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from gcodejerk.motion import Grid, Laws, sample_laws
+from gcodejerk.motion import Grid, SymmetricLaws, sample_laws
 
 INTERVAL = 0.0005
 SHAPES = {
@@ -22,7 +22,7 @@ SHAPES = {
 
 def law_of(name):
     """One law of the table, durations in intervals."""
-    return Laws(*(np.array([d * INTERVAL]) for d in SHAPES[name]))
+    return SymmetricLaws(*(np.array([d * INTERVAL]) for d in SHAPES[name])).general()
 
 
 def integrated(name):
@@ -63,7 +63,7 @@ def test_samples_are_antisymmetric_and_monotone_with_exact_ends(name):
     assert position[0, 0] == 0.0
     assert position[0, -1] == 1.0
     assert velocity[0, 0] == 0.0
-    assert abs(velocity[0, -1]) < 1e-20
+    assert velocity[0, -1] == 0.0
     assert (np.diff(position[0]) > 0.0).all()
     if count * INTERVAL == pytest.approx(total, rel=1e-12):
         np.testing.assert_allclose(position[0] + position[0, ::-1], 1.0, atol=1e-14)
@@ -79,19 +79,21 @@ def test_a_law_rests_before_it_begins_and_after_it_has_ended():
 
 def test_the_paper_s_profile_has_the_paper_s_first_sample():
     # J1 T1^3 / 6 with 3.846e6 mm/s^3 and 1 ms.
-    law = Laws(*(np.array([d]) for d in (0.001, 0.0, 0.019, 0.0)))
+    law = SymmetricLaws(*(np.array([d]) for d in (0.001, 0.0, 0.019, 0.0))).general()
     position, _ = sample_laws(law, np.array([[1]]), 0.001)
     assert float(position[0, 0]) == pytest.approx(3846153.846 * 1e-9 / 6, rel=1e-9)
 
 
 def test_laws_of_different_kinds_are_sampled_together_as_alone():
-    laws = Laws(*(np.array(c) * INTERVAL for c in zip(*SHAPES.values(), strict=True)))
+    laws = SymmetricLaws(
+        *(np.array(c) * INTERVAL for c in zip(*SHAPES.values(), strict=True))
+    ).general()
     moments = np.tile(np.arange(0, 200, 3), (len(SHAPES), 1))
     position, velocity = sample_laws(laws, moments, INTERVAL)
     for row, name in enumerate(SHAPES):
         alone = sample_laws(law_of(name), moments[:1], INTERVAL)
-        np.testing.assert_array_equal(position[row], alone[0][0])
-        np.testing.assert_array_equal(velocity[row], alone[1][0])
+        np.testing.assert_allclose(position[row], alone[0][0], atol=1e-14)
+        np.testing.assert_allclose(velocity[row], alone[1][0], atol=1e-12)
 
 
 @pytest.mark.parametrize("stride", [1, 2, 3, 4, 7, 50])

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from gcodejerk.motion import Laws, conventional_laws
+from gcodejerk.motion import SymmetricLaws, conventional_laws
 
 RNG = np.random.default_rng(20)
 
 
 def one(*durations):
     """One law of given T1, Ta, T2, Tv."""
-    return Laws(*(np.array([float(d)]) for d in durations))
+    return SymmetricLaws(*(np.array([float(d)]) for d in durations))
 
 
 def integrated(durations):
@@ -71,7 +71,7 @@ def test_length_is_velocity_times_what_the_centroids_leave_of_the_time(durations
 
 def test_segments_are_the_phases_of_finite_jerk_in_order():
     law = one(0.003, 0.005, 0.011, 0.021)
-    durations, jerks = zip(*law.segments(0), strict=True)
+    durations, jerks = zip(*law.general().segments(0), strict=True)
     assert durations == (0.003, 0.005, 0.011, 0.021, 0.011, 0.005, 0.003)
     J1, zero, J2, *rest = jerks
     A = float(law.acceleration[0])
@@ -80,7 +80,7 @@ def test_segments_are_the_phases_of_finite_jerk_in_order():
 
 
 def test_segments_of_the_paper_have_the_paper_s_jerks():
-    (d1, J1), (d2, J2), (d3, J3), (d4, J4) = one(0.001, 0.0, 0.019, 0.0).segments(0)
+    (d1, J1), (d2, J2), (d3, J3), (d4, J4) = one(0.001, 0.0, 0.019, 0.0).general().segments(0)
     assert (d1, d2, d3, d4) == (0.001, 0.019, 0.019, 0.001)
     np.testing.assert_allclose([J1, J4], 3846153.8, atol=0.1)
     np.testing.assert_allclose([J2, J3], -J1 / 19)
@@ -88,12 +88,12 @@ def test_segments_of_the_paper_have_the_paper_s_jerks():
 
 def test_a_trapezoid_has_no_jerk_in_its_segments_and_an_infinite_peak():
     law = one(0.0, 0.02, 0.0, 0.01)
-    assert law.segments(0) == [(0.02, 0.0), (0.01, 0.0), (0.02, 0.0)]
+    assert law.general().segments(0) == [(0.02, 0.0), (0.01, 0.0), (0.02, 0.0)]
     assert np.isinf(law.jerk[0])
 
 
 def test_taking_and_replacing_laws_keeps_the_others():
-    laws = Laws(*(np.arange(4.0) + 10 * k for k in range(4)))
+    laws = SymmetricLaws(*(np.arange(4.0) + 10 * k for k in range(4)))
     few = laws.take(np.array([2, 0]))
     assert [c.tolist() for c in few.columns()] == [[2, 0], [12, 10], [22, 20], [32, 30]]
     mixed = laws.replaced(np.array([False, True, False, True]), few)
