@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     )
     from gcodejerk.machine import Machine, find_machine
     from gcodejerk.motion import residual_acceleration
+    from gcodejerk.motion.amplitudes import residual
+    from gcodejerk.motion.maps import amplitude_map
     from gcodejerk.move import Plan, plan_move
     from gcodejerk.pipeline import Result, process
     from gcodejerk.verification import Verification, verify
@@ -39,6 +41,8 @@ _HOMES = {
     ),
     "gcodejerk.machine": ("Machine", "find_machine"),
     "gcodejerk.motion": ("residual_acceleration",),
+    "gcodejerk.motion.amplitudes": ("residual",),
+    "gcodejerk.motion.maps": ("amplitude_map",),
     "gcodejerk.move": ("Plan", "plan_move"),
     "gcodejerk.pipeline": ("Result", "process"),
     "gcodejerk.verification": ("Verification", "verify"),
@@ -55,9 +59,11 @@ __all__ = [
     "Result",
     "Verification",
     "VerifyError",
+    "amplitude_map",
     "find_machine",
     "plan_move",
     "process",
+    "residual",
     "residual_acceleration",
     "verify",
 ]

@@ -183,10 +183,13 @@ def test_every_public_name_has_a_home_that_knows_it():
         assert getattr(import_module(home), name).__module__.startswith(home)
 
 
-@pytest.mark.parametrize("first", ["process", "gcodejerk.report.records"])
+@pytest.mark.parametrize(
+    "first", ["process", "gcodejerk.report.records", "gcodejerk.motion.residual", "residual"]
+)
 def test_public_names_stay_what_they_are_whatever_was_imported_before(first):
     before = f"import {first}" if "." in first else f"gcodejerk.{first}"
-    loaded_by(f"import gcodejerk\n{before}\nfor name in ('verify', 'process', 'plan_move'):\n"
+    loaded_by(f"import gcodejerk\n{before}\n"
+              "for name in ('verify', 'process', 'plan_move', 'residual', 'amplitude_map'):\n"
               "    assert callable(getattr(gcodejerk, name)), name")  # fmt: skip
 
 
