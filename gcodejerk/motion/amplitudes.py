@@ -139,7 +139,7 @@ def undamped_amplitude(
     """
     first, total = checked_times(T1, T_SUM)
     omega = np.abs(mode_poles(frequency, 0.0))
-    J1 = np.abs(condition_accelerations(condition, length, first, total)[0]) / first
+    J1 = np.abs(condition_accelerations(condition, length, first, total)[0]) / first  # noqa: N806
     other = 0.5 * total - first
     R = other / first
     kind = Condition.of(condition)

@@ -20,7 +20,7 @@ def equation_28(length, T1, T_SUM, frequency):
     T1, T = T1[np.newaxis, :], T_SUM[:, np.newaxis]
     T2 = T / 2.0 - T1
     R = T2 / T1
-    J1 = 6.0 * length / (T1**2 * T * (2.0 * R + 1.0))
+    J1 = 6.0 * length / (T1**2 * T * (2.0 * R + 1.0))  # noqa: N806
     return 2.0 * J1 / omega * np.abs((1.0 + 1.0 / R) * np.sin(omega * T2) - np.sin(omega * T / 2.0))
 
 
