@@ -15,7 +15,7 @@ import typer
 
 from gcodejerk import __version__
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
-from gcodejerk.cli.moves import plan
+from gcodejerk.cli.moves import map_amplitudes, plan
 from gcodejerk.cli.programs import inspect, process
 from gcodejerk.errors import GcodejerkError
 
@@ -30,8 +30,11 @@ app = typer.Typer(
 machine_app = typer.Typer(help="Check machine files.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(machine_app, name="machine")
 
-for command in (process, inspect, plan, controllers):
-    app.command()(command)
+app.command("process")(process)
+app.command("inspect")(inspect)
+app.command("plan")(plan)
+app.command("map")(map_amplitudes)
+app.command("controllers")(controllers)
 machine_app.command("check")(machine_check)
 machine_app.command("schema")(machine_schema)
 

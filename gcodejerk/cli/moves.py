@@ -1,14 +1,22 @@
-"""The commands that take a single move: `plan`."""
+"""The commands that take a single move: `plan` and `map`."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine
+
+if TYPE_CHECKING:
+    from gcodejerk.machine import Machine
+    from gcodejerk.survey import Survey
+
+CONDITIONS = ("I", "II", "III")
+TABLE = ".csv"
+MAPS = (".png", ".svg", ".pdf", TABLE)
 
 
 def plan(
@@ -59,6 +67,84 @@ def plan(
         screen = console()
         for table in move_tables(record, conventional_motion(planned)):
             screen.print(table)
+
+
+def map_amplitudes(
+    machine: MachineOption,
+    axis: Annotated[str, typer.Option(metavar="AXIS", help="the axis that moves")],
+    length: Annotated[float, typer.Option(metavar="L", help="how far it moves [mm or deg]")],
+    mode: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODE",
+            help="number or name of a mode that the axis excites, or all: the worst displacement "
+            "(default: all; in a .csv the mode that the controller's own G0 moves most)",
+        ),
+    ] = None,
+    condition: Annotated[str, typer.Option(metavar="I/II/III", help="which profiles")] = "III",
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="draw (.png, .svg, .pdf) or write a .csv"
+        ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option(
+            min=2,
+            max=5000,
+            metavar="N",
+            help="of each axis of the map; a .csv by default keeps to the command interval",
+        ),
+    ] = None,
+    longest: Annotated[
+        float | None, typer.Option(metavar="S", help="where T_SUM ends on the map")
+    ] = None,
+) -> None:
+    """Map what is left of vibration over T1 and T_SUM, for one move of one axis."""
+    from gcodejerk.files import new_file
+
+    if condition.upper() not in CONDITIONS:
+        raise typer.BadParameter(f"--condition {condition}: choose I, II or III")
+    if output is None and (points is not None or longest is not None):
+        raise typer.BadParameter("--points and --longest are of a map that is written (-o FILE)")
+    suffix = Path(output).suffix.lower() if output is not None else ""
+    if output is not None and suffix not in MAPS:
+        raise typer.BadParameter(f"-o {output}: a map is one of {', '.join(MAPS)}")
+    described = load_machine(machine, None)
+    survey = _survey(described, axis, length, condition.upper(), mode, suffix == TABLE)
+    if output is None:
+        from gcodejerk.report.tables import map_tables
+
+        screen = console()
+        for table in map_tables(survey):
+            screen.print(table)
+        return
+    with new_file(output) as file:
+        if suffix == TABLE:
+            from gcodejerk.report.map_csv import map_csv
+
+            grid = survey.axes(points, longest) if points else survey.interval_axes(longest)
+            file.write(map_csv(survey, *grid))
+        else:
+            from gcodejerk.report.map_figure import POINTS, plot_map
+
+            plot_map(survey, file, Path(output).suffix, points or POINTS, longest)
+
+
+def _survey(
+    machine: Machine, axis: str, length: float, condition: str, mode: str | None, table: bool
+) -> Survey:
+    """The survey of the mode that was asked for, or of the one that the output is best made of."""
+    from gcodejerk.survey import ALL, Survey
+
+    survey = Survey.of(machine, axis, length, condition, mode or ALL)
+    if mode is not None or not (table or len(survey.modes) == 1):
+        return survey
+    chosen = survey.dominant
+    if len(survey.modes) > 1:
+        print(f"mode {chosen.name}, {chosen.frequency:g} Hz; choose another one with --mode")
+    return Survey.of(machine, axis, length, condition, chosen.name)
 
 
 def _displacement(moves: list[str]) -> dict[str, float]:

@@ -6,12 +6,18 @@ um.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich import box
+from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from gcodejerk.motion.conditions import Peaks
+    from gcodejerk.survey import Survey
 
 UM_PER_MM = 1000.0
 MS_PER_S = 1000.0
@@ -148,6 +154,75 @@ def _residual_table(residual: Sequence[Record]) -> Table:
     return table
 
 
+def map_tables(survey: Survey) -> list[Table]:
+    """A survey in figures: the profile it would choose, and what each mode keeps of it.
+
+    Parameters
+    ----------
+    survey : Survey
+        The move, and the modes it is judged by.
+
+    Returns
+    -------
+    list of Table
+        One of the profile beside the limits, one of the modes; the first alone says so where no
+        time is long enough for the limits.
+    """
+    chosen, unit = survey.choose(), survey.unit
+    move = _table(
+        (f"{survey.axis.name} {survey.length:g} {unit}", "left"),
+        ("T_SUM\n[ms]", "right"),
+        ("T1\n[ms]", "right"),
+        (f"velocity\n[{unit}/s]", "right"),
+        (f"acceleration\n[{unit}/s^2]", "right"),
+        (f"jerk\n[{unit}/s^3]", "right"),
+    )
+    move.add_row("limit", "", "", *_peaks(survey.limit, "none"))
+    usual = _peaks(survey.conventional_peaks, "step")
+    move.add_row("conventional today", f"{survey.conventional_time * MS_PER_S:.6g}", "", *usual)
+    if chosen is None:
+        move.add_row(f"Condition {survey.condition}: in no time within the limits")
+        return [move]
+    move.add_row(
+        f"Condition {survey.condition}, best",
+        f"{chosen.T_SUM * MS_PER_S:.6g}",
+        f"{chosen.T1 * MS_PER_S:.4g}",
+        *_peaks(survey.peaks(chosen), "step"),
+    )
+    modes = _table(
+        ("mode", "left"),
+        ("frequency\n[Hz]", "right"),
+        ("damping\n[-]", "right"),
+        (f"amplitude [{unit}/s^2]\ntoday -> best", "right"),
+        (f"displacement [{'um' if unit == 'mm' else 'deg/1000'}]\ntoday -> best", "right"),
+        ("next null [ms]\nT_SUM (T1)", "right"),
+    )
+    for mode in survey.judged:
+        now = survey.conventional_amplitude(mode)
+        then = survey.amplitude(mode, chosen.T1, chosen.T_SUM)
+        moved = [survey.displacement(mode, a) * UM_PER_MM for a in (now, then)]
+        null = survey.nearest_null(mode, survey.time)
+        modes.add_row(
+            mode.name,
+            f"{mode.frequency:g}",
+            f"{mode.damping:g}",
+            f"{now:.1f} -> {then:.1f}",
+            f"{moved[0]:.2f} -> {moved[1]:.2f}",
+            f"{null[1] * MS_PER_S:.6g} ({null[0] * MS_PER_S:.4g})" if null else "-",
+        )
+    return [move, modes]
+
+
+def _peaks(peaks: Peaks, infinite: str) -> tuple[str, str, str]:
+    """Velocity, acceleration and jerk, with a word for a jerk that is infinite."""
+    jerk = float(peaks.jerk)
+    return (
+        f"{float(peaks.velocity):.2f}",
+        f"{float(peaks.acceleration):.1f}",
+        f"{jerk:.4g}" if jerk < math.inf else infinite,
+    )
+
+
 def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
     """Emitters: name, what each can write, and how far its facts can be trusted."""
     table = _table(
@@ -162,7 +237,8 @@ def _table(*columns: tuple[str, str]) -> Table:
     """A table without frame, its head underlined."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
     for name, justify in columns:
-        table.add_column(name, justify=justify, overflow="fold")  # type: ignore[arg-type]
+        # Unescaped, a unit in brackets is taken for a style and vanishes.
+        table.add_column(escape(name), justify=justify, overflow="fold")  # type: ignore[arg-type]
     return table
 
 

@@ -19,7 +19,7 @@ ROOT = Path(gcodejerk.__file__).parent
 PICTURE = """
     errors units reasons
  <- nc | machine | motion
- <- start plans plan stream move
+ <- start plans plan stream move survey
  <- emit | verification | testing
  <- pipeline
  <- report

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```console\n\$ (gcodejerk [^\n]*)\n(.*?)\n```", README, flags=re.DOTALL)
 COMMANDS = [
-    *(command.callback.__name__ for command in app.registered_commands),
+    *(command.name for command in app.registered_commands),
     *(f"machine {command.name}" for command in machine_app.registered_commands),
 ]
 

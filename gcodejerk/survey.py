@@ -1,0 +1,361 @@
+"""A survey: one move of one axis, over every T1 and T_SUM that four segments can have.
+
+This module joins a machine with the amplitude maps of `motion`: which modes the axis shakes, what
+the controller's own G0 leaves, where the limits bind, and the point that would be chosen. It knows
+no file and draws nothing; `report.map_figure` and `report.map_csv` do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.errors import PlanError
+from gcodejerk.machine import Axis, Machine, Mode
+from gcodejerk.motion import (
+    SymmetricLaws,
+    conventional_laws,
+    mode_poles,
+    residual_displacement,
+    symmetric_response,
+    whole_intervals,
+)
+from gcodejerk.motion.amplitudes import null_curve
+from gcodejerk.motion.conditions import Condition, Peaks, condition_peaks, feasible, limit_use
+from gcodejerk.motion.maps import amplitude_map, displacement_map
+
+Array = NDArray[np.float64]
+
+ALL = "all"
+"""In place of a mode: the worst displacement over all of them."""
+SEARCH = 2001
+"""Points of a search for the best T1; it is repeated around the best of them."""
+WITHIN = 1.0 + 1e-9
+"""A limit that is just reached is kept."""
+MOST_POINTS = 1000
+"""Rows of a table on the command interval; a longer one takes every second, third and so on."""
+MOST_INTERVALS = 1 << 22
+"""No search for a feasible time goes beyond this number of intervals."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A point of the map."""
+
+    T1: float
+    """[s]"""
+    T_SUM: float
+    """[s]"""
+    value: float
+    """What the map says there. [mm/s^2], or [mm] where it is of all modes"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Survey:
+    """One move of one axis, and the modes by which its profiles are judged.
+
+    Attributes
+    ----------
+    machine : Machine
+        Its limits, modes and interval.
+    axis : Axis
+        The axis that moves.
+    length : float
+        How far, without sign. [mm] or [deg]
+    condition : Condition
+        The family of profiles.
+    modes : tuple of Mode
+        Every mode that the axis excites.
+    mode : Mode or None
+        The one whose amplitude is mapped; None: the worst displacement over all.
+    """
+
+    machine: Machine
+    axis: Axis
+    length: float
+    condition: Condition
+    modes: tuple[Mode, ...]
+    mode: Mode | None
+
+    @classmethod
+    def of(
+        cls, machine: Machine, axis: str, length: float, condition: str = "III", mode: str = ALL
+    ) -> Survey:
+        """Survey a move.
+
+        Parameters
+        ----------
+        machine : Machine
+            The machine that moves.
+        axis : str
+            Letter of the axis.
+        length : float
+            How far it moves. [mm] or [deg]
+        condition : str, optional
+            I, II or III.
+        mode : str, optional
+            Name or number (from 1) of a mode that the axis excites, or `all`.
+
+        Returns
+        -------
+        Survey
+
+        Raises
+        ------
+        MachineError
+            The machine has no such axis.
+        PlanError
+            The length is no length, the axis excites no mode, or there is no such mode.
+        """
+        described = machine.axis(axis.upper())
+        if not (np.isfinite(length) and length != 0.0):
+            raise PlanError(
+                f"{described.name} moves by {length:g}, expected a length other than zero",
+                "for example --length 1",
+            )
+        modes = tuple(m for _, m in machine.all_modes() if m.participation_of(described.name))
+        if not modes:
+            raise PlanError(
+                f"axis {described.name} of {machine.source} excites no mode: nothing to map",
+                f"describe its modes in the machine file (axes.{described.name}.modes)",
+            )
+        found = None if mode == ALL else _find_mode(modes, mode, described.name)
+        return cls(machine, described, abs(length), Condition.of(condition), modes, found)
+
+    @property
+    def unit(self) -> str:
+        """Unit of lengths."""
+        return "deg" if self.axis.rotary else "mm"
+
+    @property
+    def judged(self) -> tuple[Mode, ...]:
+        """The modes that the map is of."""
+        return self.modes if self.mode is None else (self.mode,)
+
+    @property
+    def conventional_time(self) -> float:
+        """What the controller's own G0 takes [s]."""
+        return float(self._conventional().total[0])
+
+    @property
+    def time(self) -> float:
+        """T_SUM: the conventional time, rounded up to whole intervals [s]."""
+        return self._whole(self.conventional_time)
+
+    @property
+    def limit(self) -> Peaks:
+        """What a designed profile may use."""
+        limit = self.axis.limit
+        return Peaks(*(np.array(x) for x in (limit.velocity, limit.acceleration, limit.jerk)))
+
+    @property
+    def conventional_peaks(self) -> Peaks:
+        """What the controller's own G0 reaches; the jerk of a trapezoid is infinite."""
+        law = self._conventional()
+        return Peaks(
+            *(self.length * peak[0] for peak in (law.velocity, law.acceleration, law.jerk))
+        )
+
+    def values(self, T1: Array, T_SUM: Array) -> Array:
+        """The map over two axes [s]: amplitude of the mode [mm/s^2], or displacement [mm]."""
+        if self.mode is not None:
+            return amplitude_map(
+                self.length, T1, T_SUM, self.mode.frequency, self.mode.damping, self.condition
+            )
+        return displacement_map(
+            self.length,
+            T1,
+            T_SUM,
+            [m.frequency for m in self.modes],
+            [m.damping for m in self.modes],
+            [self._weight(m) for m in self.modes],
+            self.condition,
+        )
+
+    def use(self, T1: Array, T_SUM: Array) -> Peaks:
+        """How much of each limit every point uses, shapes (k, n); NaN where there is no profile."""
+        column, row = np.meshgrid(T1, T_SUM)
+        there = feasible(column, row)
+        parts = limit_use(self.condition, self.length, column[there], row[there], self.limit)
+        grids = [np.full(there.shape, np.nan) for _ in parts]
+        for grid, part in zip(grids, parts, strict=True):
+            grid[there] = part
+        return Peaks(*grids)
+
+    def amplitude(self, mode: Mode, T1: float, T_SUM: float) -> float:
+        """What one mode keeps of a profile, for participation 1 [mm/s^2]."""
+        return float(
+            amplitude_map(
+                self.length, T1, T_SUM, mode.frequency, mode.damping, self.condition
+            ).item()
+        )
+
+    def displacement(self, mode: Mode, amplitude: float) -> float:
+        """What an amplitude [mm/s^2] of a mode is at the tool, participation included [mm]."""
+        return self._weight(mode) * amplitude / (2.0 * np.pi * mode.frequency) ** 2
+
+    def conventional_amplitude(self, mode: Mode) -> float:
+        """What one mode keeps of the controller's own G0, for participation 1 [mm/s^2]."""
+        poles = mode_poles([mode.frequency], [mode.damping])
+        unit = residual_displacement(symmetric_response(self._conventional(), poles), poles)
+        return float(unit[0, 0] * self.length * (2.0 * np.pi * mode.frequency) ** 2)
+
+    @property
+    def conventional_value(self) -> float:
+        """What the map would say of the controller's own G0 [mm/s^2] or [mm]."""
+        if self.mode is not None:
+            return self.conventional_amplitude(self.mode)
+        return max(self.displacement(m, self.conventional_amplitude(m)) for m in self.modes)
+
+    @property
+    def dominant(self) -> Mode:
+        """The mode of those judged that the controller's own G0 moves most."""
+        return max(self.judged, key=lambda m: self.displacement(m, self.conventional_amplitude(m)))
+
+    def peaks(self, chosen: Chosen) -> Peaks:
+        """Largest velocity, acceleration and jerk of a point's profile."""
+        return condition_peaks(self.condition, self.length, chosen.T1, chosen.T_SUM)
+
+    def choose(self) -> Chosen | None:
+        """The best profile within the limits, in the conventional time if one fits into it.
+
+        Returns
+        -------
+        Chosen or None
+            At T_SUM, or at the least number of intervals above it into which a profile within the
+            limits fits; T1 and T_SUM/2 - T1 are at least one interval. None where no time is long
+            enough.
+        """
+        count = least = int(whole_intervals(np.array(self.time), self.machine.interval))
+        while not self._fits(count):
+            least, count = count + 1, 2 * count
+            if count > MOST_INTERVALS:
+                return None
+        while least < count:
+            middle = (least + count) // 2
+            if self._fits(middle):
+                count = middle
+            else:
+                least = middle + 1
+        T = count * self.machine.interval
+        low, high = self.machine.interval, 0.5 * T - self.machine.interval
+        for _ in range(3):
+            T1 = np.linspace(low, high, SEARCH)
+            value = self.values(T1, np.array([T]))[0]
+            value[~self._within(T1, T)] = np.inf
+            # Conditions I and II leave as much with T1 and T_SUM/2 - T1 exchanged: the shorter one.
+            best = int(np.flatnonzero(value <= value.min() * WITHIN)[0])
+            low, high = T1[max(best - 1, 0)], T1[min(best + 1, len(T1) - 1)]
+        return Chosen(float(T1[best]), T, float(value[best]))
+
+    def _conventional(self) -> SymmetricLaws:
+        """The unit law of the controller's own G0."""
+        rapid, L = self.axis.rapid, self.length
+        return conventional_laws([rapid.velocity / L], [rapid.acceleration / L], [rapid.jerk / L])
+
+    def nulls(self, T_SUM: Array) -> Array:
+        """T1 at which the dominant mode without damping would keep nothing; see `null_curve`."""
+        if self.condition is not Condition.III:
+            return np.empty((0, len(T_SUM)))
+        return null_curve(T_SUM, self.dominant.frequency)
+
+    def nearest_null(self, mode: Mode, T_SUM: float) -> tuple[float, float] | None:
+        """T1 and T_SUM of the first exact null of a mode (without damping) from a time on [s].
+
+        T_SUM is a whole number of intervals and T1 at least one; where a time has several, T1 is
+        the longest, which asks for the least jerk.
+        """
+        if self.condition is not Condition.III:
+            return None
+        interval = self.machine.interval
+        # A null exists in every time from 1.43 periods on, T1 at least one interval soon after.
+        last = max(T_SUM, 2.0 / mode.frequency) + 16.0 * interval
+        T = np.arange(round(T_SUM / interval), round(last / interval) + 1) * interval
+        curve = null_curve(T, mode.frequency)
+        there = np.flatnonzero((np.nan_to_num(curve) >= interval).any(axis=0))
+        if not there.size:
+            return None
+        return float(np.nanmax(curve[:, there[0]])), float(T[there[0]])
+
+    def axes(self, points: int, longest: float | None = None) -> tuple[Array, Array]:
+        """T1 and T_SUM for a picture, evenly spaced.
+
+        Parameters
+        ----------
+        points : int
+            Of each axis.
+        longest : float, optional
+            End of T_SUM; by default the conventional time stands well inside. [s]
+
+        Returns
+        -------
+        T1, T_SUM : ndarray, shape (points,)
+            [s]
+
+        Raises
+        ------
+        PlanError
+            The longest time leaves no room.
+        """
+        low, high = self._range(longest)
+        T = np.linspace(low, high, points)
+        # Half a step off zero, so that the first column is the limit of short T1.
+        first = 0.25 * high / points
+        return np.linspace(first, 0.5 * high - first, points), T
+
+    def interval_axes(self, longest: float | None = None) -> tuple[Array, Array]:
+        """T1 and T_SUM on the command interval, for a table; as `axes` otherwise."""
+        low, high = self._range(longest)
+        first, last = (round(t / self.machine.interval) for t in (low, high))
+        step = -(-(last - first) // MOST_POINTS) or 1
+        T, T1 = np.arange(first, last + 1, step), np.arange(1, (last + 1) // 2, step)
+        interval = np.float64(self.machine.interval)
+        return np.multiply(T1, interval), np.multiply(T, interval)
+
+    def _range(self, longest: float | None) -> tuple[float, float]:
+        """Shortest and longest T_SUM of the map."""
+        T, interval = self.time, self.machine.interval
+        least = max(0.4 * T, 4.0 * interval)
+        if longest is None:
+            period = 1.0 / self.dominant.frequency
+            return self._whole(least), self._whole(max(2.2 * T, min(3.0 * period, 4.0 * T)))
+        if not (np.isfinite(longest) and longest >= least + interval):
+            raise PlanError(
+                f"the map would end at T_SUM = {longest:g} s, before it begins at {least:g} s",
+                f"the conventional time is {T:g} s; for example --longest {2.0 * T:g}",
+            )
+        return self._whole(least), self._whole(longest)
+
+    def _weight(self, mode: Mode) -> float:
+        return abs(mode.participation_of(self.axis.name))
+
+    def _whole(self, time: float) -> float:
+        """A time rounded up to whole intervals."""
+        interval = self.machine.interval
+        return int(whole_intervals(np.array(time), interval)) * interval
+
+    def _within(self, T1: Array, T: float) -> NDArray[np.bool_]:
+        """Which T1 keep the limits."""
+        use = np.stack(self.use(T1, np.array([T])))[:, 0]
+        return np.asarray((use <= WITHIN).all(axis=0))
+
+    def _fits(self, count: int) -> bool:
+        """Whether a time of so many intervals has a profile within the limits."""
+        interval = self.machine.interval
+        if count < 4:
+            return False
+        T1 = np.linspace(interval, 0.5 * count * interval - interval, SEARCH)
+        return bool(self._within(T1, count * interval).any())
+
+
+def _find_mode(modes: tuple[Mode, ...], wanted: str, axis: str) -> Mode:
+    """The mode of that name, or of that number."""
+    for k, mode in enumerate(modes, start=1):
+        if wanted in (mode.name, str(k)):
+            return mode
+    listed = ", ".join(f"{k} ({mode.name})" for k, mode in enumerate(modes, start=1))
+    raise PlanError(
+        f"axis {axis} excites no mode {wanted!r}", f"choose a number or a name: {listed}; or all"
+    )
