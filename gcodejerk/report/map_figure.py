@@ -105,6 +105,7 @@ class _Drawing:
     def __init__(self, survey: Survey, axes: Axes, T1: Array, T: Array) -> None:
         self.survey, self.axes, self.T1, self.T = survey, axes, T1, T
         self.values = survey.values(T1, T)
+        self.best = survey.choose()
         self.scale = 1.0 if survey.mode is not None else UM
         unit = "mm/s²" if survey.mode is not None else "µm"
         if survey.axis.rotary:
@@ -180,29 +181,47 @@ class _Drawing:
             paths = [
                 np.asarray(line) for line in lines.get_paths()[0].to_polygons(closed_only=False)
             ]
-            if paths:
-                self._name(max(paths, key=lambda path: self._along(path)[-1]), f"{name} limit")
+            self._name(paths, f"{name} limit")
 
-    def _along(self, path: Array) -> Array:
-        """Length of a line up to each of its points, as a part of the picture."""
-        seen = path / [0.5 * MS * self.T[-1], MS * (self.T[-1] - self.T[0])]
-        return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(seen, axis=0).T))])
+    def _seen(self, points: Array) -> Array:
+        """Points as parts of the picture's width and height."""
+        low, high = [0.0, MS * self.T[0]], [0.5 * MS * self.T[-1], MS * self.T[-1]]
+        return np.asarray((points - low) / np.subtract(high, low))
 
-    def _name(self, path: Array, text: str) -> None:
-        """Write a name along a line, in its second half: at its middle it may have a corner."""
-        along = self._along(path)
-        if along[-1] < SHORTEST_NAMED:
-            return
-        # Straight pieces have no points between their ends.
-        parts = np.array([0.6, 0.7, 0.8]) * along[-1]
-        x, y = np.interp(parts, along, path[:, 0]), np.interp(parts, along, path[:, 1])
-        angle = np.degrees(np.arctan2(y[2] - y[0], x[2] - x[0]))
-        self.axes.text(
-            x[1], y[1], text, rotation=(angle + 90.0) % 180.0 - 90.0, transform_rotates_text=True,
-            fontsize=TEXT, color=LIMIT, ha="center", va="center", zorder=5,
-            rotation_mode="anchor", clip_on=True,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0},
-        )  # fmt: skip
+    def _name(self, paths: list[Array], text: str) -> None:
+        """Write a name along one of some lines, where it is farthest from all that is marked."""
+        best, place, angle = 0.0, np.zeros(2), 0.0
+        for path in paths:
+            seen = self._seen(path)
+            along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(seen, axis=0).T))])
+            if along[-1] < SHORTEST_NAMED:
+                continue
+            for part in (0.2, 0.35, 0.5, 0.65, 0.8):
+                # Straight pieces have no points between their ends.
+                here = np.array([part - 0.1, part, part + 0.1]) * along[-1]
+                points = np.stack([np.interp(here, along, path[:, k]) for k in (0, 1)], axis=1)
+                room = self._room(points[1])
+                if room > best:
+                    best, place = room, points[1]
+                    angle = float(np.degrees(np.arctan2(*(points[2] - points[0])[::-1])))
+        if best > 0.0:
+            # A line along the left border is named beside it.
+            self.axes.text(
+                max(place[0], 0.01 * MS * self.T[-1]), place[1], text,
+                rotation=(angle + 90.0) % 180.0 - 90.0,
+                transform_rotates_text=True, fontsize=TEXT, color=LIMIT, ha="center",
+                va="center", zorder=5, rotation_mode="anchor", clip_on=True,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0},
+            )  # fmt: skip
+
+    def _room(self, point: Array) -> float:
+        """Distance from the borders and from the chosen point, as a part of the picture."""
+        seen = self._seen(point)
+        room = float(np.minimum(seen, 1.0 - seen).min())
+        if self.best is not None:
+            marked = self._seen(MS * np.array([self.best.T1, self.best.T_SUM]))
+            room = min(room, float(np.hypot(*(seen - marked))))
+        return room
 
     def nulls(self) -> None:
         """The analytic null curve of Condition III."""
@@ -238,7 +257,7 @@ class _Drawing:
 
     def chosen(self) -> None:
         """The best point within the limits."""
-        chosen = self.survey.choose()
+        chosen = self.best
         if chosen is None or not self.T[0] <= chosen.T_SUM <= self.T[-1]:
             return
         self.axes.plot(
