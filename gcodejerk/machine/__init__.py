@@ -1,7 +1,16 @@
 """The machine: a YAML file read into axes, limits and modes."""
 
 from gcodejerk.machine.find import find_machine
-from gcodejerk.machine.model import AXES, Axis, Design, Limits, Machine, Mode, ProgramStart
+from gcodejerk.machine.model import (
+    AXES,
+    Axis,
+    Design,
+    Limits,
+    Machine,
+    Mode,
+    ProgramStart,
+    Spectrum,
+)
 from gcodejerk.machine.problems import MachineFileError
 from gcodejerk.machine.schema import machine_schema
 from gcodejerk.machine.writer import machine_yaml
@@ -15,6 +24,7 @@ __all__ = [
     "MachineFileError",
     "Mode",
     "ProgramStart",
+    "Spectrum",
     "find_machine",
     "machine_schema",
     "machine_yaml",

@@ -95,6 +95,8 @@ class Checker:
                 return self._section(node, kind, path)
             case table.Table():
                 return self._table(node, kind, path)
+            case table.OrMapping():
+                return self._read(node, self._chosen(node, kind), path)
             case table.ListOf():
                 return self._list(node, kind, path)
             case table.Pair():
@@ -105,6 +107,11 @@ class Checker:
                 return self._flag(node, path)
             case table.Choice() | table.Text():
                 return self._words(node, kind, path)
+
+    def _chosen(self, node: yaml.Node, kind: table.OrMapping) -> table.Kind:
+        """Which of the two a node is: a mapping none of whose keys fits is a list without dash."""
+        fits = any(nearest(key, kind.mapping.names) for key in self._peek(node))
+        return kind.mapping if fits else kind.plain
 
     def _section(self, node: yaml.Node, kind: table.Section, path: KeyPath) -> Any:
         what = f"a mapping with the keys {', '.join(kind.names)}"
@@ -241,6 +248,10 @@ class Checker:
                 expected = key.kind.expected(self.unit(unit, (*path, key.name)))
             case table.Choice(words=words):
                 expected = _one_of(words)
+            case (
+                table.Text(expected=expected) | table.OrMapping(plain=table.Text(expected=expected))
+            ):
+                pass
             case _:
                 expected = "a mapping"
         remedy = f"add {key.name}: {key.example}" if key.example else key.doc
@@ -266,6 +277,7 @@ def _default(key: table.Key) -> dict[str, Any]:
 
 def _is_left_empty(node: yaml.Node, kind: table.Kind) -> bool:
     """Whether all entries of a key like `modes:` have been deleted or commented out."""
+    kind = kind.plain if isinstance(kind, table.OrMapping) else kind
     collection = isinstance(kind, table.Section | table.Table | table.ListOf)
     return collection and is_empty(node)
 
@@ -279,6 +291,8 @@ def _example(path: KeyPath) -> str | None:
     kind: table.Kind | None = table.MACHINE
     key: table.Key | None = None
     for part in path:
+        if isinstance(kind, table.OrMapping):
+            kind = kind.mapping if isinstance(part, str) else kind.plain
         match kind:
             case table.Section():
                 key = next((k for k in kind.keys if k.name == part), None)

@@ -7,13 +7,24 @@ not fit together. What a single key may hold is the table's.
 from __future__ import annotations
 
 import math
-from pathlib import PurePath
+from pathlib import Path
 from typing import Any
 
+from gcodejerk.errors import MachineError
 from gcodejerk.machine.checker import Checker, KeyPath, dotted
 from gcodejerk.machine.document import Document
-from gcodejerk.machine.model import AXES, Axis, Design, Limits, Machine, Mode, ProgramStart
+from gcodejerk.machine.model import (
+    AXES,
+    Axis,
+    Design,
+    Limits,
+    Machine,
+    Mode,
+    ProgramStart,
+    Spectrum,
+)
 from gcodejerk.machine.problems import Problems
+from gcodejerk.machine.spectrum import load_spectrum
 from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 
 JERK_OVER_RAPID = 10.0
@@ -28,7 +39,7 @@ def load_text(text: str, name: str) -> Machine:
     text : str
         YAML.
     name : str
-        What messages call the file.
+        What messages call the file; the names of spectrum files begin in its folder.
 
     Returns
     -------
@@ -44,10 +55,11 @@ def load_text(text: str, name: str) -> Machine:
     checker = Checker(Document(text, name), problems)
     values = checker.read()
     _check_axis_types(values, checker)
+    spectra = _spectra(values, Path(name).parent, checker)
     _check_frequencies(values, checker)
     _check_participations(values, checker)
     problems.raise_any()
-    return _machine(values, name, checker)
+    return _machine(values, spectra, name, checker)
 
 
 def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
@@ -108,16 +120,51 @@ def _check_participations(values: dict[str, Any], checker: Checker) -> None:
                 )
 
 
-def _machine(values: dict[str, Any], name: str, checker: Checker) -> Machine:
+def _spectra(values: dict[str, Any], folder: Path, checker: Checker) -> dict[str, Spectrum]:
+    """Read the spectra; from here on `modes` of an axis is a list, however they were given."""
+    highest = 0.5 / values["interval"] if "interval" in values else math.inf
+    spectra = {}
+    for name, axis in values.get("axes", {}).items():
+        path: KeyPath = ("axes", name, "spectrum")
+        modes, given = axis.get("modes", {}), axis.get("spectrum", {})
+        if given and modes:
+            checker.problems.add(
+                checker.place(path),
+                f"{dotted(path)} is given beside axes.{name}.modes, expected only one of them",
+                "keep the spectrum, which was measured, or the modes, which know the damping",
+            )
+        if "spectrum" in modes:
+            path, given, axis["modes"] = ("axes", name, "modes", "spectrum"), modes["spectrum"], {}
+        file = given if isinstance(given, str) else given.get("file")
+        if file is None:
+            continue
+        participation = 1.0 if isinstance(given, str) else given.get("participation", 1.0)
+        try:
+            spectra[name] = load_spectrum(file, folder, highest, participation)
+        except MachineError as error:
+            what = f"is no spectrum: {error.place}: " if error.place else ""
+            checker.problems.add(
+                checker.place(path if isinstance(given, str) else (*path, "file")),
+                f"{dotted(path)} is {file!r}, which {what}{error.problem}",
+                error.remedy,
+            )
+    return spectra
+
+
+def _machine(
+    values: dict[str, Any], spectra: dict[str, Spectrum], name: str, checker: Checker
+) -> Machine:
     controller = values["controller"]
     axes = values["axes"]
     return Machine(
-        name=values.get("name", PurePath(name).stem),
+        name=values.get("name", Path(name).stem),
         controller=controller,
         dialect=values.get("dialect", DIALECT_OF_CONTROLLER.get(controller, "auto")),
         interval=values["interval"],
         positioning=values["positioning"],
-        axes=tuple(_axis(a, axes[a], a in checker.rotary) for a in AXES if a in axes),
+        axes=tuple(
+            _axis(a, axes[a], a in checker.rotary, spectra.get(a)) for a in AXES if a in axes
+        ),
         modes=tuple(
             _mode(mode, mode["participation"]) for mode in values.get("modes", {}).values()
         ),
@@ -128,7 +175,7 @@ def _machine(values: dict[str, Any], name: str, checker: Checker) -> Machine:
     )
 
 
-def _axis(name: str, values: dict[str, Any], rotary: bool) -> Axis:
+def _axis(name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | None) -> Axis:
     return Axis(
         name=name,
         rotary=rotary,
@@ -140,6 +187,7 @@ def _axis(name: str, values: dict[str, Any], rotary: bool) -> Axis:
         modes=tuple(
             _mode(mode, {name: mode["participation"]}) for mode in values.get("modes", {}).values()
         ),
+        spectrum=spectrum,
     )
 
 

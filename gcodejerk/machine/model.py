@@ -53,6 +53,32 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True)
+class Spectrum:
+    r"""How one axis shakes as it was measured: a line spectrum in place of modes.
+
+    Every line stands for an undamped oscillator that the axis drives. With :math:`w_k` the share of
+    line k in the energy (the PSD times the width that the line stands for, over the sum of all) and
+    :math:`D_k` the residual displacement of its oscillator [mm], the residual of a move is
+
+    .. math:: D = p \sqrt{\sum_k w_k D_k^2}
+
+    with the participation p: the spectrum-weighted mean, which is convex in the jerks. A spectrum
+    holds no phase and tells no damping apart, so the residual counts as if nothing decayed.
+    """
+
+    source: str = field(compare=False)
+    """The file, as the machine file names it."""
+    frequency: tuple[float, ...]
+    """Frequency of each line, rising. [Hz]"""
+    weight: tuple[float, ...]
+    """Share of each line; all add up to 1. [-]"""
+    peak: float
+    """Frequency at which the measured PSD is largest. [Hz]"""
+    participation: float = 1.0
+    """How strongly the axis excites what was measured. [-]"""
+
+
+@dataclass(frozen=True, slots=True)
 class Axis:
     """One axis of a machine; lengths are degrees if it is rotary."""
 
@@ -69,7 +95,9 @@ class Axis:
     travel: tuple[float, float] | None
     """Lowest and highest machine coordinate, where they are known. [mm] or [deg]"""
     modes: tuple[Mode, ...]
-    """Modes that this axis alone excites."""
+    """Modes that this axis alone excites; none where there is a spectrum."""
+    spectrum: Spectrum | None = None
+    """What was measured in place of modes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +189,7 @@ class Machine:
         text : str
             YAML.
         name : str
-            What messages call the file.
+            What messages call the file. Its folder is where the names of spectrum files begin.
 
         Returns
         -------
@@ -200,9 +228,9 @@ class Machine:
     @property
     def settings_hash(self) -> str:
         """Eight hex digits that change with anything that a machine file can say."""
-        from gcodejerk.machine.writer import machine_yaml
+        from gcodejerk.machine.writer import settings_text
 
-        return hashlib.sha256(machine_yaml(self).encode()).hexdigest()[:8]
+        return hashlib.sha256(settings_text(self).encode()).hexdigest()[:8]
 
     def axis(self, name: str) -> Axis:
         """Find the axis of that letter.
@@ -231,6 +259,9 @@ class Machine:
         )
 
     def all_modes(self) -> tuple[tuple[str, Mode], ...]:
-        """Every mode with the axes that excite it as a label: `Z`, or `Y+Z` for the structure's."""
+        """Every mode with the axes that excite it as a label: `Z`, or `Y+Z` for the structure's.
+
+        Spectra are not among them.
+        """
         own = tuple((axis.name, mode) for axis in self.axes for mode in axis.modes)
         return own + tuple(("+".join(mode.axes), mode) for mode in self.modes)

@@ -54,6 +54,8 @@ def _of(kind: table.Kind) -> dict[str, Any]:
                 "minProperties": at_least,
                 "additionalProperties": False,
             }
+        case table.OrMapping(plain=plain, mapping=mapping):
+            return {"anyOf": [_of(plain), _of(mapping)]}
         case table.ListOf(of=of, at_most=at_most):
             return {"type": "array", "items": _of(of), "maxItems": at_most}
         case table.Pair(of=of):
@@ -90,6 +92,8 @@ def _key(key: table.Key) -> dict[str, Any]:
         schema["examples"] = [yaml.safe_load(key.example)]
     if not key.required and schema.get("type") in ("object", "array") and not unit:
         schema["type"] = [schema["type"], "null"]
+    if isinstance(key.kind, table.OrMapping) and isinstance(key.kind.plain, table.ListOf):
+        schema["anyOf"].append({"type": "null"})
     return schema
 
 

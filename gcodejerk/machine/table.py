@@ -10,7 +10,7 @@ Rule: defaults and bounds are in the package's own units (mm or deg, s, Hz). A u
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from gcodejerk.machine.model import AXES
@@ -134,6 +134,14 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
+class OrMapping:
+    """Something plain, or a mapping that says it at more length or otherwise."""
+
+    plain: Text | ListOf
+    mapping: Section
+
+
+@dataclass(frozen=True, slots=True)
 class Key:
     """One key of a section."""
 
@@ -158,10 +166,11 @@ class Section:
         return tuple(key.name for key in self.keys)
 
 
-Kind = Number | Text | Choice | Flag | Pair | ListOf | Table | Section
+Kind = Number | Text | Choice | Flag | Pair | ListOf | Table | Section | OrMapping
 
 _NAME = Text(r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,200}", "a name of at most 200 characters")
 _WORD = Text(r"[a-z][a-z0-9_.+-]*", "a name in lower case")
+_FILE = Text(r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,1000}", "the name of a CSV file")
 _LENGTH = Number("mm")
 _LETTERS = f"[{AXES}]"
 _AXIS_NAMES = f"an axis: {', '.join(AXES)}"
@@ -200,6 +209,17 @@ def _mode(participation: Kind, doc: str, required: bool) -> Section:
     )  # fmt: skip
 
 
+_SPECTRUM = Key("spectrum", OrMapping(_FILE, Section(
+    (
+        Key("file", _FILE, "The CSV file.", required=True, example="resonances_x.csv"),
+        Key("participation", Number("-", at_least=0.0),
+            "How strongly the axis excites what was measured.", default=1.0, example="1.0"),
+    ))),
+    "A measured spectrum in place of modes: Klipper's resonances or plain frequency [Hz] and PSD, "
+    "a CSV file that is named from the folder of this one. For a participation other than 1: "
+    "{file: FILE, participation: NUMBER}.",
+    example="resonances_x.csv")  # fmt: skip
+
 _AXIS = Section(
     (
         Key("type", Choice(("linear", "rotary")),
@@ -215,9 +235,14 @@ _AXIS = Section(
             "What a designed profile may use; what is left out is as in rapid."),
         Key("travel", Pair(_LENGTH), "Lowest and highest machine coordinate.",
             example="[-400, 50]"),
-        Key("modes", ListOf(
-            _mode(Number("-", at_least=0.0), "How strongly the axis excites the mode.", False),
-            at_most=100), "Modes that this axis alone excites."),
+        Key("modes", OrMapping(
+            ListOf(
+                _mode(Number("-", at_least=0.0), "How strongly the axis excites the mode.", False),
+                at_most=100),
+            Section((replace(_SPECTRUM, required=True),))),
+            "Modes that this axis alone excites, as a list; or {spectrum: FILE}, which is the key "
+            "spectrum."),
+        _SPECTRUM,
     )
 )  # fmt: skip
 

@@ -1,7 +1,8 @@
 """A Machine as the text of a machine file.
 
 Rule: what is written reads back as an equal Machine. Everything is spelled out, defaults too, in
-mm; so the text is also the canonical form whose hash names a machine's settings.
+mm; so the text, with the lines of spectra in place of their files, is also the canonical form whose
+hash names a machine's settings.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 
-from gcodejerk.machine.model import Axis, Limits, Machine, Mode
+from gcodejerk.machine.model import Axis, Limits, Machine, Mode, Spectrum
 from gcodejerk.machine.table import SCHEMA_VERSION
 
 
@@ -26,7 +28,8 @@ def machine_yaml(machine: Machine) -> str:
     Returns
     -------
     str
-        YAML, in mm whatever the unit of the file was.
+        YAML, in mm whatever the unit of the file was. Spectra stay files of their own: the text
+        belongs into the folder in which their names begin.
     """
     design, program = machine.design, machine.program
     offsets = {name: _flow(values) for name, values in program.offsets.items()}
@@ -58,6 +61,29 @@ def machine_yaml(machine: Machine) -> str:
     )
 
 
+def settings_text(machine: Machine) -> str:
+    """Text that is the same for equal machines only, wherever their spectra are kept.
+
+    Parameters
+    ----------
+    machine : Machine
+        As for `machine_yaml`.
+
+    Returns
+    -------
+    str
+        What `machine_yaml` writes, with what is in a spectrum file in place of its name.
+    """
+    return machine_yaml(replace(machine, axes=tuple(_with_lines(axis) for axis in machine.axes)))
+
+
+def _with_lines(axis: Axis) -> Axis:
+    if axis.spectrum is None:
+        return axis
+    lines = (axis.spectrum.peak, axis.spectrum.frequency, axis.spectrum.weight)
+    return replace(axis, spectrum=replace(axis.spectrum, source=repr(lines)))
+
+
 def _axis(axis: Axis) -> list[str]:
     lines = [
         f"  {axis.name}:",
@@ -69,7 +95,18 @@ def _axis(axis: Axis) -> list[str]:
     ]
     if axis.travel is not None:
         lines.append(f"    travel: [{', '.join(map(_number, axis.travel))}]")
+    if axis.spectrum is not None:
+        return [*lines, f"    spectrum: {_spectrum(axis.spectrum)}"]
     return lines + _modes(axis.modes, "    ", axis.name)
+
+
+def _spectrum(spectrum: Spectrum) -> str:
+    values = {
+        # Always in quotes: a file may be called 1e3.
+        "file": json.dumps(spectrum.source, ensure_ascii=False),
+        "participation": _number(spectrum.participation),
+    }
+    return _braces(values)
 
 
 def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> list[str]:

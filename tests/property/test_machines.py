@@ -1,14 +1,19 @@
 """Laws that hold on every machine that can be drawn."""
 
+import contextlib
 import math
 from dataclasses import fields, is_dataclass
+from itertools import pairwise
 
+import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gcodejerk.errors import MachineError
 from gcodejerk.machine import AXES, Limits, Machine, machine_yaml
 from gcodejerk.machine.problems import MachineFileError
+from gcodejerk.machine.spectrum import MOST_LINES, read_spectrum
 from gcodejerk.testing.machines import machines
 
 
@@ -126,3 +131,44 @@ def test_a_damaged_file_is_read_or_refused_with_its_place(machine, data):
     end = data.draw(st.integers(begin, min(begin + 20, len(text))))
     damaged = text[:begin] + data.draw(st.text(max_size=5)) + text[end:]
     assert all(problem.startswith("any.yaml") for problem in problems_of(damaged))
+
+
+@st.composite
+def spectra(draw):
+    """Rising frequencies, some a bit apart only, and a PSD over many orders of magnitude."""
+    gap = st.sampled_from([1e-12, 0.01, 0.1, 1.5, 20.0]) | st.floats(1e-9, 40.0)
+    gaps = draw(st.lists(gap, min_size=8, max_size=300))
+    start = draw(st.floats(5.0, 50.0))
+    f = [start]
+    for step in gaps:
+        f.append(max(f[-1] + step, math.nextafter(f[-1], math.inf)))
+    value = st.sampled_from([0.0, 5e-324, 1e-12, 1.0, 1e300]) | st.floats(0.0, 1e300)
+    psd = draw(st.lists(value, min_size=len(f), max_size=len(f)))
+    return f, psd
+
+
+@given(drawn=spectra(), highest=st.sampled_from([100.0, 500.0, math.inf]))
+def test_a_drawn_spectrum_is_refused_or_keeps_its_energy_in_few_lines(drawn, highest):
+    text = "".join(f"{f!r},{psd!r}\n" for f, psd in zip(*drawn, strict=True))
+    usable = [(f, psd) for f, psd in zip(*drawn, strict=True) if f < highest]
+    if len(usable) < 8 or not any(psd for _, psd in usable):
+        with pytest.raises(MachineError):
+            read_spectrum(text.encode(), "x.csv", highest)
+        return
+    spectrum = read_spectrum(text.encode(), "x.csv", highest)
+    lines = spectrum.frequency
+    assert 1 <= len(lines) == len(spectrum.weight) <= MOST_LINES
+    assert math.fsum(spectrum.weight) == 1.0
+    assert all(weight > 0.0 for weight in spectrum.weight)
+    assert all(low < high for low, high in pairwise(lines))
+    assert usable[0][0] <= lines[0]
+    assert lines[-1] <= usable[-1][0]
+    assert spectrum.peak in dict(usable)
+
+
+@given(
+    data=st.binary(max_size=200) | st.text("0123456789,.e-+#\n\r f", max_size=200).map(str.encode)
+)
+def test_any_bytes_are_a_spectrum_or_a_refusal(data):
+    with contextlib.suppress(MachineError):
+        assert read_spectrum(data, "x.csv", 500.0).frequency

@@ -15,6 +15,10 @@ VALID = {
 }
 
 
+def axis_x(**keys):
+    return {"axes": {"X": VALID["axes"]["X"] | keys}}
+
+
 @pytest.fixture(scope="module")
 def validator():
     schema = json.loads(json.dumps(machine_schema(), allow_nan=False))
@@ -52,6 +56,14 @@ def test_the_smallest_machine_is_valid(validator):
         {"program": {"offsets": {"G60": {}}}},
         {"program": {"offsets": {"H1": {"X": 1}}}},
         {"program": {"startup": "do it"}},
+        axis_x(spectrum=None),
+        axis_x(spectrum=["x.csv"]),
+        axis_x(spectrum={"participation": 1}),
+        axis_x(spectrum={"file": "x.csv", "participation": -1}),
+        axis_x(spectrum={"file": "x.csv", "damping": 0.1}),
+        axis_x(modes={"frequency": 30}),
+        axis_x(modes={"spectrum": "x.csv", "frequency": 30}),
+        axis_x(modes="x.csv"),
     ],
     ids=str,
 )
@@ -62,6 +74,22 @@ def test_what_the_loader_refuses_the_schema_refuses(validator, change):
 
 def test_a_key_left_empty_is_valid_where_the_loader_takes_it(validator):
     validator.validate(VALID | {"modes": None, "program": None, "design": None})
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"modes": None},
+        {"modes": []},
+        {"spectrum": "x.csv"},
+        {"spectrum": {"file": "x.csv", "participation": 0.5}},
+        {"modes": {"spectrum": "x.csv"}},
+        {"modes": {"spectrum": {"file": "x.csv"}}},
+    ],
+    ids=str,
+)
+def test_modes_and_spectrum_are_valid_in_every_form_that_the_loader_takes(validator, keys):
+    validator.validate(VALID | axis_x(**keys))
 
 
 def test_every_number_names_its_unit():
