@@ -152,9 +152,9 @@ def reduced(frequency: Array, psd: Array, width: Array) -> tuple[Array, Array]:
     -----
     A vibration of acceleration a at :math:`\omega` is a displacement of :math:`a/\omega^2`, so that
     what is negligible to the sensor can be most of what is left to settle: eight spectra of
-    printers hold 0.2 % of the one and 20 % to 60 % of the other below 10 Hz. Lines are left out only where they hold less
-    than `NEGLIGIBLE` of both energies, that of the acceleration and that of the displacement,
-    PSD/f^4.
+    printers hold 0.2 % of the one and 20 % to 60 % of the other below 10 Hz. Lines are left out
+    only where they hold less than `NEGLIGIBLE` of both energies, that of the acceleration and that
+    of the displacement, PSD/f^4.
 
     If too many are left, neighbours are merged in cells, each into its centroid. The cells are
     those of an n-level quantiser with the least mean square error: of the density p^(1/3) for
