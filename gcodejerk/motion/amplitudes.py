@@ -130,7 +130,8 @@ def undamped_amplitude(
         A_{III} &= \frac{2 J_1}{\omega} \left| \left(1 + \frac1R\right) \sin \omega T_2
             - \sin\frac{\omega T_{SUM}}{2} \right|
 
-    Their digits go where T1 is much shorter than the period; `condition_amplitude` keeps them.
+    III is Eq. 28; I and II are rows of Table 1 in a form of our own, found from the general rule.
+    Digits go where T1 is much shorter than the period; `condition_amplitude` keeps them.
 
     Examples
     --------
