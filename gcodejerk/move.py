@@ -65,7 +65,7 @@ class Plan:
     @property
     def profile(self) -> str:
         """Name of the profile that is written."""
-        return "conventional" if self.batch.kept[0] else "condition3"
+        return "conventional" if self.batch.kept[0] else self.plans.designed
 
     @property
     def laws(self) -> Laws:
@@ -104,16 +104,14 @@ class Plan:
         """
         modes, share = self.plans.modes, self.plans.share
         weights = share @ modes.participation.T
-        omega_squared = np.abs(modes.poles) ** 2
         columns = []
         for laws in (self.batch.laws, self.plans.conventional):
             # Laws of one move end at different times; each rings on until the last has ended.
             left = (laws.total.max() - laws.total)[:, np.newaxis]
             response = laws_response(laws, modes.poles) * np.exp(modes.poles * left) * weights
-            columns.append(np.abs(response.sum(axis=0)) / modes.poles.imag * omega_squared)
-        moving = self.plans.displacement[0] != 0.0
-        excited = ((modes.participation != 0.0) & moving).any(axis=1)
-        return [(float(columns[0][m]), float(columns[1][m])) for m in np.nonzero(excited)[0]]
+            displacement = np.abs(response.sum(axis=0)) / modes.poles.imag
+            columns.append(modes.accelerations(displacement))
+        return [(float(columns[0][m]), float(columns[1][m])) for m in self.plans.excited(0)]
 
 
 def plan_move(
@@ -133,7 +131,7 @@ def plan_move(
     machine : Machine
         Limits, modes and interval.
     profile : str, optional
-        `condition3` or `conventional`; the machine's own by default.
+        One of `plan.PROFILES`; the machine's own by default.
     time : float, optional
         T_SUM, rounded up to whole intervals; the conventional time by default. [s]
     T1 : float, optional

@@ -10,25 +10,29 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.designs import DESIGNS, Task, shortest, worst_in_band
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import (
     GRID_TOLERANCE,
+    Laws,
+    Objective,
     SymmetricLaws,
     conventional_laws,
-    design_condition3,
-    design_four_segments,
     four_segment_range,
-    symmetric_response,
+    joined,
     whole_intervals,
 )
 from gcodejerk.motion.laws import Array
+from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.nc import Rapids
+from gcodejerk.optima import Progress
 from gcodejerk.plans import Modes, Plans
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.refusals import limit_error, time_error
 
-PROFILES = ("condition3", "conventional")
-"""The profiles that this version designs."""
+PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
+"""All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
 STANDSTILL = 1e-9
 """An axis that moves less than this does not move [mm] or [deg]."""
 
@@ -62,6 +66,7 @@ def plan_moves(
     reason: NDArray[np.uint8] | None = None,
     time: float | None = None,
     T1: float | None = None,
+    progress: Progress | None = None,
 ) -> Plans:
     """Plan moves, all of them together.
 
@@ -72,13 +77,15 @@ def plan_moves(
     machine : Machine
         Limits, modes and interval.
     profile : str, optional
-        `condition3` or `conventional`; the machine's own by default.
+        One of `PROFILES`; the machine's own by default.
     reason : ndarray of uint8, shape (n,), optional
         CERTAIN, or why a move must not be planned (an index in `REASONS`).
     time : float, optional
         T_SUM for all moves, in place of the conventional time rounded up. [s]
     T1 : float, optional
         T1 of a four-segment law for all moves, in place of the best. [s]
+    progress : callable, optional
+        Called while optima are computed.
 
     Returns
     -------
@@ -93,7 +100,7 @@ def plan_moves(
     profile = profile or machine.design.profile
     if profile not in PROFILES:
         raise PlanError(
-            f"profile {profile!r} is not available in this version",
+            f"there is no profile {profile!r}",
             f"choose one of {', '.join(PROFILES)} (--profile, or the machine's design.profile)",
         )
     reason = np.full(len(displacement), CERTAIN, np.uint8) if reason is None else reason.copy()
@@ -104,10 +111,15 @@ def plan_moves(
     known = np.array([axis in machine.axis_names for axis in AXES])
     _rule_out(reason, (length == 0.0), Reason.NO_MOTION)
     _rule_out(reason, (displacement[:, ~known] != 0.0).any(axis=1), Reason.AXIS_UNKNOWN)
-    return _Planner(machine, profile, displacement, length, reason, time, T1).run()
+    return _Planner(machine, profile, displacement, length, reason, time, T1, progress).run()
 
 
-def plan_rapids(rapids: Rapids, machine: Machine, profile: str | None = None) -> Plans:
+def plan_rapids(
+    rapids: Rapids,
+    machine: Machine,
+    profile: str | None = None,
+    progress: Progress | None = None,
+) -> Plans:
     """Plan the rapids of a program, all of them together.
 
     Parameters
@@ -118,6 +130,8 @@ def plan_rapids(rapids: Rapids, machine: Machine, profile: str | None = None) ->
         Limits, modes, travel and interval.
     profile : str, optional
         The machine's own by default.
+    progress : callable, optional
+        Called while optima are computed.
 
     Returns
     -------
@@ -127,8 +141,14 @@ def plan_rapids(rapids: Rapids, machine: Machine, profile: str | None = None) ->
     Raises
     ------
     PlanError
-        The profile is unknown.
+        The profile is unknown, or adds time.
     """
+    profile = profile or machine.design.profile
+    if profile in SHAPERS:
+        raise PlanError(
+            f"profile {profile!r} adds time to every rapid: it is there for comparison only",
+            f"choose one of {', '.join(p for p in PROFILES if p not in SHAPERS)}",
+        )
     reason = rapids.reason.copy()
     known = sum(1 << AXES.index(name) for name in machine.axis_names)
     foreign = (rapids.words & ~np.uint16(known)) != 0
@@ -149,7 +169,7 @@ def plan_rapids(rapids: Rapids, machine: Machine, profile: str | None = None) ->
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)
     _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
-    return plan_moves(displacement, machine, profile, reason)
+    return plan_moves(displacement, machine, profile, reason, progress=progress)
 
 
 def _is_rotary(machine: Machine, axis: str) -> bool:
@@ -157,14 +177,6 @@ def _is_rotary(machine: Machine, axis: str) -> bool:
     if axis in machine.axis_names:
         return machine.axis(axis).rotary
     return axis in "ABC"
-
-
-def _squeezed(fastest: SymmetricLaws, total: float, interval: float) -> SymmetricLaws:
-    """One law squeezed into a shorter time, its segments no shorter than the interval."""
-    stretch = total / fastest.total
-    ramp = np.clip(fastest.T1 * stretch, interval, 0.25 * total)
-    Ta = np.clip(fastest.Ta * stretch, 0.0, 0.5 * total - 2.0 * ramp)
-    return SymmetricLaws(ramp, Ta, ramp, total - 4.0 * ramp - 2.0 * Ta)
 
 
 def _rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -> None:
@@ -184,8 +196,10 @@ class _Planner:
         reason: NDArray[np.uint8],
         time: float | None,
         T1: float | None,
+        progress: Progress | None,
     ) -> None:
         self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
+        self.progress = progress
         self.displacement, self.length, self.reason = displacement, length, reason
         self.modes = Modes.of(machine)
         self.interval = machine.interval
@@ -201,25 +215,37 @@ class _Planner:
         self.limits = self._unit_limits("limit")
         rapid = self._unit_limits("rapid")
         self.conventional = conventional_laws(*rapid)
-        self.weights: Array = np.abs(self.share @ self.modes.participation.T)
+        weights = np.abs(self.share @ self.modes.participation.T)
+        self.objective = Objective(self.modes.poles, weights, self.modes.group)
 
     def run(self) -> Plans:
         """Design every law, then gather the moves."""
         total = (
             self.conventional.total if self.time is None else np.full(len(self.share), self.time)
         )
-        counts = whole_intervals(total, self.interval)
-        counts = np.maximum(counts, 1)
+        counts = np.maximum(whole_intervals(total, self.interval), 1)
+        kept = np.zeros(len(counts), dtype=bool)
         if self.profile == "conventional":
             laws, feasible = self._conventional(counts)
-            kept = np.ones(len(counts), dtype=bool)
+            kept[:] = True
+        elif self.profile in SHAPERS:
+            laws, counts, feasible = self._shaped()
         elif self.T1 is not None:
             laws, feasible = self._given_T1(counts)
-            kept = np.zeros(len(counts), dtype=bool)
+        elif self.profile == "shortest":
+            laws, counts, feasible = self._shortest(counts)
         else:
             laws, counts, feasible, kept = self._designed(counts)
         self._rule_out_laws(~feasible, Reason.LIMITS)
         return self._plans(laws, counts, kept)
+
+    def _task(self, counts: NDArray[np.int64]) -> Task:
+        """All moves as designs see them, in these times."""
+        design = self.machine.design
+        return Task(
+            counts, self.limits, self.conventional, self.objective, self.interval,
+            design.band, design.tolerance, self.progress,
+        )  # fmt: skip
 
     def _unit_limits(self, which: str) -> tuple[Array, Array, Array]:
         """Limits of the unit laws: each axis's, divided by its displacement."""
@@ -231,13 +257,13 @@ class _Planner:
                 columns.append((axes / np.abs(self.share)).min(axis=1, initial=np.inf))
         return columns[0], columns[1], columns[2]
 
-    def _conventional(self, counts: NDArray[np.int64]) -> tuple[SymmetricLaws, NDArray[np.bool_]]:
+    def _conventional(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
         """The controller's own laws; a trapezoid cannot be written with finite jerk."""
         laws = self.conventional
         if self.time is not None:
             stretch = counts * self.interval / laws.total
             laws = SymmetricLaws(*(column * stretch for column in laws.columns()))
-        return laws, self._within_limits(laws)
+        return laws.general(), self._within_limits(laws)
 
     def _within_limits(self, laws: SymmetricLaws) -> NDArray[np.bool_]:
         """Whether laws keep the limits of a designed profile."""
@@ -245,7 +271,27 @@ class _Planner:
         jerk = laws.jerk
         return (laws.velocity <= V) & (laws.acceleration <= A) & (jerk <= J) & np.isfinite(jerk)
 
-    def _given_T1(self, counts: NDArray[np.int64]) -> tuple[SymmetricLaws, NDArray[np.bool_]]:
+    def _shaped(self) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_]]:
+        """The conventional laws behind an input shaper, for the mode that shakes most."""
+        if self.time is not None:
+            raise PlanError(
+                f"the time of profile {self.profile} follows from its shaper",
+                "leave out --time, or choose another profile",
+            )
+        laws = self.conventional.general()
+        modes = self.modes
+        if len(modes.poles):
+            frequency = np.abs(modes.poles[self.objective.dominant(laws)]) / (2.0 * np.pi)
+            laws = joined(
+                [
+                    shaped_law(laws.take(np.array([row])), self.profile, float(frequency[row]))
+                    for row in range(len(laws))
+                ]
+            )
+        fits = self._within_limits(self.conventional)
+        return laws, whole_intervals(laws.total, self.interval), fits
+
+    def _given_T1(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
         """Four segments with the T1 that the user asked for."""
         assert self.T1 is not None
         total: Array = np.asarray(counts * self.interval, dtype=float)
@@ -263,20 +309,42 @@ class _Planner:
         bad = ~((low - tolerance <= T1) & (high + tolerance >= T1))
         if bad.any():
             row = int(np.nonzero(bad)[0][0])
-            raise self._limit_error(laws, row, f"with T1 = {self.T1:g} s ")
-        return laws, ~bad
+            raise limit_error(
+                self.machine, self.share[row], laws.take(slice(row, row + 1)),
+                f"with T1 = {self.T1:g} s ",
+            )  # fmt: skip
+        return laws.general(), ~bad
+
+    def _shortest(
+        self, least: NDArray[np.int64]
+    ) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_]]:
+        """The least time in which the vibration stays within the tolerance."""
+        if self.time is not None:
+            raise PlanError(
+                "the time of profile shortest is what it looks for",
+                "leave out --time, or choose profile optimal",
+            )
+        fastest = conventional_laws(*self.limits, self.interval).total
+        # What the controller's own move and two periods of every mode take is always enough...
+        slack = 2.0 * float((2.0 * np.pi / self.modes.poles.imag).sum())
+        longest = whole_intervals(
+            np.maximum(fastest, self.conventional.total) + slack, self.interval
+        )
+        task = self._task(whole_intervals(fastest, self.interval))
+        laws, worst, counts = shortest(task, longest)
+        return laws, counts, np.isfinite(worst)
 
     def _designed(
         self, counts: NDArray[np.int64]
-    ) -> tuple[SymmetricLaws, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
-        """Condition III of unchanged time; longer only where the limits leave no room."""
-        laws, worst = self._search(counts, np.arange(len(counts)))
+    ) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+        """A profile of unchanged time; longer only where the limits leave no room."""
+        laws, worst = DESIGNS[self.profile](self._task(counts))
         kept = np.zeros(len(counts), dtype=bool)
         fits = self._within_limits(self.conventional)
         if self.time is None:
-            reference = self._worst(self.conventional)
+            reference = self._judged(self._task(counts), self.conventional.general())
             keep = fits & (worst >= reference - self._noise())
-            laws = laws.replaced(keep, self.conventional.take(keep))
+            laws = laws.replaced(keep, self.conventional.take(keep).general())
             worst = np.where(keep, reference, worst)
             kept |= keep
             laws, counts, worst = self._extend(laws, counts, worst)
@@ -285,41 +353,19 @@ class _Planner:
             self._rule_out_laws(worse, Reason.NOT_BETTER)
         elif not np.isfinite(worst).all():
             row = int(np.nonzero(~np.isfinite(worst))[0][0])
-            raise self._time_error(row, counts[row] * self.interval)
+            limits = tuple(limit[row : row + 1] for limit in self.limits)
+            total = float(counts[row] * self.interval)
+            raise time_error(self.machine, self.share[row], limits, total, self.profile)
         return laws, counts, np.isfinite(worst), kept
 
-    def _search(
-        self, counts: NDArray[np.int64], rows: NDArray[np.intp]
-    ) -> tuple[SymmetricLaws, Array]:
-        """The best laws for these rows; the worst residual is infinite where there is none."""
-        total: Array = np.asarray(counts[rows] * self.interval, dtype=float)
-        V, A, J = (limit[rows] for limit in self.limits)
-        weights, conventional = self.weights[rows], self.conventional.take(rows)
-        # Four segments where the conventional law has them: it is then a member of the family.
-        four = (conventional.Ta == 0.0) & (conventional.Tv == 0.0)
-        low, high = four_segment_range(total, V, A, J, self.interval)
-        four &= low <= high
-        poles = self.modes.poles
-        zero = np.zeros(len(rows))
-        laws, worst = SymmetricLaws(zero, zero, zero, zero), np.full(len(rows), np.inf)
-        for chosen, part in ((four, "four"), (~four, "general")):
-            index = np.nonzero(chosen)[0]
-            if part == "four":
-                found, value = design_four_segments(
-                    total[index], low[index], high[index], poles, weights[index]
-                )
-            else:
-                found, value, _ = design_condition3(
-                    total[index], V[index], A[index], J[index], poles, weights[index],
-                    self.interval, conventional.take(index),
-                )  # fmt: skip
-            laws = laws.replaced(index, found)
-            worst[index] = value
-        return laws, worst
+    def _judged(self, task: Task, laws: Laws) -> Array:
+        """Largest residual displacement of laws, as the profile judges its own [mm]."""
+        nominal = task.objective.of(laws)
+        return worst_in_band(task, laws) if self.profile == "optimal" else nominal
 
     def _extend(
-        self, laws: SymmetricLaws, counts: NDArray[np.int64], worst: Array
-    ) -> tuple[SymmetricLaws, NDArray[np.int64], Array]:
+        self, laws: Laws, counts: NDArray[np.int64], worst: Array
+    ) -> tuple[Laws, NDArray[np.int64], Array]:
         """The least feasible time, at most `max_extension` longer, where T_SUM is impossible."""
         rows = np.nonzero(~np.isfinite(worst))[0]
         if not len(rows):
@@ -334,20 +380,13 @@ class _Planner:
             rows = rows[counts[rows] <= most[rows]]
             if not len(rows):
                 break
-            found, value = self._search(counts, rows)
+            found, value = DESIGNS[self.profile](self._task(counts).take(rows))
             done = np.isfinite(value)
             laws = laws.replaced(rows[done], found.take(done))
             worst[rows[done]] = value[done]
             rows = rows[~done]
             counts[rows] += 1
         return laws, counts, worst
-
-    def _worst(self, laws: SymmetricLaws) -> Array:
-        """Largest residual displacement of laws over the modes [mm]."""
-        poles = self.modes.poles
-        amplitude = np.abs(symmetric_response(laws, poles)) / poles.imag * self.weights
-        worst: Array = amplitude.max(axis=1, initial=0.0)
-        return worst
 
     def _noise(self) -> Array:
         """What rounding may add to a residual: below this a design has gained nothing [mm]."""
@@ -365,9 +404,7 @@ class _Planner:
         moves[self.move[where]] = True
         _rule_out(self.reason, moves, why)
 
-    def _plans(
-        self, laws: SymmetricLaws, counts: NDArray[np.int64], kept: NDArray[np.bool_]
-    ) -> Plans:
+    def _plans(self, laws: Laws, counts: NDArray[np.int64], kept: NDArray[np.bool_]) -> Plans:
         """The laws of planned moves, and the moves' own columns."""
         conventional_time = np.zeros(len(self.reason))
         np.maximum.at(conventional_time, self.move, self.conventional.total)
@@ -384,52 +421,9 @@ class _Planner:
             counts=move_counts,
             move=self.move[keep],
             share=self.share[keep],
-            laws=laws.take(keep).general(),
+            laws=laws.take(keep),
             conventional=self.conventional.take(keep).general(),
             law_counts=counts[keep],
             kept=kept[keep],
-        )
-
-    def _limit_error(self, laws: SymmetricLaws, row: int, how: str) -> PlanError:
-        """Which axis passes which limit, in the words of its unit."""
-        law = laws.take(slice(row, row + 1))
-        total = float(law.total[0])
-        if float(np.minimum(law.T1, law.T2)[0]) < self.interval * (1.0 - 1e-9):
-            return PlanError(
-                f"T1 = {float(law.T1[0]):g} s leaves a segment shorter than the interval "
-                f"of {self.interval:g} s",
-                f"give a T1 from {self.interval:g} to {0.5 * total - self.interval:g} s",
-            )
-        units = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
-        for quantity in ("velocity", "acceleration", "jerk"):
-            for axis in self.machine.axes:
-                peak = float(
-                    getattr(law, quantity)[0] * abs(self.share[row, AXES.index(axis.name)])
-                )
-                limit = getattr(axis.limit, quantity)
-                if peak > limit * (1.0 + 1e-9):
-                    unit = ("deg" if axis.rotary else "mm") + units[quantity]
-                    return PlanError(
-                        f"{how}axis {axis.name} reaches {peak:.6g} {unit} of {quantity} "
-                        f"in {total:.3f} s, above its limit of {limit:.6g} {unit}",
-                        f"allow more time (--time), or raise axes.{axis.name}.limit.{quantity}",
-                    )
-        raise AssertionError("a law outside its range keeps every limit")
-
-    def _time_error(self, row: int, total: float) -> PlanError:
-        """A time too short for the limits, with the least that would do."""
-        V, A, J = (limit[row : row + 1] for limit in self.limits)
-        fastest = conventional_laws(V, A, J, self.interval)
-        least = float(whole_intervals(fastest.total, self.interval)[0] * self.interval)
-        if total >= 4.0 * self.interval:
-            law = _squeezed(fastest, total, self.interval)
-            if bool((law.velocity > V) | (law.acceleration > A) | (law.jerk > J)):
-                error = self._limit_error(law, row, "")
-                return PlanError(
-                    error.problem, f"allow at least {least:.6g} s (--time {least:.6g})"
-                )
-        return PlanError(
-            f"no profile of {total:g} s keeps the limits and has segments of at least "
-            f"{self.interval:g} s",
-            f"allow at least {least:.6g} s (--time {least:.6g})",
+            designed=self.profile,
         )

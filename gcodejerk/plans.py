@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.machine import AXES, Machine, Mode
-from gcodejerk.motion import Laws, mode_poles
+from gcodejerk.motion import Laws, grouped, mode_poles
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.reasons import CERTAIN
@@ -21,35 +21,70 @@ from gcodejerk.reasons import CERTAIN
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """A machine's modes as columns.
+    """A machine's modes as columns: g of them, and the m oscillators that they stand for.
+
+    A mode is one oscillator. A measured spectrum is one entry here too, but many oscillators, which
+    count together.
 
     Attributes
     ----------
-    labels : tuple of str
+    labels : tuple of str, length g
         The axes that excite each: `Z`, or `Y+Z`.
-    modes : tuple of Mode
-        The modes themselves.
+    modes : tuple of Mode, length g
+        The modes themselves; a spectrum's stands for the frequency of its peak.
     poles : ndarray of complex, shape (m,)
         [rad/s]
     participation : ndarray, shape (m, 9)
         Of each axis of `AXES`. [-]
+    group : ndarray of int, shape (m,)
+        The entry that each oscillator belongs to.
     """
 
     labels: tuple[str, ...]
     modes: tuple[Mode, ...]
     poles: Complex
     participation: Array
+    group: NDArray[np.int64]
 
     @classmethod
     def of(cls, machine: Machine) -> Modes:
         """The modes of a machine."""
-        pairs = machine.all_modes()
-        modes = tuple(mode for _, mode in pairs)
-        poles = mode_poles([mode.frequency for mode in modes], [mode.damping for mode in modes])
-        participation = np.array(
-            [[mode.participation_of(axis) for axis in AXES] for mode in modes], dtype=float
-        ).reshape(len(modes), len(AXES))
-        return cls(tuple(label for label, _ in pairs), modes, poles, participation)
+        labels: list[str] = []
+        modes: list[Mode] = []
+        poles: list[complex] = []
+        rows: list[Array] = []
+        group: list[int] = []
+        for label, mode in machine.all_modes():
+            group.append(len(modes))
+            labels.append(label)
+            modes.append(mode)
+            poles.append(complex(mode_poles(mode.frequency, mode.damping)))
+            rows.append(np.array([mode.participation_of(axis) for axis in AXES], dtype=float))
+        for axis in machine.axes:
+            if axis.spectrum is None:
+                continue
+            spectrum = axis.spectrum
+            own = np.array([spectrum.participation * (a == axis.name) for a in AXES], dtype=float)
+            for frequency, weight in zip(spectrum.frequency, spectrum.weight, strict=True):
+                group.append(len(modes))
+                poles.append(complex(mode_poles(frequency, 0.0)))
+                rows.append(own * np.sqrt(weight))
+            labels.append(axis.name)
+            excited = ((axis.name, spectrum.participation),)
+            modes.append(Mode(f"spectrum {spectrum.source}", spectrum.peak, 0.0, excited))
+        participation = np.array(rows).reshape(len(rows), len(AXES))
+        order = np.array(poles, dtype=np.complex128)
+        return cls(
+            tuple(labels), tuple(modes), order, participation, np.array(group, dtype=np.int64)
+        )
+
+    def grouped(self, amplitude: Array) -> Array:
+        """Amplitudes of the entries from those of the oscillators, (..., m) -> (..., g)."""
+        return grouped(amplitude, self.group)
+
+    def accelerations(self, displacement: Array) -> Array:
+        """Acceleration amplitudes of the entries, (..., m) -> (..., g) [mm/s^2]."""
+        return self.grouped(displacement * np.abs(self.poles) ** 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +117,8 @@ class Plans:
         T_SUM of each law. [intervals]
     kept : ndarray of bool, shape (l,)
         The law is the conventional one, because none is better.
+    designed : str
+        Name of the profile that all other laws follow.
     """
 
     machine: Machine
@@ -97,6 +134,7 @@ class Plans:
     conventional: Laws
     law_counts: NDArray[np.int64]
     kept: NDArray[np.bool_]
+    designed: str
 
     def __len__(self) -> int:
         return len(self.reason)
@@ -109,7 +147,13 @@ class Plans:
 
     def profile(self, law: int) -> str:
         """Name of the profile that a law follows."""
-        return "conventional" if self.kept[law] else "condition3"
+        return "conventional" if self.kept[law] else self.designed
+
+    def excited(self, move: int) -> list[int]:
+        """The entries of the modes that a move excites."""
+        moving = self.displacement[move] != 0.0
+        used = ((self.modes.participation != 0.0) & moving).any(axis=1)
+        return sorted(set(self.modes.group[used].tolist()))
 
     def laws_of(self, move: int) -> range:
         """The laws of a move."""

@@ -170,8 +170,8 @@ def _make_batch(plans: Plans, moves: NDArray[np.int64], spelling: Spelling, stri
     made = _Maker(plans, moves, rows, row_of, spelling, stride)
     conventional = made.conventional_residual()
     batch = made.batch(plans.laws.take(rows), kept, conventional)
-    worst = batch.residual.max(axis=1, initial=0.0)
-    reference = conventional.max(axis=1, initial=0.0)
+    worst = plans.modes.grouped(batch.residual).max(axis=1, initial=0.0)
+    reference = plans.modes.grouped(conventional).max(axis=1, initial=0.0)
     worse = (worst > reference) & made.writable(plans.conventional.take(rows)) & ~kept
     if worse.any():
         laws = plans.laws.take(rows)

@@ -1,5 +1,13 @@
 """Options of the test run."""
 
+import os
+import tempfile
+
+
+def pytest_configure():
+    """No test reads or fills the user's own cache of solutions."""
+    os.environ["GCODEJERK_CACHE"] = tempfile.mkdtemp(prefix="gcodejerk-cache-")
+
 
 def pytest_addoption(parser):
     parser.addoption(

@@ -8,7 +8,9 @@ a straight line.
 
 from gcodejerk.motion.condition3 import design_condition3, design_four_segments, four_segment_range
 from gcodejerk.motion.laws import Laws, joined
+from gcodejerk.motion.objective import Objective
 from gcodejerk.motion.residual import (
+    grouped,
     laws_response,
     mode_poles,
     polyline_response,
@@ -31,11 +33,13 @@ __all__ = [
     "GRID_TOLERANCE",
     "Grid",
     "Laws",
+    "Objective",
     "SymmetricLaws",
     "conventional_laws",
     "design_condition3",
     "design_four_segments",
     "four_segment_range",
+    "grouped",
     "joined",
     "knots_response",
     "laws_response",

@@ -11,8 +11,7 @@ is least. The search has two parts:
   free, and Ta's feasible range is a closed form of the other two.
 
 Rule 1: no segment is shorter than one command interval; a segment may be absent.
-Rule 2: what is compared is the displacement of the tool, so each mode has a weight: its
-participation times the displacement of the axes that excite it.
+Rule 2: what is compared is the objective, the largest residual displacement of the tool.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.motion.laws import Array
+from gcodejerk.motion.objective import Objective
 from gcodejerk.motion.residual import Complex, symmetric_response
 from gcodejerk.motion.symmetric import SymmetricLaws, conventional_laws
 
@@ -90,7 +90,7 @@ def four_segment_range(
 
 
 def design_four_segments(
-    total: Array, low: Array, high: Array, poles: Complex, weights: Array
+    total: Array, low: Array, high: Array, objective: Objective
 ) -> tuple[SymmetricLaws, Array]:
     """The four-segment law with the least worst residual, T1 within a range.
 
@@ -98,10 +98,8 @@ def design_four_segments(
     ----------
     total, low, high : ndarray, shape (n,)
         T_SUM and the range of T1. [s]
-    poles : ndarray of complex, shape (m,)
-        Of the modes, from `mode_poles`. [rad/s]
-    weights : ndarray, shape (n, m)
-        Participation times displacement. [mm]
+    objective : Objective
+        Of n moves.
 
     Returns
     -------
@@ -110,6 +108,7 @@ def design_four_segments(
     worst : ndarray, shape (n,)
         Largest residual displacement. [mm]
     """
+    poles = objective.poles
     # The map depends on T_SUM alone: rapids that take equally long share its row.
     durations, row = np.unique(total, return_inverse=True)
     fractions = np.linspace(0.0, 1.0, MAP_COLUMNS)[1:-1]
@@ -120,7 +119,7 @@ def design_four_segments(
     step = 0.5 * total / (MAP_COLUMNS - 1)
     for part in _slices(len(total), T1.shape[1] * max(len(poles), 1)):
         columns = T1[row[part]]
-        value = _worst(amplitude[row[part]], weights[part])
+        value = objective.take(part).worst(amplitude[row[part]])
         inside = (columns >= low[part, np.newaxis]) & (columns <= high[part, np.newaxis])
         value = np.where(inside, value, np.inf)
         quarter = 0.25 * total[part]
@@ -134,22 +133,22 @@ def design_four_segments(
         best[part] = np.where(found, columns[np.arange(len(chosen)), chosen], best[part])
         # The ends of the range are seldom on the map; T1 of one interval is such an end.
         every = np.stack([best[part], low[part], high[part]], axis=1)
-        value = _worst(_displacement(_four(every, total[part, np.newaxis]), poles), weights[part])
+        own = objective.take(part)
+        value = own.worst(_displacement(_four(every, total[part, np.newaxis]), poles))
         chosen = _least(value, np.abs(every - quarter[:, np.newaxis]))
         best[part] = every[np.arange(len(chosen)), chosen]
         best[part], worst[part] = _refine_T1(
-            best[part], step[part], low[part], high[part], total[part], poles, weights[part]
+            best[part], step[part], low[part], high[part], total[part], own
         )
     return _four(best, total), worst
 
 
 def _refine_T1(
-    T1: Array, step: Array, low: Array, high: Array, total: Array, poles: Complex, weights: Array
+    T1: Array, step: Array, low: Array, high: Array, total: Array, objective: Objective
 ) -> tuple[Array, Array]:
     """Zoom in on the best T1 of the map, keeping what is not better by more than a tie."""
-    worst = _worst(_displacement(_four(T1[:, np.newaxis], total[:, np.newaxis]), poles), weights)[
-        :, 0
-    ]
+    poles = objective.poles
+    worst = objective.of(_four(T1, total))
     around = np.array([-1.0, -0.5, 0.5, 1.0])
     index = np.arange(len(T1))
     for _ in range(8):
@@ -158,7 +157,7 @@ def _refine_T1(
             low[:, np.newaxis],
             high[:, np.newaxis],
         )
-        value = _worst(_displacement(_four(every, total[:, np.newaxis]), poles), weights)
+        value = objective.worst(_displacement(_four(every, total[:, np.newaxis]), poles))
         chosen = np.argmin(value, axis=1)
         better = value[index, chosen] < worst - 0.01 * TIE
         T1 = np.where(better, every[index, chosen], T1)
@@ -172,8 +171,7 @@ def design_condition3(
     velocity: Array,
     acceleration: Array,
     jerk: Array,
-    poles: Complex,
-    weights: Array,
+    objective: Objective,
     interval: float,
     conventional: SymmetricLaws,
 ) -> tuple[SymmetricLaws, Array, NDArray[np.bool_]]:
@@ -185,10 +183,8 @@ def design_condition3(
         T_SUM. [s]
     velocity, acceleration, jerk : ndarray, shape (n,)
         Limits of the unit law; jerk may be infinite. [1/s], [1/s^2], [1/s^3]
-    poles : ndarray of complex, shape (m,)
-        Of the modes. [rad/s]
-    weights : ndarray, shape (n, m)
-        Participation times displacement. [mm]
+    objective : Objective
+        Of n moves.
     interval : float
         Command interval, the least duration of a segment. [s]
     conventional : SymmetricLaws
@@ -214,15 +210,14 @@ def design_condition3(
             velocity[part],
             acceleration[part],
             jerk[part],
-            poles,
-            weights[part],
+            objective.take(part),
             interval,
         )
         laws, worst[part] = search.run([conventional.take(part), fastest.take(part)])
         for column, new in zip(columns, laws.columns(), strict=True):
             column[part] = new
     feasible = np.isfinite(worst)
-    if not len(poles):
+    if not len(objective.poles):
         # The search went by the jerk; nothing vibrates.
         worst = np.where(feasible, 0.0, np.inf)
     return SymmetricLaws(*columns), worst, feasible
@@ -250,13 +245,12 @@ class _GeneralSearch:
         V: Array,
         A: Array,
         J: Array,
-        poles: Complex,
-        weights: Array,
+        objective: Objective,
         interval: float,
     ) -> None:
         slack = 1.0 + ROUNDING
         self.total, self.V, self.A, self.J = total, V * slack, A * slack, J * slack
-        self.poles, self.weights, self.interval = poles, weights, interval
+        self.objective, self.interval = objective, interval
         # V = 1/(T_SUM - 2 centroid): the velocity limit is a limit of the centroid.
         self.centroid = 0.5 * (total - 1.0 / self.V)
 
@@ -371,8 +365,8 @@ class _GeneralSearch:
         value = np.full(T1.shape, np.inf)
         rows = np.nonzero(legal)[0]
         flat = SymmetricLaws(*(column[legal] for column in laws.columns()))
-        if len(self.poles):
-            value[legal] = _worst_flat(flat, self.poles, self.weights, rows)
+        if len(self.objective.poles):
+            value[legal] = self.objective.take(rows).of(flat)
         else:
             # Nothing vibrates: the lowest jerk is the best, far below any tie with a residual.
             value[legal] = flat.jerk
@@ -392,23 +386,6 @@ def _displacement(laws: SymmetricLaws, poles: Complex) -> Array:
     flat = SymmetricLaws(*(column.ravel() for column in laws.columns()))
     amplitude: Array = np.abs(symmetric_response(flat, poles)) / poles.imag
     return amplitude.reshape(*shape, len(poles))
-
-
-def _worst(amplitude: Array, weights: Array) -> Array:
-    """Largest weighted amplitude over the modes; amplitude (n, k, m), weights (n, m) -> (n, k)."""
-    if amplitude.shape[-1] == 0:
-        return np.zeros(amplitude.shape[:-1])
-    worst: Array = (amplitude * weights[:, np.newaxis, :]).max(axis=-1)
-    return worst
-
-
-def _worst_flat(
-    laws: SymmetricLaws, poles: Complex, weights: Array, rows: NDArray[np.intp]
-) -> Array:
-    """The same for a flat list of laws, the law k belonging to row rows[k] of the weights."""
-    response = np.abs(symmetric_response(laws, poles)) / poles.imag
-    worst: Array = (response * weights[rows]).max(axis=1)
-    return worst
 
 
 def _least(value: Array, tie_break: Array) -> NDArray[np.intp]:

@@ -119,6 +119,35 @@ def residual_displacement(response: NDArray[np.complex128], poles: Complex) -> A
     return np.abs(response) / poles.imag
 
 
+def grouped(amplitude: Array, group: NDArray[np.int64]) -> Array:
+    """Residuals of groups of modes: the root of the squares' sum of each.
+
+    A mode is a group of its own; the lines of a measured spectrum are one group.
+
+    Parameters
+    ----------
+    amplitude : ndarray, shape (..., m)
+        Of each mode, weights already in it. [mm]
+    group : ndarray of int, shape (m,)
+        Group of each mode, counted from 0; those of a group stand side by side.
+
+    Returns
+    -------
+    ndarray, shape (..., g)
+        [mm]
+
+    Examples
+    --------
+    >>> grouped(np.array([3.0, 4.0, 7.0]), np.array([0, 0, 1])).tolist()
+    [5.0, 7.0]
+    """
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    if len(starts) == len(group):
+        return amplitude
+    together: Array = np.sqrt(np.add.reduceat(amplitude**2, starts, axis=-1))
+    return together
+
+
 def laws_response(laws: Laws, poles: Complex) -> Complex:
     r"""Response of modes to unit laws, exact.
 

@@ -36,7 +36,10 @@ class Records:
         self, plans: Plans, kept: NDArray[np.bool_], residual: Array, conventional: Array
     ) -> None:
         self.plans, self.kept = plans, kept
-        self.residual, self.conventional = residual, conventional
+        modes = plans.modes
+        self.residual, self.conventional = modes.grouped(residual), modes.grouped(conventional)
+        self.acceleration = modes.accelerations(residual)
+        self.conventional_acceleration = modes.accelerations(conventional)
         interval = plans.machine.interval
         usual = whole_intervals(plans.conventional_time, interval)
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
@@ -122,22 +125,20 @@ class Records:
         """Residual of every mode that the move excites."""
         out = []
         modes = self.plans.modes
-        moving = self.plans.displacement[row] != 0.0
-        for m, (label, mode) in enumerate(zip(modes.labels, modes.modes, strict=True)):
-            if not np.any(moving & (modes.participation[m] != 0.0)):
-                continue
-            own, usual = float(self.residual[row, m]), float(self.conventional[row, m])
-            square = (2.0 * math.pi * mode.frequency) ** 2
+        for m in self.plans.excited(row):
+            label, mode = modes.labels[m], modes.modes[m]
             out.append(
                 {
                     "axis": label,
                     "mode": mode.name,
                     "frequency": number(mode.frequency),
                     "damping": number(mode.damping),
-                    "acceleration": number(own * square),
-                    "displacement": number(own),
-                    "conventional_acceleration": number(usual * square),
-                    "conventional_displacement": number(usual),
+                    "acceleration": number(float(self.acceleration[row, m])),
+                    "displacement": number(float(self.residual[row, m])),
+                    "conventional_acceleration": number(
+                        float(self.conventional_acceleration[row, m])
+                    ),
+                    "conventional_displacement": number(float(self.conventional[row, m])),
                 }
             )
         return out

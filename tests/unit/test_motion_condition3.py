@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import differential_evolution
 
 from gcodejerk.motion import (
+    Objective,
     SymmetricLaws,
     conventional_laws,
     design_condition3,
@@ -120,7 +121,7 @@ def test_a_range_of_a_single_law_survives_rounding():
 def test_the_design_finds_the_nulls_of_the_map(total, nulls):
     pole = mode_poles([30.0], [0.0])
     laws, worst = design_four_segments(
-        *columns(total, INTERVAL, total / 2 - INTERVAL), pole, np.ones((1, 1))
+        *columns(total, INTERVAL, total / 2 - INTERVAL), Objective.of_modes(pole, np.ones((1, 1)))
     )
     assert float(worst[0]) < TIE
     assert any(float(laws.T1[0]) == pytest.approx(null * 1e-3, abs=1e-6) for null in nulls)
@@ -130,7 +131,9 @@ def test_the_design_finds_the_nulls_of_the_map(total, nulls):
 def test_the_design_of_the_paper_s_case_is_the_least_T1():
     pole = mode_poles([30.0], [0.0])
     low, high = four_segment_range(*columns(0.04, 600, 5000, 5e6), INTERVAL)
-    laws, worst = design_four_segments(columns(0.04)[0], low, high, pole, np.ones((1, 1)))
+    laws, worst = design_four_segments(
+        columns(0.04)[0], low, high, Objective.of_modes(pole, np.ones((1, 1)))
+    )
     assert float(laws.T1[0]) == 0.001
     assert float(worst[0]) * (60 * np.pi) ** 2 == pytest.approx(5696.8, abs=0.05)
 
@@ -145,7 +148,9 @@ def test_no_law_of_a_dense_scan_leaves_much_less_than_the_design():
         if T < 0.005:
             continue
         low, high = np.sort(rng.uniform(INTERVAL, T / 2 - INTERVAL, 2))
-        laws, worst = design_four_segments(*columns(T, low, high), poles, weights[np.newaxis])
+        laws, worst = design_four_segments(
+            *columns(T, low, high), Objective.of_modes(poles, weights[np.newaxis])
+        )
         assert low <= float(laws.T1[0]) <= high
         T1 = np.linspace(low, high, 4001)
         zero = np.zeros_like(T1)
@@ -161,7 +166,9 @@ def test_the_reported_worst_is_that_of_the_reported_law():
     poles = mode_poles([30.0, 90.0], [0.02, 0.0])
     weights = np.array([[1.0, 0.3], [0.0, 2.0], [5.0, 5.0]])
     T = column(0.04, 0.053, 0.2)
-    laws, worst = design_four_segments(T, T * 0 + INTERVAL, T / 2 - INTERVAL, poles, weights)
+    laws, worst = design_four_segments(
+        T, T * 0 + INTERVAL, T / 2 - INTERVAL, Objective.of_modes(poles, weights)
+    )
     for i in range(3):
         amplitudes = []
         T1, T2 = float(laws.T1[i]), float(laws.T2[i])
@@ -178,17 +185,23 @@ def test_the_reported_worst_is_that_of_the_reported_law():
 def test_without_modes_four_segments_stay_symmetric():
     none = mode_poles([], [])
     T = column(0.04, 0.08)
-    laws, worst = design_four_segments(T, T * 0 + INTERVAL, T / 2 - INTERVAL, none, np.ones((2, 0)))
+    laws, worst = design_four_segments(
+        T, T * 0 + INTERVAL, T / 2 - INTERVAL, Objective.of_modes(none, np.ones((2, 0)))
+    )
     np.testing.assert_allclose(laws.T1, T / 4)
     assert worst.tolist() == [0.0, 0.0]
 
 
 def test_modes_that_do_not_count_leave_the_lowest_jerk():
     pole = mode_poles([30.0], [0.0])
-    laws, _ = design_four_segments(*columns(0.04, 0.001, 0.019), pole, np.zeros((1, 1)))
+    laws, _ = design_four_segments(
+        *columns(0.04, 0.001, 0.019), Objective.of_modes(pole, np.zeros((1, 1)))
+    )
     assert float(laws.T1[0]) == pytest.approx(0.01)
     # Symmetry out of reach: the nearest end of the range.
-    laws, _ = design_four_segments(*columns(0.04, 0.001, 0.007), pole, np.zeros((1, 1)))
+    laws, _ = design_four_segments(
+        *columns(0.04, 0.001, 0.007), Objective.of_modes(pole, np.zeros((1, 1)))
+    )
     assert float(laws.T1[0]) == pytest.approx(0.007)
 
 
@@ -196,7 +209,7 @@ def test_residuals_too_small_to_matter_are_ties_and_leave_the_lowest_jerk():
     pole = mode_poles([30.0], [0.0])
     # All residuals of the map are below 0.1 nm, though some are ten times others.
     laws, worst = design_four_segments(
-        *columns(0.04, 0.001, 0.019), pole, np.full((1, 1), 0.9 * TIE)
+        *columns(0.04, 0.001, 0.019), Objective.of_modes(pole, np.full((1, 1), 0.9 * TIE))
     )
     assert float(laws.T1[0]) == pytest.approx(0.01)
     assert 0.0 < float(worst[0]) < TIE
@@ -221,7 +234,10 @@ def drawn_long_moves(seed, count):
 def design(total, V, A, J, poles, weights, conventional):
     """One law of the general design."""
     return design_condition3(
-        *columns(total, V, A, J), poles, weights[np.newaxis], INTERVAL, conventional
+        *columns(total, V, A, J),
+        Objective.of_modes(poles, weights[np.newaxis]),
+        INTERVAL,
+        conventional,
     )
 
 
@@ -289,11 +305,16 @@ def test_rows_do_not_know_each_other():
     conventional = SymmetricLaws(
         *(np.concatenate(c) for c in zip(*(case[-1].columns() for case in cases), strict=True))
     )
-    together, worst, _ = design_condition3(*numbers, poles, weights, INTERVAL, conventional)
+    together, worst, _ = design_condition3(
+        *numbers, Objective.of_modes(poles, weights), INTERVAL, conventional
+    )
     for i in range(7):
         row = slice(i, i + 1)
         alone, own, _ = design_condition3(
-            *(x[row] for x in numbers), poles, weights[row], INTERVAL, conventional.take(row)
+            *(x[row] for x in numbers),
+            Objective.of_modes(poles, weights[row]),
+            INTERVAL,
+            conventional.take(row),
         )
         np.testing.assert_allclose(own, worst[row], rtol=1e-9)
         for a, b in zip(alone.columns(), together.columns(), strict=True):

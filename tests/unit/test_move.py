@@ -146,7 +146,7 @@ def test_a_kept_conventional_law_says_so():
         ({"Z": 1.0}, {"time": 0.028}, PlanError, r"axis Z reaches .* in 0.028 s, above its limit"),
         ({"Z": 1.0}, {"T1": 0.03}, PlanError, r"T1 is 0.03 s, outside 0 < T1 < T_SUM/2 = 0.02 s"),
         ({"Z": 1.0}, {"T1": 0.016}, PlanError, r"axis Z reaches \S+ mm/s\^2 of acceleration"),
-        ({"Z": 1.0}, {"profile": "zv"}, PlanError, r"profile 'zv' is not available"),
+        ({"Z": 1.0}, {"profile": "best"}, PlanError, r"there is no profile 'best'"),
     ],
 )
 def test_a_move_that_cannot_be_planned_is_refused_with_its_reason(row, arguments, kind, said):

@@ -339,8 +339,8 @@ def test_a_trapezoid_cannot_be_written_as_it_is():
 
 
 def test_an_unknown_profile_is_refused_with_those_there_are():
-    with pytest.raises(PlanError, match="'optimal' is not available") as caught:
-        plan_moves(moves({"Z": 1.0}), PAPER, "optimal")
+    with pytest.raises(PlanError, match="there is no profile 'best'") as caught:
+        plan_moves(moves({"Z": 1.0}), PAPER, "best")
     assert "condition3" in caught.value.remedy
 
 

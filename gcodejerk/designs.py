@@ -1,0 +1,317 @@
+"""Designs: for each profile, how the laws of many moves are found in the time that they have.
+
+This module owns the table from a profile's name to its design. A design gets moves as columns
+(their time, their limits, what they excite) and gives a law for each, with what it leaves. When a
+design is used, and what happens where it finds nothing, the planner decides.
+
+Rule: a design changes no move's time, but for `shortest`, whose result the time is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion import (
+    Laws,
+    Objective,
+    SymmetricLaws,
+    design_condition3,
+    design_four_segments,
+    four_segment_range,
+)
+from gcodejerk.motion.cascade import design_cascade
+from gcodejerk.motion.laws import Array
+from gcodejerk.motion.optimal import Move, Optimum
+from gcodejerk.motion.rivals import design_condition
+from gcodejerk.optima import Progress, Question, answers, optimum_laws
+
+ALLOWED = 0.97
+"""Share of the tolerance that a law may use; rounding to the resolution needs some, too."""
+COARSE = 24
+"""Moves of so few intervals may gain from segments that end between them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """Moves to be designed, columns of n.
+
+    Attributes
+    ----------
+    counts : ndarray of int, shape (n,)
+        T_SUM. [intervals]
+    limits : tuple of ndarray, shape (n,)
+        Velocity, acceleration and jerk of the unit laws. [1/s], [1/s^2], [1/s^3]
+    conventional : SymmetricLaws
+        What the controller does today.
+    objective : Objective
+        What they are judged by.
+    interval, band, tolerance : float
+        Of the machine. [s], [-], [mm]
+    progress : callable or None
+        For designs that take long.
+    """
+
+    counts: NDArray[np.int64]
+    limits: tuple[Array, Array, Array]
+    conventional: SymmetricLaws
+    objective: Objective
+    interval: float
+    band: float
+    tolerance: float
+    progress: Progress | None = None
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    @property
+    def total(self) -> Array:
+        """T_SUM, shape (n,) [s]."""
+        return np.asarray(self.counts * self.interval, dtype=np.float64)
+
+    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Task:
+        """Some of the moves."""
+        return replace(
+            self,
+            counts=self.counts[index],
+            limits=(self.limits[0][index], self.limits[1][index], self.limits[2][index]),
+            conventional=self.conventional.take(index),
+            objective=self.objective.take(index),
+        )
+
+    def after(self, counts: NDArray[np.int64]) -> Task:
+        """The same moves in other times."""
+        return replace(self, counts=counts)
+
+
+Design = Callable[[Task], tuple[Laws, Array]]
+"""Laws of the moves, and the largest residual of each [mm], infinite where there is none."""
+
+
+def condition3(task: Task) -> tuple[Laws, Array]:
+    """Condition III, or its generalisation where a limit binds."""
+    V, A, J = task.limits
+    conventional, total = task.conventional, task.total
+    # Four segments where the conventional law has them: it is then a member of the family.
+    four = (conventional.Ta == 0.0) & (conventional.Tv == 0.0)
+    low, high = four_segment_range(total, V, A, J, task.interval)
+    four &= low <= high
+    laws, worst = conventional, np.full(len(task), np.inf)
+    index = np.nonzero(four)[0]
+    found, worst[index] = design_four_segments(
+        total[index], low[index], high[index], task.objective.take(index)
+    )
+    laws = laws.replaced(index, found)
+    index = np.nonzero(~four)[0]
+    found, worst[index], _ = design_condition3(
+        total[index], V[index], A[index], J[index], task.objective.take(index),
+        task.interval, conventional.take(index),
+    )  # fmt: skip
+    # A law that is not feasible may have no shape at all.
+    feasible = index[np.isfinite(worst[index])]
+    laws = laws.replaced(feasible, found.take(np.isfinite(worst[index])))
+    return laws.general(), worst
+
+
+def condition1(task: Task) -> tuple[Laws, Array]:
+    """Condition I at its best T1."""
+    return design_condition("I", task.total, *task.limits, task.objective, task.interval)
+
+
+def condition2(task: Task) -> tuple[Laws, Array]:
+    """Condition II at its best T1."""
+    return design_condition("II", task.total, *task.limits, task.objective, task.interval)
+
+
+def cascade(task: Task) -> tuple[Laws, Array]:
+    """Moving averages as wide as the modes' periods, in the unchanged time."""
+    laws, worst = design_cascade(task.total, *task.limits, task.objective, task.interval)
+    return _with(task.conventional.general(), np.isfinite(worst), laws), worst
+
+
+def optimal(task: Task) -> tuple[Laws, Array]:
+    """The least worst residual over the band, of all laws there are.
+
+    The programme knows jerks that change at whole intervals only. Where a law of another design,
+    whose segments need not end there, is better still, that one is taken.
+    """
+    laws, worst = task.conventional.general(), np.full(len(task), np.inf)
+    rows = np.nonzero(task.objective.weights.any(axis=1))[0]
+    reference = task.objective.of(task.conventional)
+    found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
+    laws, worst = _answered(task, rows, found, laws, worst)
+    everything = np.ones(len(task), dtype=bool)
+    for rival, where in (
+        (condition3, everything),
+        (cascade, everything),
+        (condition1, task.counts <= COARSE),
+        (condition2, task.counts <= COARSE),
+    ):
+        index = np.nonzero(where)[0]
+        others, nominal = rival(task.take(index))
+        residual = np.full(len(task), np.inf)
+        # The band is looked at only where the modes' own frequencies leave a hope.
+        hope = np.isfinite(nominal) & (nominal < worst[index])
+        residual[index[hope]] = worst_in_band(task.take(index[hope]), others.take(hope))
+        better = residual < worst
+        laws = laws.replaced(better, others.take(better[index]))
+        worst = np.where(better, residual, worst)
+    return laws, worst
+
+
+def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Laws, Array, NDArray[np.int64]]:
+    """The least time in which no mode is left with more than the tolerance, over the band.
+
+    Parameters
+    ----------
+    task : Task
+        Its counts are the least that the limits allow.
+    longest : ndarray of int, shape (n,)
+        The most that is tried. [intervals]
+
+    Returns
+    -------
+    laws, worst : Laws and ndarray, shape (n,)
+        As of a `Design`.
+    counts : ndarray of int, shape (n,)
+        T_SUM of each. [intervals]
+
+    Notes
+    -----
+    A move that can rest for an interval and then begin can do in n + 1 intervals what it can in n:
+    so the time is found by bisection.
+    """
+    task = replace(task, tolerance=ALLOWED * task.tolerance)
+    low, high = task.counts - 1, longest.copy()
+    reference = task.objective.of(task.conventional)
+    at_high = np.isfinite(_least(task.after(high), reference, task.tolerance)[1])
+    while True:
+        open_ = np.nonzero(at_high & (high - low > 1))[0]
+        if not len(open_):
+            break
+        middle = (low[open_] + high[open_]) // 2
+        trial = task.take(open_).after(middle)
+        quiet = np.isfinite(_least(trial, reference[open_], task.tolerance)[1])
+        high[open_[quiet]] = middle[quiet]
+        low[open_[~quiet]] = middle[~quiet]
+    final = task.after(high)
+    laws, worst = _least(final, reference, task.tolerance)
+    rows = np.nonzero(at_high & task.objective.weights.any(axis=1))[0]
+    questions = [_question(final, k, float(reference[k]), task.tolerance) for k in rows]
+    smooth = answers(questions, task.progress)
+    settled = [o if o is not None and o.worst <= task.tolerance else None for o in smooth]
+    # Below the tolerance all are equal: the smoothest is taken.
+    laws, worst = _answered(final, rows, settled, laws, np.where(np.isfinite(worst), np.inf, worst))
+    again, residual = _least(final, reference, task.tolerance)
+    missing = ~np.isfinite(worst) & np.isfinite(residual)
+    return laws.replaced(missing, again.take(missing)), np.where(missing, residual, worst), high
+
+
+def _least(task: Task, reference: Array, tolerance: float) -> tuple[Laws, Array]:
+    """Laws within the tolerance over the band, of Condition III or optimal; else infinite."""
+    laws, nominal = condition3(task)
+    worst = np.full(len(task), np.inf)
+    hope = nominal <= tolerance
+    worst[hope] = worst_in_band(task.take(hope), laws.take(hope))
+    worst = np.where(worst <= tolerance, worst, np.inf)
+    rows = np.nonzero(~np.isfinite(worst))[0]
+    found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
+    quiet = [o if o is not None and o.worst <= tolerance else None for o in found]
+    return _answered(task, rows, quiet, laws, worst)
+
+
+def bounds(task: Task) -> Array:
+    """The least residual that any law within the limits leaves, at the modes' own frequencies.
+
+    Parameters
+    ----------
+    task : Task
+        The moves.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        NaN where no law on the grid keeps the limits. [mm]
+
+    Raises
+    ------
+    PlanError
+        scipy or clarabel is not installed.
+    """
+    nominal = replace(task, band=0.0)
+    least = np.where(task.objective.weights.any(axis=1), np.nan, 0.0)
+    rows = np.nonzero(np.isnan(least))[0]
+    reference = task.objective.of(task.conventional)
+    found = answers([_question(nominal, k, float(reference[k])) for k in rows], task.progress)
+    for k, optimum in zip(rows, found, strict=True):
+        least[k] = np.nan if optimum is None else optimum.worst
+    return least
+
+
+def worst_in_band(task: Task, laws: Laws) -> Array:
+    """Largest residual displacement of laws with every frequency anywhere within the band.
+
+    Parameters
+    ----------
+    task : Task
+        The moves.
+    laws : Laws
+        One for each.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        [mm]
+    """
+    worst = np.zeros(len(task))
+    total = laws.total
+    # A longer move needs more frequencies: moves of like duration together.
+    octave = np.frexp(total)[1]
+    for k in np.unique(octave):
+        index = np.nonzero(octave == k)[0]
+        objective = task.objective.take(index).in_band(task.band, float(total[index].max()))
+        worst[index] = objective.of(laws.take(index))
+    return worst
+
+
+def _question(task: Task, row: np.intp, reference: float, allowed: float | None = None) -> Question:
+    """What is asked about one of the moves."""
+    V, A, J = (float(limit[row]) for limit in task.limits)
+    objective = task.objective
+    move = Move(
+        int(task.counts[row]), V, A, J, objective.poles, objective.weights[row], objective.group,
+        task.band, task.interval,
+    )  # fmt: skip
+    return Question(move, reference, allowed)
+
+
+def _answered(
+    task: Task, rows: NDArray[np.intp], found: list[Optimum | None], laws: Laws, worst: Array
+) -> tuple[Laws, Array]:
+    """Laws and residuals with those of the answers in the place of what they answer."""
+    solved = [(row, optimum) for row, optimum in zip(rows, found, strict=True) if optimum]
+    if not solved:
+        return laws, worst
+    index = np.array([row for row, _ in solved])
+    worst = worst.copy()
+    worst[index] = [optimum.worst for _, optimum in solved]
+    optima = [optimum for _, optimum in solved]
+    return laws.replaced(index, optimum_laws(optima, task.interval)), worst
+
+
+def _with(laws: Laws, where: NDArray[np.bool_], others: Laws) -> Laws:
+    """These laws with others in some places; both have a law for each move."""
+    return laws.replaced(where, others.take(where))
+
+
+DESIGNS: dict[str, Design] = {
+    "condition1": condition1,
+    "condition2": condition2,
+    "condition3": condition3,
+    "cascade": cascade,
+    "optimal": optimal,
+}
+"""The profiles that keep a move's time."""

@@ -1,0 +1,167 @@
+r"""Cascades of moving averages: a step of position smoothed by three boxes.
+
+This module owns the design of the profile `cascade`. A velocity pulse that lasts w1, averaged over
+w2 and then over w3, has 8 steps of the jerk, and with w1 >= w2 + w3 it is the symmetric profile of
+seven segments that many controllers make (T1 = T2 = w3, Ta = w2 - w3, Tv = w1 - w2 - w3). It ends
+after w1 + w2 + w3 = T_SUM, and a mode keeps of the length L the displacement
+
+.. math:: D = L \left|\prod_i \mathrm{sinc}\frac{\omega w_i}{2}\right|, \qquad
+          \mathrm{sinc}\,x = \frac{\sin x}{x},
+
+nothing where a box is as wide as a period of the mode, or several: three modes can be silenced at
+once. With damping each factor is :math:`(e^{\lambda w} - 1)/(\lambda w)`, exactly.
+
+Rule: w1 >= w2 >= w3 >= one interval, which loses nothing: boxes may be applied in any order.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.objective import Objective
+from gcodejerk.motion.residual import Complex
+
+GRID = 16
+"""Values of w2 and of w3 each on the map."""
+PERIODS = 3
+"""A box may be as wide as up to so many periods of a mode."""
+REFINEMENTS = 14
+"""Halvings of the step around the best of the map."""
+CELLS = 1 << 16
+"""Candidates evaluated at a time."""
+ROUNDING = 1e-9
+STEPS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]], float)
+"""Steps of the refinement, in w2 and w3."""
+
+
+def design_cascade(
+    total: Array, velocity: Array, acceleration: Array, jerk: Array,
+    objective: Objective, interval: float,
+) -> tuple[Laws, Array]:  # fmt: skip
+    """The cascade of three boxes in the given time with the least worst residual.
+
+    Parameters
+    ----------
+    total : ndarray, shape (n,)
+        T_SUM. [s]
+    velocity, acceleration, jerk : ndarray, shape (n,)
+        Limits of the unit law. [1/s], [1/s^2], [1/s^3]
+    objective : Objective
+        Of n moves.
+    interval : float
+        The least width of a box. [s]
+
+    Returns
+    -------
+    laws : Laws
+        n laws; meaningless where none is feasible.
+    worst : ndarray, shape (n,)
+        Largest residual displacement, infinite where no cascade keeps the limits. [mm]
+    """
+    n = len(total)
+    w2, w3, worst = (np.empty(n) for _ in range(3))
+    periods = 2.0 * np.pi / objective.poles.imag
+    boxes = np.concatenate([k * periods for k in range(1, PERIODS + 1)])
+    width = GRID * GRID + len(boxes) ** 2 + GRID * len(boxes)
+    rows = max(1, CELLS // width)
+    for begin in range(0, n, rows):
+        part = slice(begin, min(begin + rows, n))
+        search = _Search(
+            total[part], velocity[part], acceleration[part], jerk[part],
+            objective.take(part), interval,
+        )  # fmt: skip
+        w2[part], w3[part], worst[part] = search.run(boxes)
+    return _laws(total - w2 - w3, w2, w3), worst
+
+
+def box_response(width: Array, poles: Complex) -> Complex:
+    """What a box of unit area does to a mode, seen from its end; width (...), poles (m,)."""
+    x = width[..., np.newaxis] * poles
+    response: Complex = np.expm1(x) / x
+    return response
+
+
+class _Search:
+    """The search for some moves: a map over w2 and w3, then smaller and smaller steps."""
+
+    def __init__(
+        self, total: Array, V: Array, A: Array, J: Array, objective: Objective, interval: float
+    ) -> None:
+        slack = 1.0 + ROUNDING
+        self.total = total[:, np.newaxis]
+        self.V, self.A, self.J = ((x * slack)[:, np.newaxis] for x in (V, A, J))
+        self.objective, self.interval = objective, interval
+
+    def run(self, boxes: Array) -> tuple[Array, Array, Array]:
+        """The best w2 and w3 and what they leave; `boxes` are widths worth trying."""
+        n = len(self.total)
+        share = np.linspace(0.0, 1.0, GRID)
+        # w3 up to a third of the time, w2 between it and half of the rest.
+        w3 = self.interval + share[:, np.newaxis] * (
+            self.total[..., np.newaxis] / 3 - self.interval
+        )
+        w2 = w3 + share * (0.5 * (self.total[..., np.newaxis] - w3) - w3)
+        w3, w2 = (np.broadcast_to(x, (n, GRID, GRID)).reshape(n, -1) for x in (w3, w2))
+        free = np.repeat(w3[:, ::GRID], len(boxes), axis=1)
+        box = np.tile(boxes, (n, free.shape[1] // max(len(boxes), 1)))
+        first, second = (x.ravel() for x in np.meshgrid(boxes, boxes))
+        w3 = np.concatenate(
+            [w3, np.minimum(free, box), np.tile(np.minimum(first, second), (n, 1))], 1
+        )
+        w2 = np.concatenate(
+            [w2, np.maximum(free, box), np.tile(np.maximum(first, second), (n, 1))], 1
+        )
+        w2, w3, worst = self._best(w2, w3)
+        step = self.total[:, 0] / (3.0 * GRID)
+        for _ in range(REFINEMENTS):
+            near2 = np.column_stack([w2, w2[:, np.newaxis] + step[:, np.newaxis] * STEPS[:, 0]])
+            near3 = np.column_stack([w3, w3[:, np.newaxis] + step[:, np.newaxis] * STEPS[:, 1]])
+            w2, w3, least = self._best(near2, near3)
+            step = np.where(least < worst, step, 0.5 * step)
+            worst = least
+        return w2, w3, worst
+
+    def _best(self, w2: Array, w3: Array) -> tuple[Array, Array, Array]:
+        """The best of the candidates in each row, the first among equals."""
+        value = self._value(w2, w3)
+        row, chosen = np.arange(len(value)), np.argmin(value, axis=1)
+        return w2[row, chosen], w3[row, chosen], value[row, chosen]
+
+    def _value(self, w2: Array, w3: Array) -> Array:
+        """Worst residual of candidates, shape (n, k); infinite where limits are broken."""
+        w1 = self.total - w2 - w3
+        edge = 1.0 - 1e-12
+        with np.errstate(all="ignore"):
+            overlap = np.maximum(0.5 * (w2 + w3 - w1), 0.0)
+            V = (1.0 - overlap**2 / (w2 * w3)) / w1
+            J = np.where(overlap > 1e-12, 2.0, 1.0) / (w1 * w2 * w3)
+            legal = (w1 >= w2 * edge) & (w2 >= w3 * edge) & (w3 >= self.interval * edge)
+            legal &= (V <= self.V) & (1.0 / (w1 * w2) <= self.A) & (J <= self.J)
+        rows = np.nonzero(legal)[0]
+        poles = self.objective.poles
+        product = poles * np.ones((len(rows), 1))
+        for width in (w1, w2, w3):
+            product = product * box_response(width[legal], poles)
+        value = np.full(w2.shape, np.inf)
+        value[legal] = self.objective.take(rows).worst(np.abs(product) / poles.imag)
+        return value
+
+
+def _laws(w1: Array, w2: Array, w3: Array) -> Laws:
+    """Laws of boxes: a step of the jerk, up or down, at the sum of every subset of the widths."""
+    chosen = np.array(list(itertools.product((0, 1), repeat=3)))
+    widths = np.stack([w1, w2, w3], axis=1)
+    times = widths @ chosen.T
+    steps = (-1.0) ** chosen.sum(axis=1) / widths.prod(axis=1)[:, np.newaxis]
+    order = np.argsort(times, axis=1, kind="stable")
+    times, steps = (np.take_along_axis(x, order, axis=1) for x in (times, steps))
+    duration = np.diff(times, axis=1)
+    jerk = np.cumsum(steps, axis=1)[:, :-1]
+    used: NDArray[np.bool_] = duration > 1e-12
+    acceleration = np.cumsum(jerk * duration, axis=1) - jerk * duration
+    first = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+    return Laws.of(first, duration[used], acceleration[used], jerk[used])

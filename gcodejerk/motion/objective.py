@@ -1,0 +1,114 @@
+"""What a design is judged by: the largest residual displacement of the tool.
+
+This module owns the objective of many moves at once: the machine's modes, how strongly each move
+excites each of them, and which of them count together.
+
+Rule: what is compared is the displacement of the tool, so each mode has a weight: its
+participation times the displacement of the axes that excite it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.residual import Complex, grouped, laws_response, symmetric_response
+from gcodejerk.motion.symmetric import SymmetricLaws
+
+DENSE = 0.25
+"""Distance of frequencies, times T_SUM/2, at which a band is judged. [rad]"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Objective:
+    """The largest residual displacement, for n moves and m modes.
+
+    Attributes
+    ----------
+    poles : ndarray of complex, shape (m,)
+        Of the modes, from `mode_poles`. [rad/s]
+    weights : ndarray, shape (n, m)
+        Participation times displacement. [mm]
+    group : ndarray of int, shape (m,)
+        As in `grouped`.
+    """
+
+    poles: Complex
+    weights: Array
+    group: NDArray[np.int64]
+
+    @classmethod
+    def of_modes(cls, poles: Complex, weights: Array) -> Objective:
+        """Every mode a group of its own."""
+        return cls(poles, weights, np.arange(len(poles)))
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+    def take(self, index: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Objective:
+        """Some of the moves; one may stand several times."""
+        return Objective(self.poles, self.weights[index], self.group)
+
+    def in_band(self, band: float, total: float) -> Objective:
+        """The same moves, every mode at many frequencies within a relative band.
+
+        Parameters
+        ----------
+        band : float
+            Relative error of the frequencies. [-]
+        total : float
+            Duration of the longest move: residuals of longer moves change faster with the
+            frequency. [s]
+
+        Returns
+        -------
+        Objective
+            Groups of several modes have no band: they are spectra, which are broad by themselves.
+        """
+        size = np.bincount(self.group, minlength=1)[self.group]
+        half = np.ceil(0.5 * band * np.abs(self.poles) * total / DENSE).astype(np.int64)
+        half = np.where((size == 1) & (band > 0.0), np.maximum(half, 1), 0)
+        count = 2 * half + 1
+        relative = [np.linspace(1.0 - band, 1.0 + band, n) if n > 1 else np.ones(1) for n in count]
+        index = np.repeat(np.arange(len(self.poles)), count)
+        new = np.diff(np.repeat(self.group, count), prepend=-1) != 0
+        return Objective(
+            self.poles[index] * np.concatenate([np.zeros(0), *relative]),
+            self.weights[:, index],
+            np.cumsum(new | (size[index] == 1)) - 1,
+        )
+
+    def worst(self, displacement: Array) -> Array:
+        """Largest over the groups, of envelopes for weight 1.
+
+        Parameters
+        ----------
+        displacement : ndarray, shape (n, ..., m)
+            Envelope of each mode for a weight of 1. [-]
+
+        Returns
+        -------
+        ndarray, shape (n, ...)
+            [mm]
+        """
+        between = tuple(range(1, displacement.ndim - 1))
+        weighted = displacement * np.expand_dims(self.weights, between)
+        worst: Array = grouped(weighted, self.group).max(axis=-1, initial=0.0)
+        return worst
+
+    def dominant(self, laws: Laws) -> NDArray[np.intp]:
+        """The mode whose residual displacement is largest, for each of n laws, shape (n,)."""
+        displacement = np.abs(laws_response(laws, self.poles)) / self.poles.imag
+        mode: NDArray[np.intp] = np.argmax(displacement * self.weights, axis=1)
+        return mode
+
+    def of(self, laws: Laws | SymmetricLaws) -> Array:
+        """Largest residual displacement of n unit laws, one for each move, shape (n,) [mm]."""
+        if isinstance(laws, Laws):
+            response = laws_response(laws, self.poles)
+        else:
+            response = symmetric_response(laws, self.poles)
+        return self.worst(np.abs(response) / self.poles.imag)

@@ -1,0 +1,308 @@
+r"""The optimum: of all jerk sequences on the command grid, the one that leaves modes most still.
+
+This module owns the two questions that the convex programme of `programme.py` leaves open for one
+move:
+
+* *which frequencies*. A mode is known to a relative band only; the residual is a smooth function
+  of the frequency, which some points pin down. The programme is solved for a few; where the
+  residual between them is larger, that frequency is added and it is solved again;
+* *which blocks*. Short moves have a jerk of their own in every interval. In long ones most of the
+  optimal jerk is zero, in cruise and at constant acceleration: a first programme with long blocks
+  shows where it is not, and only there are the blocks cut into single intervals.
+
+Rule: what is returned has been judged on a dense grid of frequencies, not on the points that it was
+designed on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.objective import DENSE
+from gcodejerk.motion.programme import (
+    ACCURACY,
+    Index,
+    Problem,
+    Solution,
+    amplitudes,
+    smoothest,
+    solve,
+)
+from gcodejerk.motion.residual import Complex
+
+FULL_INTERVALS = 128
+"""Moves of at most so many intervals have a jerk in each of them."""
+BLOCK = 4
+"""Intervals of a block in the first programme of a longer move."""
+ACTIVE = 0.02
+"""A block counts where its jerk is above this share of the largest."""
+IDLE = 0.5
+"""A frequency below this share of the worst is not asked for again in a finer programme."""
+SPACING = 1.0
+"""Distance of frequencies, times T_SUM/2, at which a band is designed at first. [rad]"""
+ROUNDS = 4
+"""Programmes at most, until no frequency between the points is worse than these."""
+WORSE = 1.008
+"""A frequency is added where the residual is this much above that of the points."""
+COARSE_ACCURACY = 1e-6
+"""Relative accuracy of the programme that only shows where the jerk acts."""
+SMOOTHNESS = 1e-4
+"""What the full jerk costs, as a share of the reference residual."""
+LOSS = 3e-3
+"""What smoothness may cost of the residual at most."""
+NULL = 1e-6
+"""A residual below this share of the reference is tried as an exact null."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Move:
+    """One unit move, and what it must not shake.
+
+    Attributes
+    ----------
+    count : int
+        T_SUM. [intervals]
+    velocity, acceleration, jerk : float
+        Limits of the unit law; the jerk may be infinite. [1/s], [1/s^2], [1/s^3]
+    poles : ndarray of complex, shape (m,)
+        Of the modes. [rad/s]
+    weights : ndarray, shape (m,)
+        Participation times displacement. [mm]
+    group : ndarray of int, shape (m,)
+        Poles of one group, side by side, count together: the root of their squares' sum.
+    band : float
+        Relative error of the frequencies of single modes; groups have no band. [-]
+    interval : float
+        [s]
+    """
+
+    count: int
+    velocity: float
+    acceleration: float
+    jerk: float
+    poles: Complex
+    weights: Array
+    group: Index
+    band: float
+    interval: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optimum:
+    """An optimal unit law: a jerk for each block of whole intervals.
+
+    Attributes
+    ----------
+    knots : ndarray of int, shape (k + 1,)
+        Ends of the blocks. [intervals]
+    jerk : ndarray, shape (k,)
+        [1/intervals^3]
+    worst : float
+        Largest residual displacement over all groups and the band. [mm]
+    """
+
+    knots: Index
+    jerk: Array
+    worst: float
+
+    def laws(self, interval: float) -> Laws:
+        """The law, a segment for each block."""
+        jerk = self.jerk / interval**3
+        duration = np.diff(self.knots) * interval
+        acceleration = np.concatenate([[0.0], np.cumsum(jerk * duration)[:-1]])
+        return Laws.of(np.array([0, len(jerk)]), duration, acceleration, jerk)
+
+
+def least_residual(move: Move, reference: float) -> Optimum | None:
+    """The law of least worst residual; among equal ones the smoothest.
+
+    Parameters
+    ----------
+    move : Move
+        At least one pole has a weight above zero.
+    reference : float
+        Residual of the controller's own law, the measure for what is small. [mm]
+
+    Returns
+    -------
+    Optimum or None
+        None where no law on the grid keeps the limits.
+
+    Raises
+    ------
+    PlanError
+        scipy or clarabel is not installed.
+    """
+    return _Search(move, reference).least()
+
+
+def smoothest_within(move: Move, worst: float, reference: float) -> Optimum | None:
+    """The law of least peak jerk that leaves at most `worst` in every mode, over the band.
+
+    Parameters
+    ----------
+    move : Move
+        The move.
+    worst : float
+        Residual allowed. [mm]
+    reference : float
+        As in `least_residual`. [mm]
+
+    Returns
+    -------
+    Optimum or None
+        None where no law on the grid does that within the limits.
+
+    Raises
+    ------
+    PlanError
+        scipy or clarabel is not installed.
+    """
+    return _Search(move, reference).within(worst)
+
+
+class _Search:
+    """One move: its frequencies and its blocks, as they are refined."""
+
+    def __init__(self, move: Move, reference: float) -> None:
+        self.move = move
+        used = move.weights > 0.0
+        self.poles, self.group = move.poles[used], move.group[used]
+        self.scale = float(move.weights.max(initial=0.0)) or 1.0
+        self.weights = move.weights[used] / self.scale
+        self.reference = max(reference / self.scale, 1e-12)
+        self.total = move.count * move.interval
+        sizes = np.bincount(self.group, minlength=1)
+        self.single = sizes[self.group] == 1
+        self.points = self._points(SPACING)
+        self.dense = self._points(DENSE)
+
+    def _points(self, spacing: float) -> list[Array]:
+        """Relative frequencies at which each pole is looked at."""
+        out = []
+        for pole, single in zip(self.poles, self.single, strict=True):
+            band = self.move.band if single else 0.0
+            half = int(np.ceil(0.5 * band * abs(pole) * self.total / spacing)) if band else 0
+            out.append(np.linspace(1.0 - band, 1.0 + band, 2 * half + 1) if half else np.ones(1))
+        return out
+
+    def _problem(self, knots: Index, points: list[Array]) -> Problem:
+        """The programme for these blocks and frequencies."""
+        move, T = self.move, self.total
+        count = np.array([len(p) for p in points], dtype=np.int64)
+        relative = np.concatenate(points) if points else np.zeros(0)
+        single = np.repeat(self.single, count)
+        # Each frequency of a single mode is a group of its own; a spectrum's lines stay together.
+        group = np.cumsum(single | (np.diff(np.repeat(self.group, count), prepend=-1) != 0)) - 1
+        jerk = min(move.jerk, move.acceleration / move.interval)
+        return Problem(
+            knots=knots,
+            velocity=move.velocity * T,
+            acceleration=move.acceleration * T**2,
+            jerk=jerk * T**3,
+            poles=np.repeat(self.poles, count) * relative * T,
+            weights=np.repeat(self.weights, count),
+            group=group,
+        )
+
+    def least(self) -> Optimum | None:
+        """Blocks and frequencies refined around the least residual."""
+        every = np.arange(self.move.count + 1)
+        knots = every
+        if self.move.count > FULL_INTERVALS:
+            coarse = np.union1d(every[::BLOCK], every[-1:])
+            found = self._exchanged(coarse, 2, COARSE_ACCURACY)
+            if found is not None:
+                knots = self._refined(coarse, found)
+                self._drop_idle(coarse, found)
+        found = self._exchanged(knots, ROUNDS if knots is every else 2)
+        if found is None and len(knots) < len(every):
+            knots = every
+            found = self._exchanged(knots, ROUNDS)
+        if found is None:
+            return None
+        if found.worst <= NULL * self.reference:
+            found = smoothest(self._problem(knots, self.points), 0.0) or found
+        return self._optimum(knots, found)
+
+    def _exchanged(self, knots: Index, rounds: int, accuracy: float = ACCURACY) -> Solution | None:
+        """The least residual for some blocks, frequencies added until none between is worse."""
+        cost = SMOOTHNESS * self.reference
+        best: Solution | None = None
+        best_worst = np.inf
+        while rounds > 0:
+            rounds -= 1
+            found = solve(self._problem(knots, self.points), cost, accuracy)
+            if found is None:
+                return best
+            # Smoothness has cost at most this; where that is too much, it is made cheaper.
+            if cost * (1.0 - found.peak) > LOSS * found.worst > LOSS * NULL * self.reference:
+                cost *= 0.02
+                rounds += cost > 1e-9 * self.reference
+            worst, missing = self._missing(knots, found)
+            if worst < best_worst:
+                best, best_worst = found, worst
+            if not missing:
+                break
+        return best
+
+    def _missing(self, knots: Index, found: Solution) -> tuple[float, bool]:
+        """The true worst residual; frequencies that are worse than the points become points."""
+        problem = self._problem(knots, self.dense)
+        amplitude = amplitudes(problem, found.jerk)
+        worst = float(amplitude.max(initial=0.0))
+        if worst <= max(WORSE * found.worst, NULL * self.reference):
+            return worst, False
+        by_pole = np.split(amplitude[problem.group], np.cumsum([len(p) for p in self.dense])[:-1])
+        for k, (dense, own) in enumerate(zip(self.dense, by_pole, strict=True)):
+            peak = (own >= np.append(0.0, own[:-1])) & (own >= np.append(own[1:], 0.0))
+            self.points[k] = np.union1d(self.points[k], dense[peak & (own > WORSE * found.worst)])
+        return worst, True
+
+    def _drop_idle(self, knots: Index, found: Solution) -> None:
+        """Only frequencies near the worst stay, and the ends of each band."""
+        amplitude = amplitudes(self._problem(knots, self.points), found.jerk)
+        group = self._problem(knots, self.points).group
+        ends = np.cumsum([len(p) for p in self.points])[:-1]
+        for k, own in enumerate(np.split(amplitude[group], ends)):
+            keep = own > IDLE * found.worst
+            keep[[0, -1]] = True
+            self.points[k] = self.points[k][keep]
+
+    def _refined(self, knots: Index, found: Solution) -> Index:
+        """Blocks cut into single intervals where the jerk acts, and beside these."""
+        size = np.abs(found.jerk)
+        active = size > ACTIVE * size.max(initial=0.0)
+        active[[0, -1]] = True
+        active[1:] |= active[:-1].copy()
+        active[:-1] |= active[1:].copy()
+        every = np.arange(knots[-1] + 1)
+        block = np.searchsorted(knots, every, side="right") - 1
+        keep = active[np.minimum(block, len(active) - 1)]
+        return np.union1d(knots, every[keep])
+
+    def within(self, worst: float) -> Optimum | None:
+        """The least peak jerk under a residual, on the blocks that the least residual needs."""
+        allowed = worst / self.scale
+        least = self.least()
+        if least is None or least.worst > worst:
+            return None
+        for _ in range(ROUNDS):
+            found = smoothest(self._problem(least.knots, self.points), allowed)
+            if found is None:
+                break
+            true, missing = self._missing(least.knots, found)
+            if true <= worst / self.scale:
+                return self._optimum(least.knots, found)
+            # Between the points it is worse; with these added or a little less allowed it is not.
+            allowed *= 1.0 if missing else 0.99
+        return least
+
+    def _optimum(self, knots: Index, found: Solution) -> Optimum:
+        """The solution in the units of the move."""
+        amplitude = amplitudes(self._problem(knots, self.dense), found.jerk)
+        worst = float(amplitude.max(initial=0.0)) * self.scale
+        return Optimum(knots, found.jerk / self.move.count**3, worst)

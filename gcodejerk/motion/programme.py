@@ -1,0 +1,332 @@
+r"""The convex programme behind the optimum: jerks of a move, its limits, and what it leaves.
+
+This module owns the programme and its solver. Which blocks and which frequencies it is asked for,
+`optimal.py` decides. Sought are jerks :math:`j_i`, constant within blocks of whole intervals, with
+
+* rest at both ends and the given length (linear equations),
+* :math:`|j| \le J`, :math:`|a| \le A` and :math:`0 \le v \le V` (linear inequalities; v is a
+  parabola within a block, so its control point is held in the bounds besides its ends),
+* a largest residual displacement t over all modes and frequencies asked for: one second-order cone
+  for each, exact where a linear programme needs a polygon in place of the modulus.
+
+Minimised is t with a small part of the peak jerk, so that among equal optima the smoothest is
+taken; or the peak jerk alone under a given t, which may be zero: the modes are perfectly still.
+
+Rule 1: times are in units of the move's duration and weights in units of the largest, so that the
+solver sees numbers near 1 and equal problems are equal.
+Rule 2: scipy and clarabel (an interior-point solver for cones) are imported inside functions; where
+they are missing, the error names the remedy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.errors import PlanError
+from gcodejerk.motion.laws import Array
+from gcodejerk.motion.residual import Complex, grouped
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+Index = NDArray[np.int64]
+
+ACCURACY = 1e-8
+"""Relative accuracy asked of the solver."""
+MARGIN = 1e-7
+"""Share of each limit that is left unused, so that the solver's rounding stays within it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """One move, its duration taken as the unit of time.
+
+    Attributes
+    ----------
+    knots : ndarray of int, shape (k + 1,)
+        Ends of the blocks of constant jerk, from 0 to T_SUM. [intervals]
+    velocity, acceleration, jerk : float
+        Limits, times T_SUM, T_SUM^2 and T_SUM^3 over the length. [-]
+    poles : ndarray of complex, shape (m,)
+        Times T_SUM. [rad]
+    weights : ndarray, shape (m,)
+        Participation times displacement over the largest of them. [-]
+    group : ndarray of int, shape (m,)
+        Poles of the same group, in a row, are judged by the root of their squares' sum.
+    """
+
+    knots: Index
+    velocity: float
+    acceleration: float
+    jerk: float
+    poles: Complex
+    weights: Array
+    group: Index
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """What the solver found.
+
+    Attributes
+    ----------
+    jerk : ndarray, shape (k,)
+        Of each block, for the unit length in the unit of time. [-]
+    worst : float
+        Largest residual displacement over the groups, for the largest weight 1. [-]
+    peak : float
+        Largest jerk as a share of its limit. [-]
+    """
+
+    jerk: Array
+    worst: float
+    peak: float
+
+
+def require_solver() -> None:
+    """Refuse with the remedy where scipy or clarabel is missing."""
+    try:
+        import clarabel
+        import scipy.sparse  # noqa: F401
+    except ImportError as error:
+        raise PlanError(
+            f"optimal profiles and their bound need scipy and clarabel: {error.name} is missing",
+            "install them with: pip install 'gcodejerk[science]'",
+        ) from None
+    del clarabel
+
+
+def solve(problem: Problem, jerk_cost: float, accuracy: float = ACCURACY) -> Solution | None:
+    """The law that has the least sum of residual and cost of its peak jerk.
+
+    Parameters
+    ----------
+    problem : Problem
+        The move.
+    jerk_cost : float
+        What the full jerk costs, in units of the residual: it decides among laws that are equal.
+        [-]
+    accuracy : float, optional
+        Relative accuracy asked of the solver.
+
+    Returns
+    -------
+    Solution or None
+        None where no law keeps the limits.
+
+    Raises
+    ------
+    PlanError
+        scipy or clarabel is not installed.
+    """
+    return _solve(problem, None, jerk_cost, accuracy)
+
+
+def smoothest(problem: Problem, worst: float) -> Solution | None:
+    """The law of least peak jerk whose residual stays within `worst`, exactly null where it is 0.
+
+    Parameters
+    ----------
+    problem : Problem
+        The move.
+    worst : float
+        Residual allowed, for the largest weight 1. [-]
+
+    Returns
+    -------
+    Solution or None
+        None where no law within the limits does that.
+
+    Raises
+    ------
+    PlanError
+        scipy or clarabel is not installed.
+    """
+    return _solve(problem, worst, 1.0, ACCURACY)
+
+
+def amplitudes(problem: Problem, jerk: Array) -> Array:
+    """Residual displacement of each group for a jerk in each block, shape (groups,)."""
+    return grouped(np.abs(_Unknowns(problem).by_block() @ jerk), problem.group)
+
+
+def _solve(
+    problem: Problem, cap: float | None, jerk_cost: float, accuracy: float
+) -> Solution | None:
+    """One call of the solver: residual and jerk are minimised, or the jerk under a cap."""
+    require_solver()
+    import clarabel
+    from scipy import sparse
+
+    unknowns = _Unknowns(problem)
+    response = unknowns.responses()
+    rows = _Rows()
+    unknowns.motion(rows)
+    if cap == 0.0:
+        rows.dense(_parts(response), unknowns.a)
+    equalities = rows.count
+    unknowns.limits(rows)
+    cones: list[Any] = [
+        clarabel.ZeroConeT(equalities),
+        clarabel.NonnegativeConeT(rows.count - equalities),
+    ]
+    if cap != 0.0:
+        for part in _groups(problem.group):
+            if cap is None:
+                rows.add([(unknowns.worst, -1.0)], 0.0)
+            else:
+                rows.add([], cap)
+            rows.dense(_parts(response[part]), unknowns.a)
+            cones.append(clarabel.SecondOrderConeT(1 + 2 * (part.stop - part.start)))
+    width = unknowns.worst + (cap is None)
+    matrix, bound = rows.assembled(width)
+    cost = np.zeros(width)
+    cost[unknowns.peak] = jerk_cost
+    if cap is None:
+        cost[unknowns.worst] = 1.0
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.direct_solve_method = "qdldl"
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = accuracy
+    none = sparse.csc_matrix((width, width))
+    found = clarabel.DefaultSolver(none, cost, matrix, bound, cones, settings).solve()
+    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+        return None
+    return unknowns.solution(np.array(found.x), null=cap == 0.0)
+
+
+class _Rows:
+    """Rows of ``matrix x + s = bound`` as they are added, s being in the cone of each row."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.entries: list[tuple[Index, Index, Array]] = []
+        self.bounds: list[Array] = []
+
+    def add(self, terms: list[tuple[Any, Any]], bound: Any) -> None:
+        """As many rows as the terms' columns (a number is one) have entries."""
+        count = max([1, *(np.size(column) for column, _ in terms)])
+        row = self.count + np.arange(count)
+        for column, value in terms:
+            columns = np.broadcast_to(np.asarray(column, dtype=np.int64), count)
+            self.entries.append((row, columns, np.broadcast_to(np.asarray(value, float), count)))
+        self.bounds.append(np.broadcast_to(np.asarray(bound, float), count))
+        self.count += count
+
+    def dense(self, values: Array, columns: Index) -> None:
+        """Rows of values, shape (r, c), in all of these columns; the bound is 0."""
+        count = len(values)
+        row = np.repeat(self.count + np.arange(count), len(columns))
+        self.entries.append((row, np.tile(columns, count), values.ravel()))
+        self.bounds.append(np.zeros(count))
+        self.count += count
+
+    def assembled(self, width: int) -> tuple[sparse.csc_matrix, Array]:
+        """The matrix and the bounds; entries of column -1, which stands for zero, fall away."""
+        from scipy import sparse
+
+        row, column, value = (np.concatenate(part) for part in zip(*self.entries, strict=True))
+        used = column >= 0
+        shape = (self.count, width)
+        matrix = sparse.csc_matrix((value[used], (row[used], column[used])), shape=shape)
+        return matrix, np.concatenate(self.bounds)
+
+
+class _Unknowns:
+    """Acceleration and velocity at every knot, the peak jerk as a share of its limit, the residual.
+
+    Columns of the matrix; -1 stands for what is zero: rest at both ends.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        inner = len(problem.knots) - 2
+        self.h = np.diff(problem.knots) / problem.knots[-1]
+        self.at_v = np.concatenate([[-1], np.arange(inner), [-1]])
+        self.at_a = np.concatenate([[-1], inner + np.arange(inner), [-1]])
+        self.a = self.at_a[1:-1]
+        self.peak = 2 * inner
+        self.worst = self.peak + 1
+
+    def motion(self, rows: _Rows) -> None:
+        """The velocity is the acceleration's integral, and its own is the length."""
+        h, a, v = self.h, self.at_a, self.at_v
+        rows.add([(v[1:], 1.0), (v[:-1], -1.0), (a[1:], -0.5 * h), (a[:-1], -0.5 * h)], 0.0)
+        before, after = np.append(h, 0.0), np.insert(h, 0, 0.0)
+        # Over a block: v h + (2 a + a') h^2 / 6, a' being the acceleration at its end.
+        columns = np.concatenate([v, a])
+        values = np.concatenate([before, before**2 / 3.0 + after**2 / 6.0])
+        used = columns >= 0
+        rows.dense(values[np.newaxis, used], columns[used])
+        rows.bounds[-1] = np.ones(1)
+
+    def limits(self, rows: _Rows) -> None:
+        """Jerk, acceleration and velocity within their limits, in every block."""
+        problem, h, a, v = self.problem, self.h, self.at_a, self.at_v
+        usable = 1.0 - MARGIN
+        for sign in (1.0, -1.0):
+            share = sign / (h * problem.jerk)
+            rows.add([(a[1:], share), (a[:-1], -share), (self.peak, -1.0)], 0.0)
+            if np.isfinite(problem.acceleration):
+                rows.add([(self.a, sign)], problem.acceleration * usable)
+        rows.add([(self.peak, 1.0)], usable)
+        # v and the control point of the parabola, v + a h / 2, which lies above or below it.
+        inner = v[1:-1]
+        for terms in ([(inner, 1.0)], [(inner, 1.0), (a[1:-1], 0.5 * h[1:])]):
+            rows.add([(column, -np.asarray(value)) for column, value in terms], 0.0)
+            if np.isfinite(problem.velocity):
+                rows.add(terms, problem.velocity * usable)
+
+    def responses(self) -> Complex:
+        """Displacement of each pole for each unknown acceleration, shape (m, len(a))."""
+        # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
+        per_time = self.by_block() / self.h
+        response: Complex = per_time[:, :-1] - per_time[:, 1:]
+        return response
+
+    def by_block(self) -> Complex:
+        """Displacement of each pole for a unit jerk in each block, shape (m, k)."""
+        problem = self.problem
+        pole = problem.poles[:, np.newaxis]
+        left = 1.0 - problem.knots / problem.knots[-1]
+        decay = np.exp(pole * left)
+        gain = problem.weights / (problem.poles**2 * problem.poles.imag)
+        by_block: Complex = (decay[:, :-1] - decay[:, 1:]) * gain[:, np.newaxis]
+        return by_block
+
+    def solution(self, x: Array, null: bool) -> Solution:
+        """The solver's answer, mended to the last digit where it must be exact."""
+        a = np.append(x, 0.0)[np.where(self.at_a < 0, len(x), self.at_a)]
+        jerk = np.diff(a) / self.h
+        by_block = self.by_block()
+        # Rest and length: what a jerk does to acceleration, velocity and position at the end.
+        ends = np.stack(_moments(self.h))
+        exact = np.concatenate([ends, _parts(by_block)]) if null else ends
+        wanted = np.zeros(len(exact))
+        wanted[2] = 1.0
+        jerk += np.linalg.lstsq(exact, wanted - exact @ jerk, rcond=None)[0]
+        worst = grouped(np.abs(by_block @ jerk), self.problem.group).max(initial=0.0)
+        return Solution(jerk, float(worst), float(x[self.peak]))
+
+
+def _moments(h: Array) -> tuple[Array, Array, Array]:
+    """What a unit jerk in each block adds to acceleration, velocity and position at the end."""
+    left = 1.0 - np.cumsum(h)
+    return h, h * (left + 0.5 * h), h * (0.5 * left**2 + 0.5 * left * h + h**2 / 6.0)
+
+
+def _parts(rows: Complex) -> Array:
+    """Complex rows as twice as many real ones: real part, imaginary part."""
+    parts: Array = np.stack([rows.real, rows.imag], axis=1).reshape(-1, rows.shape[-1])
+    return parts
+
+
+def _groups(group: Index) -> list[slice]:
+    """Poles of each group, which stand side by side."""
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    ends = np.append(starts[1:], len(group))
+    return [slice(int(begin), int(end)) for begin, end in zip(starts, ends, strict=True)]

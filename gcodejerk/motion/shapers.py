@@ -1,0 +1,132 @@
+r"""Input shapers: what today's controllers do against vibration, at the cost of time.
+
+This module owns the shapers that designs are compared with. Each replaces a move by a sum of
+delayed copies of itself, with amplitudes that add up to 1; the move takes longer by the last delay.
+For a mode of damped period T_d = 1/(f sqrt(1 - zeta^2)) and K = exp(-zeta pi / sqrt(1 - zeta^2)):
+
+======== ====================== ================================================================
+name     delays                 amplitudes, before they are divided by their sum
+======== ====================== ================================================================
+zv       0, T_d/2               1, K
+zvd      0, T_d/2, T_d          1, 2 K, K^2
+ei       0, T_d/2, T_d          (1 + V)/4, (1 - V) K/2, (1 + V) K^2/4, with V = 0.05
+mzv      0, 3 T_d/8, 3 T_d/4    1 - 1/sqrt 2, (sqrt 2 - 1) k, (1 - 1/sqrt 2) k^2, k = K^(3/4)
+posicast 0, T_d/2               1/(1 + d), d/(1 + d), with the overshoot d = K
+fir      0 to T_d, evenly       equal: a moving average over one period
+======== ====================== ================================================================
+
+Sources: Singer and Seering, J. Dyn. Sys. Meas. Control 112 (1990) 76-82 (zv, zvd); Singhose,
+Seering and Singer, J. Mech. Des. 116 (1994) 654-659 (ei); Klipper, klippy/extras/shaper_defs.py
+(mzv, and the damped ei); Smith, Proc. IRE 45 (1957) 1249-1255 (posicast, which for one mode is zv
+by another road).
+
+Rule: a controller's shaper knows one frequency, and by default nothing of the damping, as the
+reference figures of the method do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gcodejerk.errors import PlanError
+from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.residual import mode_poles
+
+SHAPERS = ("zv", "zvd", "ei", "mzv", "fir", "posicast")
+"""Names of the shapers."""
+EI_VIBRATION = 0.05
+"""Vibration that the shaper ei tolerates at its frequency, as a share."""
+AVERAGED = 128
+"""Parts of a moving average: its residual is right to (pi f / f0 / AVERAGED)^2 / 3."""
+
+
+def shaper_impulses(name: str, frequency: float, damping: float = 0.0) -> tuple[Array, Array]:
+    """Delays and amplitudes of a shaper.
+
+    Parameters
+    ----------
+    name : str
+        One of `SHAPERS`.
+    frequency : float
+        That it is made for. [Hz]
+    damping : float, optional
+        That it is made for, at least 0 and below 1. [-]
+
+    Returns
+    -------
+    delays, amplitudes : ndarray
+        [s], and shares that add up to 1. [-]
+
+    Raises
+    ------
+    PlanError
+        There is no such shaper, or no such mode.
+
+    Examples
+    --------
+    >>> delays, amplitudes = shaper_impulses("zv", 50.0)
+    >>> delays.tolist(), amplitudes.tolist()
+    ([0.0, 0.01], [0.5, 0.5])
+    """
+    if name not in SHAPERS:
+        raise PlanError(f"there is no shaper {name!r}", f"choose one of {', '.join(SHAPERS)}")
+    pole = complex(mode_poles(frequency, damping))
+    period = 2.0 * np.pi / pole.imag
+    left = float(np.exp(0.5 * pole.real * period))  # K
+    if name == "fir":
+        # Half of each end's part: the sum of a trapezoid rule, exactly null at the frequency.
+        amplitudes = np.ones(AVERAGED + 1)
+        amplitudes[[0, -1]] = 0.5
+        return np.linspace(0.0, period, AVERAGED + 1), amplitudes / AVERAGED
+    edge, ei = 1.0 - np.sqrt(0.5), EI_VIBRATION
+    table = {
+        "zv": ([0.0, 0.5], [1.0, left]),
+        "posicast": ([0.0, 0.5], [1.0 / (1.0 + left), left / (1.0 + left)]),
+        "zvd": ([0.0, 0.5, 1.0], [1.0, 2.0 * left, left**2]),
+        "ei": ([0.0, 0.5, 1.0], [1.0 + ei, 2.0 * (1.0 - ei) * left, (1.0 + ei) * left**2]),
+        "mzv": (
+            [0.0, 0.375, 0.75],
+            [edge, (np.sqrt(2.0) - 1.0) * left**0.75, edge * left**1.5],
+        ),
+    }
+    halves, impulses = table[name]
+    shares: Array = np.array(impulses)
+    return np.array(halves) * period, shares / shares.sum()
+
+
+def shaped_law(law: Laws, name: str, frequency: float, damping: float = 0.0) -> Laws:
+    """One law behind a shaper.
+
+    Parameters
+    ----------
+    law : Laws
+        One law.
+    name, frequency, damping
+        As in `shaper_impulses`.
+
+    Returns
+    -------
+    Laws
+        One law, longer by the last delay.
+
+    Raises
+    ------
+    PlanError
+        As `shaper_impulses`.
+    """
+    delays, amplitudes = shaper_impulses(name, frequency, damping)
+    times = (law.step_times() + delays[:, np.newaxis]).ravel()
+    order = np.argsort(times, kind="stable")
+    times = times[order]
+    steps = [
+        (amplitudes[:, np.newaxis] * step).ravel()[order]
+        for step in (law.acceleration_steps(), law.jerk_steps())
+    ]
+    duration = np.diff(times)
+    jerk = np.cumsum(steps[1])[:-1]
+    # The acceleration at each begin: its own steps, and what the jerk has added before.
+    acceleration = np.cumsum(steps[0])[:-1] + np.cumsum(jerk * duration) - jerk * duration
+    used = duration > 1e-12
+    jerk = np.where(np.abs(jerk) < 1e-12 * np.abs(jerk).max(initial=0.0), 0.0, jerk)
+    first = np.array([0, np.count_nonzero(used)])
+    return Laws.of(first, duration[used], acceleration[used], jerk[used])
