@@ -13,10 +13,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import BinaryIO
 
+from gcodejerk.designs import known_limits
 from gcodejerk.errors import EmitError, GcodejerkError
 from gcodejerk.files import STANDARD, new_file, open_input, same_file
 from gcodejerk.machine import Machine
-from gcodejerk.pipeline import Progress, Result, Settings, process_file
+from gcodejerk.pipeline import Progress, Result, Settings, process_file, silent
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line
@@ -105,7 +106,7 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         if job.strict and result.left:
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
-            report.write(dump(record_of(result, machine, job.output, source)))
+            report.write(dump(record_of(result, machine, job.output, source, progress)))
         diff = difference(source, target, result) if job.mode == "diff" else b""
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}"
@@ -113,14 +114,46 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
     return Done(job.input, changed, summary, result.notes, diff)
 
 
-def record_of(result: Result, machine: Machine, output: str | None, source: BinaryIO) -> Record:
-    """The report on a result, with the text of each rapid's block read from the source."""
+def record_of(
+    result: Result,
+    machine: Machine,
+    output: str | None,
+    source: BinaryIO,
+    progress: Progress | None = None,
+    bounds: bool = True,
+) -> Record:
+    """The report on a result, with the text of each rapid's block read from the source.
+
+    Parameters
+    ----------
+    result : Result
+        Of `process_file`.
+    machine : Machine
+        What it was processed for.
+    output : str or None
+        Name of the file that was written.
+    source : binary file
+        The program.
+    progress : callable, optional
+        See `pipeline.Progress`.
+    bounds : bool
+        Whether to compute the limit of each rapid, which takes some 10 ms for each distinct one.
+
+    Returns
+    -------
+    dict
+        Section 4 of the contract.
+    """
     rapids = result.program.rapids
     blocks = []
     for begin, end in zip(rapids.begin.tolist(), rapids.end.tolist(), strict=True):
         source.seek(begin)
         blocks.append(source.read(end - begin).decode("latin-1").strip())
-    return process_record(result, machine, output, blocks)
+    limit = None
+    if bounds:
+        report = progress or silent
+        limit = known_limits(result.plans, lambda done, total: report("bounds", done, total))
+    return process_record(result, machine, output, blocks, limit)
 
 
 def _refuse_overwriting(job: Job) -> None:

@@ -15,19 +15,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.errors import PlanError
+from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import (
     Laws,
     Objective,
     SymmetricLaws,
+    conventional_laws,
     design_condition3,
     design_four_segments,
     four_segment_range,
+    whole_intervals,
 )
 from gcodejerk.motion.cascade import design_cascade
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.optimal import Move, Optimum
+from gcodejerk.motion.programme import require_solver
 from gcodejerk.motion.rivals import design_condition
 from gcodejerk.optima import Progress, Question, answers, optimum_laws
+from gcodejerk.plans import Modes, Plans
 
 ALLOWED = 0.97
 """Share of the tolerance that a law may use; rounding to the resolution needs some, too."""
@@ -64,6 +70,45 @@ class Task:
     tolerance: float
     progress: Progress | None = None
 
+    @classmethod
+    def of(
+        cls, machine: Machine, modes: Modes, share: Array, counts: NDArray[np.int64] | None = None,
+        progress: Progress | None = None,
+    ) -> Task:  # fmt: skip
+        """Moves on a machine.
+
+        Parameters
+        ----------
+        machine : Machine
+            Its limits and what it says of designs.
+        modes : Modes
+            Those that count, of that machine.
+        share : ndarray, shape (n, 9)
+            Displacement of each axis. [mm] or [deg]
+        counts : ndarray of int, shape (n,), optional
+            T_SUM; the conventional time rounded up by default. [intervals]
+        progress : callable, optional
+            See `Progress`.
+
+        Returns
+        -------
+        Task
+        """
+        conventional = conventional_laws(*unit_limits(machine, share, "rapid"))
+        if counts is None:
+            counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
+        weights = np.abs(share @ modes.participation.T)
+        return cls(
+            counts=counts,
+            limits=unit_limits(machine, share, "limit"),
+            conventional=conventional,
+            objective=Objective(modes.poles, weights, modes.group),
+            interval=machine.interval,
+            band=machine.design.band,
+            tolerance=machine.design.tolerance,
+            progress=progress,
+        )
+
     def __len__(self) -> int:
         return len(self.counts)
 
@@ -85,6 +130,32 @@ class Task:
     def after(self, counts: NDArray[np.int64]) -> Task:
         """The same moves in other times."""
         return replace(self, counts=counts)
+
+
+def unit_limits(machine: Machine, share: Array, which: str) -> tuple[Array, Array, Array]:
+    """Limits of unit laws: each axis's, divided by its displacement.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    share : ndarray, shape (n, 9)
+        Displacement of each axis. [mm] or [deg]
+    which : str
+        `rapid` or `limit`.
+
+    Returns
+    -------
+    velocity, acceleration, jerk : ndarray, shape (n,)
+        [1/s], [1/s^2], [1/s^3]
+    """
+    limits = {axis.name: getattr(axis, which) for axis in machine.axes}
+    columns = []
+    for quantity in ("velocity", "acceleration", "jerk"):
+        axes = np.array([getattr(limits[a], quantity) if a in limits else np.inf for a in AXES])
+        with np.errstate(divide="ignore"):
+            columns.append((axes / np.abs(share)).min(axis=1, initial=np.inf))
+    return columns[0], columns[1], columns[2]
 
 
 Design = Callable[[Task], tuple[Laws, Array]]
@@ -249,6 +320,47 @@ def bounds(task: Task) -> Array:
     for k, optimum in zip(rows, found, strict=True):
         least[k] = np.nan if optimum is None else optimum.worst
     return least
+
+
+def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
+    """How still the tool could be at best after each planned move, in the time that it has.
+
+    Parameters
+    ----------
+    plans : Plans
+        n moves.
+    progress : callable, optional
+        See `Progress`.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Largest residual displacement over the modes, at their own frequencies; NaN where a move is
+        not planned or no law on the grid keeps the limits. Of axes that move each on its own, a
+        mode that several of them excite is left out: they might cancel each other. [mm]
+
+    Raises
+    ------
+    PlanError
+        scipy or clarabel is not installed.
+    """
+    task = Task.of(plans.machine, plans.modes, plans.share, plans.law_counts, progress)
+    excited = np.zeros((len(plans), len(plans.modes.poles)), dtype=np.int64)
+    np.add.at(excited, plans.move, task.objective.weights > 0.0)
+    weights = np.where(excited[plans.move] > 1, 0.0, task.objective.weights)
+    task = replace(task, objective=replace(task.objective, weights=weights))
+    least = np.where(plans.planned, 0.0, np.nan)
+    np.maximum.at(least, plans.move, bounds(task))
+    return least
+
+
+def known_limits(plans: Plans, progress: Progress | None = None) -> Array | None:
+    """The same for reports: None where the solver is not installed, since all else is known."""
+    try:
+        require_solver()
+    except PlanError:
+        return None
+    return least_residuals(plans, progress)
 
 
 def worst_in_band(task: Task, laws: Laws) -> Array:

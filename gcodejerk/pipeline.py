@@ -195,7 +195,7 @@ def process_file(
     """
     emitter = load_controller(settings.controller or machine.controller)
     _check_form(emitter, settings.form)
-    report = progress or _silent
+    report = progress or silent
     source.seek(0, io.SEEK_END)
     size = source.tell()
     source.seek(0)
@@ -212,7 +212,12 @@ def process_file(
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp),
         )
-    plans = plan_rapids(program.rapids, machine, settings.profile)
+    plans = plan_rapids(
+        program.rapids,
+        machine,
+        settings.profile,
+        lambda done, total: report("planning", done, total),
+    )
     collected = _Residuals(plans)
     writer = _Writer(source, target, program, machine, emitter, settings)
     done = 0
@@ -231,10 +236,11 @@ def process_file(
         source.seek(0)
         target.seek(0)
         judge = verify_files if emitter.in_place else verify_csv
+        design = replace(machine.design, profile=settings.profile or machine.design.profile)
         verification = judge(
             source,
             target,
-            machine,
+            replace(machine, design=design),
             names=(name, f"the output for {name}"),
             dialect=settings.dialect,
             start=program_start(machine),
@@ -273,7 +279,7 @@ def _with_output(result: Result, output: bytes) -> Result:
     return replace(result, output=output)
 
 
-def _silent(step: str, done: int, total: int) -> None:
+def silent(step: str, done: int, total: int) -> None:
     """Progress that nobody watches."""
 
 

@@ -16,7 +16,6 @@ from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import (
     GRID_TOLERANCE,
     Laws,
-    Objective,
     SymmetricLaws,
     conventional_laws,
     four_segment_range,
@@ -199,7 +198,6 @@ class _Planner:
         progress: Progress | None,
     ) -> None:
         self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
-        self.progress = progress
         self.displacement, self.length, self.reason = displacement, length, reason
         self.modes = Modes.of(machine)
         self.interval = machine.interval
@@ -212,11 +210,8 @@ class _Planner:
             self.share = np.zeros((len(index), len(AXES)))
             self.share[np.arange(len(index)), axis] = displacement[self.move, axis]
         self.move = self.move.astype(np.int64)
-        self.limits = self._unit_limits("limit")
-        rapid = self._unit_limits("rapid")
-        self.conventional = conventional_laws(*rapid)
-        weights = np.abs(self.share @ self.modes.participation.T)
-        self.objective = Objective(self.modes.poles, weights, self.modes.group)
+        self.task = Task.of(machine, self.modes, self.share, progress=progress)
+        self.limits, self.conventional = self.task.limits, self.task.conventional
 
     def run(self) -> Plans:
         """Design every law, then gather the moves."""
@@ -238,24 +233,6 @@ class _Planner:
             laws, counts, feasible, kept = self._designed(counts)
         self._rule_out_laws(~feasible, Reason.LIMITS)
         return self._plans(laws, counts, kept)
-
-    def _task(self, counts: NDArray[np.int64]) -> Task:
-        """All moves as designs see them, in these times."""
-        design = self.machine.design
-        return Task(
-            counts, self.limits, self.conventional, self.objective, self.interval,
-            design.band, design.tolerance, self.progress,
-        )  # fmt: skip
-
-    def _unit_limits(self, which: str) -> tuple[Array, Array, Array]:
-        """Limits of the unit laws: each axis's, divided by its displacement."""
-        limits = {axis.name: getattr(axis, which) for axis in self.machine.axes}
-        columns = []
-        for quantity in ("velocity", "acceleration", "jerk"):
-            axes = np.array([getattr(limits[a], quantity) if a in limits else np.inf for a in AXES])
-            with np.errstate(divide="ignore"):
-                columns.append((axes / np.abs(self.share)).min(axis=1, initial=np.inf))
-        return columns[0], columns[1], columns[2]
 
     def _conventional(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
         """The controller's own laws; a trapezoid cannot be written with finite jerk."""
@@ -281,7 +258,7 @@ class _Planner:
         laws = self.conventional.general()
         modes = self.modes
         if len(modes.poles):
-            frequency = np.abs(modes.poles[self.objective.dominant(laws)]) / (2.0 * np.pi)
+            frequency = np.abs(modes.poles[self.task.objective.dominant(laws)]) / (2.0 * np.pi)
             laws = joined(
                 [
                     shaped_law(laws.take(np.array([row])), self.profile, float(frequency[row]))
@@ -330,7 +307,7 @@ class _Planner:
         longest = whole_intervals(
             np.maximum(fastest, self.conventional.total) + slack, self.interval
         )
-        task = self._task(whole_intervals(fastest, self.interval))
+        task = self.task.after(whole_intervals(fastest, self.interval))
         laws, worst, counts = shortest(task, longest)
         return laws, counts, np.isfinite(worst)
 
@@ -338,11 +315,11 @@ class _Planner:
         self, counts: NDArray[np.int64]
     ) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
         """A profile of unchanged time; longer only where the limits leave no room."""
-        laws, worst = DESIGNS[self.profile](self._task(counts))
+        laws, worst = DESIGNS[self.profile](self.task.after(counts))
         kept = np.zeros(len(counts), dtype=bool)
         fits = self._within_limits(self.conventional)
         if self.time is None:
-            reference = self._judged(self._task(counts), self.conventional.general())
+            reference = self._judged(self.task.after(counts), self.conventional.general())
             keep = fits & (worst >= reference - self._noise())
             laws = laws.replaced(keep, self.conventional.take(keep).general())
             worst = np.where(keep, reference, worst)
@@ -380,7 +357,7 @@ class _Planner:
             rows = rows[counts[rows] <= most[rows]]
             if not len(rows):
                 break
-            found, value = DESIGNS[self.profile](self._task(counts).take(rows))
+            found, value = DESIGNS[self.profile](self.task.after(counts).take(rows))
             done = np.isfinite(value)
             laws = laws.replaced(rows[done], found.take(done))
             worst[rows[done]] = value[done]

@@ -133,7 +133,7 @@ def inspect(
     settings = Settings(profile=profile, dialect=dialect, force=True)
     with open_input(file) as source, progress(as_json) as show:
         result = process_file(source, None, described, settings, file, show)
-        record = record_of(result, described, None, source)
+        record = record_of(result, described, None, source, show, bounds=as_json)
     if as_json:
         print(json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False))
         return

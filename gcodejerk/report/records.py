@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk import __version__
+from gcodejerk.designs import known_limits
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.laws import Array
@@ -33,9 +34,15 @@ class Records:
     """Records of planned moves; what is computed for all of them at once is computed once."""
 
     def __init__(
-        self, plans: Plans, kept: NDArray[np.bool_], residual: Array, conventional: Array
+        self,
+        plans: Plans,
+        kept: NDArray[np.bool_],
+        residual: Array,
+        conventional: Array,
+        limit: Array | None = None,
     ) -> None:
         self.plans, self.kept = plans, kept
+        self.limit = np.full(len(plans), np.nan) if limit is None else limit
         modes = plans.modes
         self.residual, self.conventional = modes.grouped(residual), modes.grouped(conventional)
         self.acceleration = modes.accelerations(residual)
@@ -80,6 +87,7 @@ class Records:
             "segments": None,
             "peak": None,
             "residual": None,
+            "limit": None,
         }
         if planned:
             of_move = plans.laws_of(row)
@@ -91,8 +99,13 @@ class Records:
                 "segments": self._segments(row, of_move),
                 "peak": self._peak(of_move),
                 "residual": self._residual(row),
+                "limit": self._limit(row),
             }
         return record
+
+    def _limit(self, row: int) -> float | None:
+        """What the best law would leave; never more than what this one leaves."""
+        return number(float(np.minimum(self.limit[row], self.residual[row].max(initial=0.0))))
 
     def _segments(self, row: int, of_move: range) -> Any:
         """Segments of the common law, or of each axis's."""
@@ -151,7 +164,11 @@ def summary_of(result: Result) -> Record:
 
 
 def process_record(
-    result: Result, machine: Machine, output: str | None, blocks: list[str]
+    result: Result,
+    machine: Machine,
+    output: str | None,
+    blocks: list[str],
+    limit: Array | None = None,
 ) -> Record:
     """The report on one processed program.
 
@@ -165,13 +182,16 @@ def process_record(
         Name of the file that was written.
     blocks : list of str
         Text of each rapid's block.
+    limit : ndarray, shape (n,), optional
+        From `designs.least_residuals`; unknown by default. [mm]
 
     Returns
     -------
     dict
         Section 4 of the contract.
     """
-    records = Records(result.plans, result.kept, result.residual, result.conventional_residual)
+    plans = result.plans
+    records = Records(plans, result.kept, result.residual, result.conventional_residual, limit)
     rapids = result.program.rapids
     rows = [
         {
@@ -196,7 +216,8 @@ def process_record(
 
 def move_record(plan: Plan) -> Record:
     """The report on one planned move, in the same form."""
-    records = Records(plan.plans, plan.kept, plan.residual, plan.conventional_residual)
+    limit = known_limits(plan.plans)
+    records = Records(plan.plans, plan.kept, plan.residual, plan.conventional_residual, limit)
     end = {axis: number(length) for axis, length in plan.displacement.items()}
     row: Record = {
         "line": None,
