@@ -156,17 +156,8 @@ def plan_move(
     >>> plan.time, round(float(plan.positions["Z"][1]), 4), plan.profile
     (0.04, 0.0006, 'condition3')
     """
-    row = np.zeros((1, len(AXES)))
-    for axis, length in displacement.items():
-        name = axis.upper()
-        machine.axis(name)
-        if not np.isfinite(length):
-            raise PlanError(f"{name} moves by {length}, expected a length", "for example Z=1.5")
-        row[0, AXES.index(name)] = length
-    if time is not None and not (np.isfinite(time) and time > 0.0):
-        raise PlanError(
-            f"the time is {time:g} s, expected more than zero", "for example --time 0.040"
-        )
+    row = displacement_row(displacement, machine)
+    check_time(time)
     plans = plan_moves(row, machine, profile, time=time, T1=T1)
     if plans.reason[0] != CERTAIN:
         reason = REASONS[plans.reason[0]]
@@ -180,3 +171,43 @@ def plan_move(
     zero = np.zeros((1, len(AXES)))
     ((batch,),) = make_streams(plans, Spelling(zero, step[np.newaxis, :], zero), 1)
     return Plan(machine, {a.upper(): float(x) for a, x in displacement.items()}, plans, batch)
+
+
+def displacement_row(displacement: Mapping[str, float], machine: Machine) -> Array:
+    """One move as a row of columns.
+
+    Parameters
+    ----------
+    displacement : mapping of str to float
+        What each axis moves, for example ``{"Z": 1.0}``. [mm] or [deg]
+    machine : Machine
+        The machine that has these axes.
+
+    Returns
+    -------
+    ndarray, shape (1, 9)
+        [mm] or [deg]
+
+    Raises
+    ------
+    MachineError
+        The machine has no such axis.
+    PlanError
+        A length is not a number.
+    """
+    row = np.zeros((1, len(AXES)))
+    for axis, length in displacement.items():
+        name = axis.upper()
+        machine.axis(name)
+        if not np.isfinite(length):
+            raise PlanError(f"{name} moves by {length}, expected a length", "for example Z=1.5")
+        row[0, AXES.index(name)] = length
+    return row
+
+
+def check_time(time: float | None) -> None:
+    """Refuse a T_SUM [s] that is none."""
+    if time is not None and not (np.isfinite(time) and time > 0.0):
+        raise PlanError(
+            f"the time is {time:g} s, expected more than zero", "for example --time 0.040"
+        )
