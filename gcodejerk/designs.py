@@ -29,10 +29,10 @@ from gcodejerk.motion import (
 )
 from gcodejerk.motion.cascade import design_cascade
 from gcodejerk.motion.laws import Array
-from gcodejerk.motion.optimal import Move, Optimum
+from gcodejerk.motion.optimal import Move, Optimum, optimum_laws
 from gcodejerk.motion.programme import require_solver
 from gcodejerk.motion.rivals import design_condition
-from gcodejerk.optima import Progress, Question, answers, optimum_laws
+from gcodejerk.optima import Progress, Question, answers
 from gcodejerk.plans import Modes, Plans
 
 ALLOWED = 0.97

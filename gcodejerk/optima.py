@@ -12,18 +12,25 @@ comes from the solver or from the disk.
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
 import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk import __version__
-from gcodejerk.motion import Laws, joined
 from gcodejerk.motion.laws import Array
-from gcodejerk.motion.optimal import Move, Optimum, least_residual, smoothest_within
+from gcodejerk.motion.optimal import (
+    Move,
+    Optimum,
+    least_residual,
+    optimum_laws,
+    smoothest_within,
+)
 from gcodejerk.motion.programme import require_solver
 from gcodejerk.solutions import cache_file, read_solutions, write_solutions
 
@@ -31,6 +38,8 @@ HELD = 1e-6
 """Relative tolerance on limits of a solution that is used."""
 ARRIVED = 1e-9
 """Error of the end, for the unit length."""
+FEW = 16
+"""Fewer problems than this are solved in this process."""
 BATCH = 64
 """Solutions are written to the disk so many at a time: a run that is cut keeps what it has."""
 
@@ -100,16 +109,15 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     distinct = {key: question for (key, _), question in zip(keys, questions, strict=True)}
     file = cache_file()
     found: dict[bytes, Optimum | None] = {}
-    for key, value in read_solutions(list(distinct), file).items():
-        known = _decoded(value)
-        if _holds(known, distinct[key].move):
-            found[key] = known
+    known = {key: _decoded(value) for key, value in read_solutions(list(distinct), file).items()}
+    good = _holding(list(known.values()), [distinct[key].move for key in known])
+    found.update((key, known[key]) for key, holds in zip(known, good, strict=True) if holds)
     missing = [key for key in distinct if key not in found]
     done = len(found)
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with _workers(len(missing)) as solve_all:
         for begin in range(0, len(missing), BATCH):
             part = missing[begin : begin + BATCH]
-            solved = dict(zip(part, pool.map(_answer, (distinct[k] for k in part)), strict=True))
+            solved = dict(zip(part, solve_all([distinct[k] for k in part]), strict=True))
             write_solutions({key: _encoded(x) for key, x in solved.items() if x is not None}, file)
             found.update(solved)
             done += len(part)
@@ -122,9 +130,20 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     return out
 
 
-def optimum_laws(optima: list[Optimum], interval: float) -> Laws:
-    """The laws of optima, in their order."""
-    return joined([optimum.laws(interval) for optimum in optima])
+@contextmanager
+def _workers(problems: int) -> Iterator[Callable[[list[Question]], list[Optimum | None]]]:
+    """What solves a list of problems: all cores where that pays, this process otherwise.
+
+    The solver keeps Python's lock, so threads would not help. Processes are forked: other ways of
+    starting them would run the user's own script again.
+    """
+    cores = os.cpu_count() or 1
+    if problems < FEW or cores == 1 or "fork" not in multiprocessing.get_all_start_methods():
+        yield lambda questions: [_answer(question) for question in questions]
+        return
+    context = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(min(cores, problems), mp_context=context) as pool:
+        yield lambda questions: list(pool.map(_answer, questions))
 
 
 def _answer(question: Question) -> Optimum | None:
@@ -136,36 +155,46 @@ def _answer(question: Question) -> Optimum | None:
         found = least_residual(unit, question.reference / scale)
     else:
         found = smoothest_within(unit, question.allowed / scale, question.reference / scale)
-    return found if found is None or _holds(found, move) else None
+    return found if found is not None and _holding([found], [move])[0] else None
 
 
-def _holds(optimum: Optimum, move: Move) -> bool:
-    """Whether a solution is a law of this move: its grid, its end, its limits, no way back."""
+def _holding(optima: list[Optimum], moves: list[Move]) -> NDArray[np.bool_]:
+    """Whether solutions are laws of these moves: their grid, their end, limits, no way back."""
+    sound = np.array([_sound(o, move) for o, move in zip(optima, moves, strict=True)], dtype=bool)
+    rows = np.nonzero(sound)[0]
+    if not len(rows):
+        return sound
+    interval = moves[0].interval
+    laws = optimum_laws([optima[k] for k in rows], interval)
+    V = np.array([moves[k].velocity for k in rows])
+    A = np.array([moves[k].acceleration for k in rows])
+    J = np.minimum([moves[k].jerk for k in rows], A / interval)
+    last = laws.first[1:] - 1
+    d, j = laws.duration[last], laws.jerk[last]
+    a, v, s = laws.acceleration[last], laws.velocity[last], laws.position[last]
+    peak, steepest = laws.peak_velocity, laws.peak_acceleration
+    sound[rows] = (
+        (np.abs(s + (v + (0.5 * a + j * d / 6.0) * d) * d - 1.0) <= ARRIVED)
+        & (np.abs(v + (a + 0.5 * j * d) * d) <= ARRIVED * peak)
+        & (np.abs(a + j * d) <= ARRIVED * steepest)
+        & (peak <= V * (1.0 + HELD))
+        & (laws.least_velocity >= -HELD * peak)
+        & (steepest <= A * (1.0 + HELD))
+        & (laws.greatest_jerk <= J * (1.0 + HELD))
+    )
+    return sound
+
+
+def _sound(optimum: Optimum, move: Move) -> bool:
+    """Whether a solution has the form of one: blocks that fill the move, and finite numbers."""
     knots, jerk = optimum.knots, optimum.jerk
-    if (
-        len(knots) != len(jerk) + 1
-        or knots[0] != 0
-        or knots[-1] != move.count
-        or np.any(np.diff(knots) <= 0)
-        or not np.isfinite(jerk).all()
-        or not np.isfinite(optimum.worst)
-    ):
-        return False
-    law = optimum.laws(move.interval)
-    d = law.duration[-1]
-    a, v, s = law.acceleration[-1], law.velocity[-1], law.position[-1]
-    end = s + (v + (0.5 * a + law.jerk[-1] * d / 6.0) * d) * d
-    speed = v + (a + 0.5 * law.jerk[-1] * d) * d
-    peak = float(law.peak_velocity[0])
-    steepest = move.jerk if np.isfinite(move.jerk) else move.acceleration / move.interval
     return bool(
-        abs(end - 1.0) <= ARRIVED
-        and abs(speed) <= ARRIVED * peak
-        and abs(a + law.jerk[-1] * d) <= ARRIVED * float(law.peak_acceleration[0])
-        and peak <= move.velocity * (1.0 + HELD)
-        and law.least_velocity[0] >= -HELD * peak
-        and law.peak_acceleration[0] <= move.acceleration * (1.0 + HELD)
-        and np.abs(jerk).max() / move.interval**3 <= steepest * (1.0 + HELD)
+        len(knots) == len(jerk) + 1 >= 2
+        and knots[0] == 0
+        and knots[-1] == move.count
+        and np.all(np.diff(knots) > 0)
+        and np.isfinite(jerk).all()
+        and np.isfinite(optimum.worst)
     )
 
 

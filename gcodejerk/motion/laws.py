@@ -129,12 +129,17 @@ class Laws:
         return self._largest(np.maximum(np.abs(self.acceleration), np.abs(self.end_acceleration)))
 
     @property
+    def greatest_jerk(self) -> Array:
+        """Largest modulus of the jerk within the segments, shape (n,) [1/s^3]."""
+        return self._largest(np.abs(self.jerk))
+
+    @property
     def peak_jerk(self) -> Array:
         """Largest modulus of the jerk, infinite where the acceleration steps, shape (n,)."""
         stepped = (
             np.abs(self.acceleration_steps()) > 1e-6 * self.peak_acceleration[self._of_steps()]
         )
-        peak = self._largest(np.abs(self.jerk))
+        peak = self.greatest_jerk
         return np.where(np.isin(np.arange(len(self)), self._of_steps()[stepped]), np.inf, peak)
 
     def _largest(self, value: Array) -> Array:

@@ -45,9 +45,9 @@ SPACING = 1.0
 """Distance of frequencies, times T_SUM/2, at which a band is designed at first. [rad]"""
 ROUNDS = 4
 """Programmes at most, until no frequency between the points is worse than these."""
-WORSE = 1.008
+WORSE = 1.012
 """A frequency is added where the residual is this much above that of the points."""
-COARSE_ACCURACY = 1e-6
+COARSE_ACCURACY = 1e-4
 """Relative accuracy of the programme that only shows where the jerk acts."""
 SMOOTHNESS = 1e-4
 """What the full jerk costs, as a share of the reference residual."""
@@ -108,12 +108,30 @@ class Optimum:
     jerk: Array
     worst: float
 
-    def laws(self, interval: float) -> Laws:
-        """The law, a segment for each block."""
-        jerk = self.jerk / interval**3
-        duration = np.diff(self.knots) * interval
-        acceleration = np.concatenate([[0.0], np.cumsum(jerk * duration)[:-1]])
-        return Laws.of(np.array([0, len(jerk)]), duration, acceleration, jerk)
+
+def optimum_laws(optima: list[Optimum], interval: float) -> Laws:
+    """The laws of optima, a segment for each block.
+
+    Parameters
+    ----------
+    optima : list of Optimum
+        n of them.
+    interval : float
+        [s]
+
+    Returns
+    -------
+    Laws
+        n laws.
+    """
+    first = np.concatenate([[0], np.cumsum([len(optimum.jerk) for optimum in optima])])
+    none = np.zeros(0)
+    jerk = np.concatenate([none, *(optimum.jerk for optimum in optima)]) / interval**3
+    duration = np.concatenate([none, *(np.diff(optimum.knots) for optimum in optima)]) * interval
+    gained = np.insert(np.cumsum(jerk * duration), 0, 0.0)
+    # Every law begins at rest: what rounding has left of the laws before it is not its own.
+    acceleration = gained[:-1] - np.repeat(gained[first[:-1]], np.diff(first))
+    return Laws.of(first, duration, acceleration, jerk)
 
 
 def least_residual(move: Move, reference: float) -> Optimum | None:

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 Index = NDArray[np.int64]
 
-ACCURACY = 1e-8
+ACCURACY = 1e-6
 """Relative accuracy asked of the solver."""
-MARGIN = 1e-7
+MARGIN = 2e-6
 """Share of each limit that is left unused, so that the solver's rounding stays within it."""
 
 
@@ -157,7 +157,18 @@ def amplitudes(problem: Problem, jerk: Array) -> Array:
 def _solve(
     problem: Problem, cap: float | None, jerk_cost: float, accuracy: float
 ) -> Solution | None:
-    """One call of the solver: residual and jerk are minimised, or the jerk under a cap."""
+    """Residual and jerk are minimised, or the jerk under a cap."""
+    found = _solve_once(problem, cap, jerk_cost, accuracy, curved=False)
+    if found is not None and not _Unknowns(problem).keeps_velocity(found.jerk):
+        # Seldom: between two knots the velocity goes beyond its bounds.
+        return _solve_once(problem, cap, jerk_cost, accuracy, curved=True)
+    return found
+
+
+def _solve_once(
+    problem: Problem, cap: float | None, jerk_cost: float, accuracy: float, curved: bool
+) -> Solution | None:
+    """One call of the solver."""
     require_solver()
     import clarabel
     from scipy import sparse
@@ -169,7 +180,7 @@ def _solve(
     if cap == 0.0:
         rows.dense(_parts(response), unknowns.a)
     equalities = rows.count
-    unknowns.limits(rows)
+    unknowns.limits(rows, curved)
     cones: list[Any] = [
         clarabel.ZeroConeT(equalities),
         clarabel.NonnegativeConeT(rows.count - equalities),
@@ -264,8 +275,11 @@ class _Unknowns:
         rows.dense(values[np.newaxis, used], columns[used])
         rows.bounds[-1] = np.ones(1)
 
-    def limits(self, rows: _Rows) -> None:
-        """Jerk, acceleration and velocity within their limits, in every block."""
+    def limits(self, rows: _Rows, curved: bool) -> None:
+        """Jerk, acceleration and velocity within their limits, at every knot.
+
+        `curved`: and between them, where the velocity is a parabola.
+        """
         problem, h, a, v = self.problem, self.h, self.at_a, self.at_v
         usable = 1.0 - MARGIN
         for sign in (1.0, -1.0):
@@ -276,10 +290,23 @@ class _Unknowns:
         rows.add([(self.peak, 1.0)], usable)
         # v and the control point of the parabola, v + a h / 2, which lies above or below it.
         inner = v[1:-1]
-        for terms in ([(inner, 1.0)], [(inner, 1.0), (a[1:-1], 0.5 * h[1:])]):
+        every = [[(inner, 1.0)]]
+        if curved:
+            every.append([(inner, 1.0), (a[1:-1], 0.5 * h[1:])])
+        for terms in every:
             rows.add([(column, -np.asarray(value)) for column, value in terms], 0.0)
-            if np.isfinite(problem.velocity):
+            # Half of the time at full acceleration reaches no more than this.
+            if problem.velocity < 0.5 * problem.acceleration:
                 rows.add(terms, problem.velocity * usable)
+
+    def keeps_velocity(self, jerk: Array) -> bool:
+        """Whether the velocity of a solution stays within its bounds between the knots, too."""
+        gained = np.cumsum(jerk * self.h)
+        a = np.concatenate([[0.0], gained[:-1]])
+        v = np.cumsum(a * self.h + 0.5 * jerk * self.h**2)
+        control = np.concatenate([[0.0], v[:-1]]) + 0.5 * a * self.h
+        small = MARGIN * np.abs(v).max(initial=0.0)
+        return bool(control.min() >= -small and control.max() <= self.problem.velocity + small)
 
     def responses(self) -> Complex:
         """Displacement of each pole for each unknown acceleration, shape (m, len(a))."""
