@@ -75,6 +75,8 @@ def design_cascade(
             objective.take(part), interval,
         )  # fmt: skip
         w2[part], w3[part], worst[part] = search.run(boxes)
+    feasible = np.isfinite(worst)
+    w2, w3 = np.where(feasible, w2, total / 3.0), np.where(feasible, w3, total / 6.0)
     return _laws(total - w2 - w3, w2, w3), worst
 
 
@@ -115,6 +117,8 @@ class _Search:
         w2 = np.concatenate(
             [w2, np.maximum(free, box), np.tile(np.maximum(first, second), (n, 1))], 1
         )
+        # Boxes may be applied in any order: the widest is w1, whichever was chosen first.
+        w3, w2, _ = np.sort(np.stack([self.total - w2 - w3, w2, w3]), axis=0)
         w2, w3, worst = self._best(w2, w3)
         step = self.total[:, 0] / (3.0 * GRID)
         for _ in range(REFINEMENTS):

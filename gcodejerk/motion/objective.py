@@ -18,8 +18,10 @@ from gcodejerk.motion.laws import Array, Laws
 from gcodejerk.motion.residual import Complex, grouped, laws_response, symmetric_response
 from gcodejerk.motion.symmetric import SymmetricLaws
 
-DENSE = 0.25
-"""Distance of frequencies, times T_SUM/2, at which a band is judged. [rad]"""
+DENSE = 0.06
+"""Distance of frequencies, times T_SUM/2, at which a band is judged at most. [rad]"""
+FEWEST = 10
+"""Frequencies on each side of a mode's own at least."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +72,7 @@ class Objective:
         """
         size = np.bincount(self.group, minlength=1)[self.group]
         half = np.ceil(0.5 * band * np.abs(self.poles) * total / DENSE).astype(np.int64)
-        half = np.where((size == 1) & (band > 0.0), np.maximum(half, 1), 0)
+        half = np.where((size == 1) & (band > 0.0), np.maximum(half, FEWEST), 0)
         count = 2 * half + 1
         relative = [np.linspace(1.0 - band, 1.0 + band, n) if n > 1 else np.ones(1) for n in count]
         index = np.repeat(np.arange(len(self.poles)), count)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcodejerk.motion.laws import Array, Laws
-from gcodejerk.motion.objective import DENSE
+from gcodejerk.motion.objective import DENSE, FEWEST
 from gcodejerk.motion.programme import (
     ACCURACY,
     Index,
@@ -195,15 +195,16 @@ class _Search:
         self.total = move.count * move.interval
         sizes = np.bincount(self.group, minlength=1)
         self.single = sizes[self.group] == 1
-        self.points = self._points(SPACING)
-        self.dense = self._points(DENSE)
+        self.points = self._points(SPACING, 1)
+        self.dense = self._points(DENSE, FEWEST)
 
-    def _points(self, spacing: float) -> list[Array]:
-        """Relative frequencies at which each pole is looked at."""
+    def _points(self, spacing: float, fewest: int) -> list[Array]:
+        """Relative frequencies at which each pole is looked at, so many on each side at least."""
         out = []
         for pole, single in zip(self.poles, self.single, strict=True):
             band = self.move.band if single else 0.0
-            half = int(np.ceil(0.5 * band * abs(pole) * self.total / spacing)) if band else 0
+            half = int(np.ceil(0.5 * band * abs(pole) * self.total / spacing))
+            half = max(half, fewest) if band else 0
             out.append(np.linspace(1.0 - band, 1.0 + band, 2 * half + 1) if half else np.ones(1))
         return out
 

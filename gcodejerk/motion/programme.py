@@ -335,7 +335,11 @@ class _Unknowns:
         exact = np.concatenate([ends, _parts(by_block)]) if null else ends
         wanted = np.zeros(len(exact))
         wanted[2] = 1.0
-        jerk += np.linalg.lstsq(exact, wanted - exact @ jerk, rcond=None)[0]
+        correction = np.linalg.lstsq(exact, wanted - exact @ jerk, rcond=None)[0]
+        if np.abs(correction).max() > MARGIN * self.problem.jerk:
+            # Nulls at frequencies side by side are nearly the same equation: not to the last digit.
+            correction = np.linalg.lstsq(ends, wanted[:3] - ends @ jerk, rcond=None)[0]
+        jerk += correction
         worst = grouped(np.abs(by_block @ jerk), self.problem.group).max(initial=0.0)
         return Solution(jerk, float(worst), float(x[self.peak]))
 

@@ -1,0 +1,129 @@
+"""Optima of many moves: each problem once, remembered, and checked before it is used."""
+
+import builtins
+
+import numpy as np
+import pytest
+
+from gcodejerk import optima
+from gcodejerk.errors import PlanError
+from gcodejerk.motion import mode_poles
+from gcodejerk.motion.optimal import Move
+from gcodejerk.optima import Question, answers
+from gcodejerk.solutions import VARIABLE, cache_file, read_solutions, write_solutions
+
+MS = 0.001
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """The questions that reach the solver."""
+    asked = []
+    solve = optima._answer
+    monkeypatch.setattr(
+        optima, "_answer", lambda question: asked.append(question) or solve(question)
+    )
+    return asked
+
+
+def question(length=1.0, count=40, frequency=30.0, allowed=None):
+    poles = mode_poles([frequency], [0.0])
+    move = Move(
+        count, 600 / length, 5000 / length, 5e6 / length, poles, np.array([length]),
+        np.arange(1), 0.05, MS,
+    )  # fmt: skip
+    return Question(move, 0.37 * length, allowed)
+
+
+def test_equal_problems_are_solved_once(solved):
+    found = answers([question(), question(frequency=31.0), question()])
+    assert len(solved) == 2
+    assert found[0].worst == found[2].worst != found[1].worst
+
+
+def test_lengths_with_the_same_limits_over_them_share_a_solution(solved):
+    # Twice the length and twice all limits: the same unit law, twice the residual.
+    move = question().move
+    double = Question(
+        Move(move.count, move.velocity, move.acceleration, move.jerk, move.poles,
+             2.0 * move.weights, move.group, move.band, MS),
+        0.74,
+    )  # fmt: skip
+    one, two = answers([question(), double])
+    assert len(solved) == 1
+    assert two.worst == pytest.approx(2.0 * one.worst)
+    np.testing.assert_array_equal(one.jerk, two.jerk)
+
+
+def test_a_second_run_solves_nothing(solved):
+    first = answers([question(), question(2.0, 50)])
+    again = answers([question(2.0, 50), question()])
+    assert len(solved) == 2
+    for a, b in zip(first, reversed(again), strict=True):
+        np.testing.assert_array_equal(a.jerk, b.jerk)
+        np.testing.assert_array_equal(a.knots, b.knots)
+        assert a.worst == b.worst
+
+
+def tampered(value):
+    """Solutions that are not: cut, of nonsense, with a jerk too many or one doubled."""
+    numbers = np.frombuffer(value, "<f8").copy()
+    yield value[:-8]
+    yield value[:5]
+    yield b""
+    yield np.full(len(numbers), np.nan).tobytes()
+    for k in (1, 3, len(numbers) - 2):
+        wrong = numbers.copy()
+        wrong[k] = 1.5 * wrong[k] + 1.0
+        yield wrong.tobytes()
+    faster = numbers.copy()
+    faster[len(numbers) // 2 + 1 :] *= 1.01
+    yield faster.tobytes()
+
+
+def test_a_solution_from_the_disk_that_is_none_is_solved_again(solved):
+    good = answers([question()])[0]
+    key = question().key()[0]
+    value = read_solutions([key], cache_file())[key]
+    for count, wrong in enumerate(tampered(value), 2):
+        write_solutions({key: wrong}, cache_file())
+        again = answers([question()])[0]
+        assert len(solved) == count
+        np.testing.assert_allclose(again.jerk, good.jerk)
+
+
+def test_many_problems_are_solved_by_several_processes_alike(monkeypatch):
+    monkeypatch.setenv(VARIABLE, "")
+    questions = [question(0.5 + 0.1 * k, 36 + k) for k in range(optima.FEW + 4)]
+    told = []
+    together = answers(questions, lambda done, total: told.append((done, total)))
+    assert told[-1] == (len(questions), len(questions))
+    alone = [optima._answer(q) for q in questions]
+    for a, b, q in zip(together, alone, questions, strict=True):
+        assert (a is None) == (b is None)
+        if a is not None:
+            np.testing.assert_allclose(a.jerk, b.jerk)
+            assert a.worst == pytest.approx(b.worst * float(q.move.weights[0]))
+
+
+def test_what_the_limits_do_not_allow_has_no_answer():
+    assert answers([question(count=12)]) == [None]
+
+
+def test_without_the_solver_the_extra_is_named(monkeypatch):
+    real = builtins.__import__
+
+    def missing(name, *arguments, **keywords):
+        if name == "clarabel":
+            raise ImportError("No module named 'clarabel'", name="clarabel")
+        return real(name, *arguments, **keywords)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    with pytest.raises(PlanError, match="clarabel is missing") as caught:
+        answers([question()])
+    assert "pip install 'gcodejerk[science]'" in caught.value.remedy
