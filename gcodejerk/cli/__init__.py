@@ -15,7 +15,7 @@ import typer
 
 from gcodejerk import __version__
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
-from gcodejerk.cli.moves import map_amplitudes, plan
+from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.programs import inspect, process
 from gcodejerk.errors import GcodejerkError
 
@@ -34,6 +34,7 @@ app.command("process")(process)
 app.command("inspect")(inspect)
 app.command("plan")(plan)
 app.command("map")(map_amplitudes)
+app.command("compare")(compare)
 app.command("controllers")(controllers)
 machine_app.command("check")(machine_check)
 machine_app.command("schema")(machine_schema)

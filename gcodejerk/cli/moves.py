@@ -1,4 +1,4 @@
-"""The commands that take a single move: `plan` and `map`."""
+"""The commands that take a single move: `plan`, `map` and `compare`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine
+from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 CONDITIONS = ("I", "II", "III")
 TABLE = ".csv"
-MAPS = (".png", ".svg", ".pdf", TABLE)
+FIGURES = (".png", ".svg", ".pdf")
+MAPS = (*FIGURES, TABLE)
+OWN = "mode"
+"""In place of a damping ratio: that of the mode."""
 
 
 def plan(
@@ -130,6 +133,82 @@ def map_amplitudes(
             from gcodejerk.report.map_figure import POINTS, plot_map
 
             plot_map(survey, file, Path(output).suffix, points or POINTS, longest)
+
+
+def compare(
+    moves: Annotated[
+        list[str], typer.Argument(metavar="AXIS=LENGTH...", help="for example Z=1 or X=20 Y=-5")
+    ],
+    machine: MachineOption,
+    time: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="T_SUM of the profiles that keep it; the conventional time by default"
+        ),
+    ] = None,
+    shaper_damping: Annotated[
+        str,
+        typer.Option(
+            metavar="RATIO", help="damping ratio that shapers are made for, or mode: that of theirs"
+        ),
+    ] = "0",
+    as_json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="write the figures; - is standard output"),
+    ] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="draw the comparison (.png, .svg, .pdf)"),
+    ] = None,
+) -> None:
+    """Compare every profile and shaper on one move: time, peaks, vibration, settling."""
+    from gcodejerk.comparison import compare_move
+    from gcodejerk.files import new_file
+    from gcodejerk.report.compare_record import compare_record
+    from gcodejerk.report.compare_table import compare_notes, compare_table
+    from gcodejerk.report.records import dump
+
+    damping = _damping(shaper_damping)
+    if plot is not None and Path(plot).suffix.lower() not in FIGURES:
+        raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
+    if as_json is not None and as_json == plot:
+        raise typer.BadParameter("--json and --plot are two files")
+    displacement = _displacement(moves)
+    described = load_machine(machine, None)
+    with progress(False) as show:
+        found = compare_move(
+            displacement,
+            described,
+            time=time,
+            shaper_damping=damping,
+            progress=None if show is None else lambda done, total: show("optima", done, total),
+        )
+    with ExitStack() as outputs:
+        if as_json is not None:
+            outputs.enter_context(new_file(as_json)).write(dump(compare_record(found)))
+        if plot is not None:
+            from gcodejerk.report.compare_figure import plot_comparison
+
+            plot_comparison(found, outputs.enter_context(new_file(plot)), Path(plot).suffix)
+    if as_json != "-":
+        console().print(compare_table(found))
+        for line in compare_notes(found):
+            print(line)
+
+
+def _damping(text: str) -> float | None:
+    """What shapers are made for; None: the mode's own damping."""
+    if text == OWN:
+        return None
+    try:
+        damping = float(text)
+    except ValueError:
+        damping = -1.0
+    if not 0.0 <= damping < 1.0:
+        raise typer.BadParameter(
+            f"--shaper-damping {text}: give a ratio from 0 to below 1, or the word {OWN}"
+        )
+    return damping
 
 
 def _survey(

@@ -36,7 +36,7 @@ def rapids_table(record: Record) -> Table:
     -------
     Table
     """
-    table = _table(
+    table = bare_table(
         ("line", "right"),
         ("from", "left"),
         ("to", "left"),
@@ -95,7 +95,7 @@ def move_tables(record: Record, conventional: Record) -> list[Table]:
     list of Table
     """
     row, usual = record["rapids"][0], conventional
-    table = _table(
+    table = bare_table(
         ("profile", "left"),
         ("T_SUM\n[ms]", "right"),
         ("segments\n[ms]", "left"),
@@ -125,7 +125,7 @@ def move_tables(record: Record, conventional: Record) -> list[Table]:
 
 def _residual_table(residual: Sequence[Record]) -> Table:
     """What each mode keeps: of the profiles, and of the streams as sampled and written."""
-    table = _table(
+    table = bare_table(
         ("axis", "left"),
         ("mode", "left"),
         ("frequency\n[Hz]", "right"),
@@ -169,7 +169,7 @@ def map_tables(survey: Survey) -> list[Table]:
         time is long enough for the limits.
     """
     chosen, unit = survey.choose(), survey.unit
-    move = _table(
+    move = bare_table(
         (f"{survey.axis.name} {survey.length:g} {unit}", "left"),
         ("T_SUM\n[ms]", "right"),
         ("T1\n[ms]", "right"),
@@ -189,7 +189,7 @@ def map_tables(survey: Survey) -> list[Table]:
         f"{chosen.T1 * MS_PER_S:.4g}",
         *_peaks(survey.peaks(chosen), "step"),
     )
-    modes = _table(
+    modes = bare_table(
         ("mode", "left"),
         ("frequency\n[Hz]", "right"),
         ("damping\n[-]", "right"),
@@ -225,7 +225,7 @@ def _peaks(peaks: Peaks, infinite: str) -> tuple[str, str, str]:
 
 def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
     """Emitters: name, what each can write, and how far its facts can be trusted."""
-    table = _table(
+    table = bare_table(
         ("controller", "left"), ("form", "left"), ("confidence", "left"), ("note", "left")
     )
     for row in rows:
@@ -233,7 +233,7 @@ def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
     return table
 
 
-def _table(*columns: tuple[str, str]) -> Table:
+def bare_table(*columns: tuple[str, str]) -> Table:
     """A table without frame, its head underlined."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
     for name, justify in columns:

@@ -1,0 +1,102 @@
+"""What one move leaves when the last of its laws has ended, at its modes and in bands around them.
+
+This module owns the exact residual of a profile that is no stream: of laws that begin together and
+may end at different times, as axes that position on their own do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gcodejerk.motion import Laws, grouped, laws_response
+from gcodejerk.motion.laws import Array
+from gcodejerk.motion.objective import DENSE
+from gcodejerk.motion.residual import Complex
+from gcodejerk.plans import Modes
+
+BANDS = (0.05, 0.10)
+"""Relative errors of the frequencies for which the worst is looked for. [-]"""
+
+
+def arrival_response(laws: Laws, weights: Array, poles: Complex) -> Complex:
+    """Response of modes to one move, when the last of its laws has ended.
+
+    Parameters
+    ----------
+    laws : Laws
+        l unit laws that begin together; the modes ring on after those that end early.
+    weights : ndarray, shape (l, m)
+        Participation times displacement, with its sign. [mm]
+    poles : ndarray of complex, shape (m,)
+        [rad/s]
+
+    Returns
+    -------
+    ndarray of complex, shape (m,)
+        [mm/s]
+    """
+    left = (laws.total.max() - laws.total)[:, np.newaxis]
+    response: Complex = (laws_response(laws, poles) * np.exp(poles * left) * weights).sum(axis=0)
+    return response
+
+
+def worst_in_bands(
+    laws: Laws, weights: Array, modes: Modes
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The worst that any mode keeps where its frequency is off by any share within `BANDS`.
+
+    Parameters
+    ----------
+    laws, weights
+        As in `arrival_response`.
+    modes : Modes
+        The modes; the lines of a spectrum are off by the same share.
+
+    Returns
+    -------
+    displacement, acceleration : tuple of float
+        One of each for each band. [mm], [mm/s^2]
+    """
+    worst = np.zeros((2, len(BANDS)))
+    for entry in range(len(modes.modes)):
+        index = np.flatnonzero(modes.group == entry)
+        if not weights[:, index].any():
+            continue
+        relative = _relative(laws, modes.poles[index])
+        poles = np.outer(relative, modes.poles[index]).ravel()
+        every = np.tile(index, len(relative))
+        D = np.abs(arrival_response(laws, weights[:, every], poles)) / poles.imag
+        together = np.repeat(np.arange(len(relative)), len(index))
+        for quantity, values in enumerate((D, D * np.abs(poles) ** 2)):
+            square = grouped(values, together) ** 2
+            for k, band in enumerate(BANDS):
+                worst[quantity, k] = max(worst[quantity, k], _peak(square, band))
+    return tuple(worst[0].tolist()), tuple(worst[1].tolist())
+
+
+def _relative(laws: Laws, poles: Complex) -> Array:
+    """Relative frequencies at which a band is looked at; the bands' ends are among them.
+
+    The square of a residual, as a function of omega T, has no faster part than cos(omega T): a
+    parabola through three points `DENSE` apart in omega T/2 is right to 1e-4.
+    """
+    phase = 0.5 * max(BANDS) * float(np.abs(poles).max()) * float(laws.total.max())
+    half = 2 * max(int(np.ceil(0.5 * phase / DENSE)), 1)
+    return np.linspace(1.0 - max(BANDS), 1.0 + max(BANDS), 2 * half + 1)
+
+
+def _peak(square: Array, band: float) -> float:
+    """Root of the largest value within a band, between the points by parabolas."""
+    half = len(square) // 2
+    inner = round(half * band / max(BANDS))
+    low, high = half - inner, half + inner
+    best = float(square[low : high + 1].max())
+    for k in range(max(low, 1), min(high, 2 * half - 1) + 1):
+        left, here, right = (float(x) for x in square[k - 1 : k + 2])
+        curvature = left - 2.0 * here + right
+        if curvature < 0.0 and here >= left and here >= right:
+            offset = 0.5 * (left - right) / curvature
+            offset = min(max(offset, 0.0 if k == low else -0.5), 0.0 if k == high else 0.5)
+            top = here + 0.5 * (right - left) * offset + 0.5 * curvature * offset**2
+            best = max(best, top)
+    return float(np.sqrt(best))

@@ -1,0 +1,405 @@
+"""A comparison: one move, made by every profile and every shaper that this package knows.
+
+This module owns the list of contenders for one move of a machine, and how they are judged: their
+time, their peaks, what every mode keeps at its own frequency and within a band around it, and when
+the machine has come to rest. It knows no file and draws nothing; `report.compare_record`,
+`report.compare_table` and `report.compare_figure` do.
+
+Rule 1: laws are judged, not streams. What a mode keeps is exact for the profile itself, before it
+is sampled and rounded; so a shaper's delays need no grid, and nothing is lost for anyone.
+
+Rule 2: Conditions I and II compete at their best T1 whatever the limits say, as the paper has them;
+shapers act on the controller's own law, made for the mode that it shakes most. Everyone else
+keeps the limits, as the planner sees to. Who breaks a limit says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcodejerk.arrival import arrival_response, worst_in_bands
+from gcodejerk.designs import Task, condition1, condition2, known_limits
+from gcodejerk.errors import PlanError
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.motion import Laws, joined, whole_intervals
+from gcodejerk.motion.laws import Array
+from gcodejerk.motion.programme import require_solver
+from gcodejerk.motion.shapers import SHAPERS, shaped_law
+from gcodejerk.move import check_time, displacement_row
+from gcodejerk.optima import Progress
+from gcodejerk.plan import STANDSTILL, path_length, plan_moves
+from gcodejerk.plans import Modes, Plans
+from gcodejerk.reasons import CERTAIN, REASONS
+
+DESIGNED = ("condition3", "cascade", "optimal", "shortest")
+"""Profiles that the planner makes, within the limits."""
+CONTENDERS = ("conventional", "condition1", "condition2", *DESIGNED, *SHAPERS)
+"""Everyone, in that order."""
+SOLVED = ("optimal", "shortest")
+"""Profiles that need the solver."""
+NEEDS_SOLVER = "needs gcodejerk[science]"
+HELD = 1e-6
+"""A limit that is passed by less than this share is kept."""
+QUANTITIES = ("velocity", "acceleration", "jerk")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contender:
+    """One profile or shaper on the move.
+
+    Attributes
+    ----------
+    name : str
+        One of `CONTENDERS`.
+    laws : Laws
+        The unit law, or one for each moving axis under independent positioning.
+    displacement, acceleration : ndarray, shape (g,)
+        What each entry of the machine's `Modes` keeps when the last axis has arrived. [mm],
+        [mm/s^2]
+    worst_band, worst_band_acceleration : tuple of float
+        The largest of these over all entries, for any error of a frequency within each of
+        `arrival.BANDS`. [mm], [mm/s^2]
+    settling : float or None
+        Time from the start until no mode's envelope is above the tolerance; None: never. [s]
+    limit : float or None
+        The least residual displacement of any law that takes as many intervals and keeps the
+        limits; None where it is not known. [mm]
+    broken : tuple of (str, float)
+        The limits that are broken, and how many times over. [-]
+    note : str
+        What else there is to say; may be empty.
+    """
+
+    name: str
+    laws: Laws
+    displacement: Array
+    acceleration: Array
+    worst_band: tuple[float, ...]
+    worst_band_acceleration: tuple[float, ...]
+    settling: float | None
+    limit: float | None
+    broken: tuple[tuple[str, float], ...]
+    note: str
+
+    @property
+    def time(self) -> float:
+        """When the last axis arrives [s]; of a shaper or today's G0 no whole intervals."""
+        return float(self.laws.total.max())
+
+    @property
+    def worst(self) -> float:
+        """Largest residual displacement over the modes, at their own frequencies [mm]."""
+        return float(self.displacement.max(initial=0.0))
+
+    @property
+    def within_limits(self) -> bool:
+        """Whether every axis stays within its `limit`."""
+        return not self.broken
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """All contenders on one move.
+
+    Attributes
+    ----------
+    machine : Machine
+        The machine that moves.
+    displacement : dict of str to float
+        What each axis moves. [mm] or [deg]
+    modes : Modes
+        The machine's modes.
+    share : ndarray, shape (l, 9)
+        Displacement of each axis that each law carries. [mm] or [deg]
+    contenders : tuple of Contender
+        Those that exist, in the order of `CONTENDERS`.
+    absent : dict of str to str
+        The others, and why.
+    time : float
+        T_SUM of the profiles that keep it. [s]
+    shaped : tuple of (float, float)
+        Frequency [Hz] and damping ratio that shapers were made for, one for each law that has a
+        shaper.
+    """
+
+    machine: Machine
+    displacement: dict[str, float]
+    modes: Modes
+    share: Array
+    contenders: tuple[Contender, ...]
+    absent: dict[str, str]
+    time: float
+    shaped: tuple[tuple[float, float], ...]
+
+    def __getitem__(self, name: str) -> Contender:
+        """The contender of that name; KeyError where it is absent."""
+        for contender in self.contenders:
+            if contender.name == name:
+                return contender
+        raise KeyError(name)
+
+    @property
+    def conventional_time(self) -> float:
+        """What the controller's own G0 takes [s]."""
+        return self["conventional"].time
+
+    @property
+    def excited(self) -> list[int]:
+        """The entries of the modes that the move excites."""
+        moving = (self.share != 0.0).any(axis=0)
+        used = ((self.modes.participation != 0.0) & moving).any(axis=1)
+        return sorted(set(self.modes.group[used].tolist()))
+
+    @property
+    def longest(self) -> str:
+        """The axis that moves farthest."""
+        return AXES[int(np.argmax(np.abs(self.share).max(axis=0)))]
+
+
+def compare_move(
+    displacement: Mapping[str, float],
+    machine: Machine,
+    *,
+    time: float | None = None,
+    shaper_damping: float | None = 0.0,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Make one move with every profile and every shaper.
+
+    Parameters
+    ----------
+    displacement : mapping of str to float
+        What each axis moves, for example ``{"Z": 1.0}``. [mm] or [deg]
+    machine : Machine
+        Limits, modes and interval.
+    time : float, optional
+        T_SUM of the profiles that keep it; the conventional time by default. [s]
+    shaper_damping : float or None, optional
+        Damping ratio that shapers are made for; None: that of the mode. [-]
+    progress : callable, optional
+        Called while optima are computed.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    MachineError
+        The machine has no such axis.
+    PlanError
+        Nothing moves or shakes, a number is not possible, or no profile within the limits is fast
+        enough for the time.
+
+    Examples
+    --------
+    The case of the paper: Condition I at its best, which breaks limits, and a shaper:
+
+    >>> from gcodejerk.machine import find_machine
+    >>> paper = compare_move({"Z": 1.0}, Machine.load(find_machine("paper")))
+    >>> [round(float(paper[name].acceleration[0]), 1) for name in ("conventional", "condition1")]
+    [13209.3, 11777.1]
+    >>> paper["condition1"].within_limits, round(paper["zv"].time, 5)
+    (False, 0.05667)
+    """
+    row = displacement_row(displacement, machine)
+    check_time(time)
+    row = np.where(np.abs(row) > STANDSTILL, row, 0.0)
+    if not row.any():
+        raise PlanError("no axis moves: nothing to compare", "for example Z=1")
+    field = _Field(machine, row, time, shaper_damping, progress)
+    if not field.task.objective.weights.any():
+        moving = ", ".join(AXES[k] for k in np.flatnonzero(row[0]))
+        raise PlanError(
+            f"{moving} of {machine.source} excites no mode: nothing to compare",
+            "describe modes in the machine file (axes.?.modes, or modes of the structure)",
+        )
+    field.enter()
+    return field.judged({a.upper(): float(x) for a, x in displacement.items()})
+
+
+class _Field:
+    """The contenders of one move, as they enter, and how they are judged."""
+
+    def __init__(
+        self, machine: Machine, row: Array, time: float | None, damping: float | None,
+        progress: Progress | None,
+    ) -> None:  # fmt: skip
+        self.machine, self.row, self.time, self.progress = machine, row, time, progress
+        self.damping = damping
+        self.modes = Modes.of(machine)
+        self.share = row if machine.positioning == "linear" else np.diag(row[0])[row[0] != 0.0]
+        task = Task.of(machine, self.modes, self.share, progress=progress)
+        counts = task.counts
+        if time is not None:
+            given = np.full(len(self.share), time)
+            counts = np.maximum(whole_intervals(given, machine.interval), 1)
+        self.task = task.after(counts)
+        self.conventional = task.conventional.general()
+        self.weights = self.share @ self.modes.participation.T
+        self.laws: dict[str, Laws] = {}
+        self.notes: dict[str, str] = {}
+        self.absent: dict[str, str] = {}
+        self.shaped: list[tuple[float, float]] = []
+
+    def enter(self) -> None:
+        """Find the laws of everyone."""
+        self.laws["conventional"] = self.conventional
+        free = np.full(len(self.share), np.inf)
+        unlimited = replace(self.task, limits=(free, free, free))
+        for name, design in (("condition1", condition1), ("condition2", condition2)):
+            found, worst = design(unlimited)
+            if np.isfinite(worst).all():
+                self.laws[name] = found
+            else:
+                self.absent[name] = "four segments are shorter than the interval"
+        self._enter_designs()
+        targets = self._targets()
+        for name in SHAPERS:
+            self.laws[name] = joined(
+                [
+                    self.conventional.take(slice(k, k + 1))
+                    if target is None
+                    else shaped_law(self.conventional.take(slice(k, k + 1)), name, *target)
+                    for k, target in enumerate(targets)
+                ]
+            )
+        self.shaped = [target for target in targets if target is not None]
+
+    def _enter_designs(self) -> None:
+        """What the planner makes, as it would make it."""
+        refused: list[PlanError] = []
+        solver = True
+        try:
+            require_solver()
+        except PlanError:
+            solver = False
+        for name in DESIGNED:
+            if name in SOLVED and not solver:
+                self.absent[name] = NEEDS_SOLVER
+                continue
+            time = None if name == "shortest" else self.time
+            try:
+                plans = plan_moves(self.row, self.machine, name, time=time, progress=self.progress)
+            except PlanError as error:
+                refused.append(error)
+                self.absent[name] = error.problem
+                continue
+            if plans.reason[0] != CERTAIN:
+                self.absent[name] = str(REASONS[plans.reason[0]])
+                continue
+            self.laws[name] = plans.laws
+            self.notes[name] = self._note(plans, name)
+        # With a time of the user's choice: if nobody makes it, the time is what is wrong.
+        if refused and not any(name in self.laws for name in ("condition3", "cascade", "optimal")):
+            raise refused[0]
+
+    def _note(self, plans: Plans, name: str) -> str:
+        """What the planner had to do about it."""
+        if plans.kept.all():
+            return "no better law within the limits: the conventional one is kept"
+        extra = int(plans.counts[0] - self.task.counts.max())
+        if name != "shortest" and extra > 0:
+            return f"{1e3 * extra * self.machine.interval:g} ms longer to keep the limits"
+        return ""
+
+    def _targets(self) -> list[tuple[float, float] | None]:
+        """Frequency [Hz] and damping that the shaper of each law is made for."""
+        dominant = self.task.objective.dominant(self.conventional)
+        out: list[tuple[float, float] | None] = []
+        for k, mode in enumerate(dominant):
+            pole = complex(self.modes.poles[mode])
+            own = -pole.real / abs(pole)
+            damping = own if self.damping is None else self.damping
+            # An axis on its own that excites no mode needs no shaper.
+            shakes = self.weights[k].any()
+            out.append((abs(pole) / (2.0 * np.pi), damping) if shakes else None)
+        return out
+
+    def judged(self, displacement: dict[str, float]) -> Comparison:
+        """Everyone's figures."""
+        names = [name for name in CONTENDERS if name in self.laws]
+        limits = known_limits(self._plans(names), self.progress)
+        contenders = tuple(
+            self._contender(name, np.nan if limits is None else float(limits[k]))
+            for k, name in enumerate(names)
+        )
+        absent = {name: self.absent[name] for name in CONTENDERS if name in self.absent}
+        return Comparison(
+            self.machine, displacement, self.modes, self.share, contenders, absent,
+            float(self.task.total.max()), tuple(self.shaped),
+        )  # fmt: skip
+
+    def _plans(self, names: list[str]) -> Plans:
+        """The contenders as moves, side by side."""
+        n, each = len(names), len(self.share)
+        laws = joined([self.laws[name] for name in names])
+        counts = np.maximum(whole_intervals(laws.total, self.machine.interval), 1)
+        displacement = np.tile(self.row, (n, 1))
+        return Plans(
+            machine=self.machine,
+            modes=self.modes,
+            reason=np.full(n, CERTAIN, np.uint8),
+            displacement=displacement,
+            length=path_length(displacement, self.machine),
+            conventional_time=np.full(n, self.conventional.total.max()),
+            counts=counts.reshape(n, each).max(axis=1),
+            move=np.repeat(np.arange(n, dtype=np.int64), each),
+            share=np.tile(self.share, (n, 1)),
+            laws=laws,
+            conventional=joined([self.conventional] * n),
+            law_counts=counts,
+            kept=np.zeros(n * each, dtype=bool),
+            designed=self.machine.design.profile,
+        )
+
+    def _contender(self, name: str, limit: float) -> Contender:
+        """One contender's figures."""
+        laws, modes = self.laws[name], self.modes
+        response = np.abs(arrival_response(laws, self.weights, modes.poles))
+        each = response / modes.poles.imag
+        displacement = modes.grouped(each)
+        broken = self._broken(laws)
+        if not broken:
+            # Segments that end between intervals may be a little better than the bound on these.
+            limit = min(limit, float(displacement.max()))
+        bands = worst_in_bands(laws, self.weights, modes)
+        return Contender(
+            name=name,
+            laws=laws,
+            displacement=displacement,
+            acceleration=modes.accelerations(each),
+            worst_band=bands[0],
+            worst_band_acceleration=bands[1],
+            settling=self._settling(float(laws.total.max()), displacement),
+            limit=limit if np.isfinite(limit) else None,
+            broken=broken,
+            note=self.notes.get(name, ""),
+        )
+
+    def _broken(self, laws: Laws) -> tuple[tuple[str, float], ...]:
+        """Limits that laws break, with the largest share of any axis."""
+        peaks = (laws.peak_velocity, laws.peak_acceleration, laws.peak_jerk)
+        out = []
+        for quantity, peak, limit in zip(QUANTITIES, peaks, self.task.limits, strict=True):
+            with np.errstate(invalid="ignore"):
+                use = float(np.where(np.isinf(limit), 0.0, peak / limit).max())
+            if use > 1.0 + HELD:
+                out.append((quantity, use))
+        return tuple(out)
+
+    def _settling(self, arrival: float, displacement: Array) -> float | None:
+        """When the last envelope has decayed to the tolerance [s]; None where one never does."""
+        tolerance = self.machine.design.tolerance
+        settled = arrival
+        for mode, D in zip(self.modes.modes, displacement.tolist(), strict=True):
+            if tolerance >= D:
+                continue
+            if mode.damping == 0.0:
+                return None
+            rate = mode.damping * 2.0 * np.pi * mode.frequency
+            settled = max(settled, arrival + float(np.log(D / tolerance)) / rate)
+        return settled

@@ -1,0 +1,202 @@
+"""A comparison for a terminal: one row for each contender, and what has to be said about them.
+
+Rule: the best of a column is bold among those that keep the limits; a figure that nobody could
+have on this machine is no best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rich.table import Table
+from rich.text import Text
+
+from gcodejerk.arrival import BANDS
+from gcodejerk.comparison import DESIGNED, NEEDS_SOLVER, Comparison, Contender
+from gcodejerk.motion.shapers import SHAPERS
+from gcodejerk.report.compare_record import axis_peaks
+from gcodejerk.report.tables import MS_PER_S, UM_PER_MM, bare_table
+
+NEVER = "never"
+UNKNOWN = "-"
+SAME = 1.0 + 1e-6
+"""Figures that differ by less are the same."""
+
+
+def compare_table(comparison: Comparison) -> Table:
+    """Times, peaks and residuals, a row for each contender.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_move`.
+
+    Returns
+    -------
+    Table
+    """
+    unit, small = _units(comparison)
+    axis = comparison.longest
+    table = bare_table(
+        ("profile", "left"),
+        ("time\n[ms]", "right"),
+        ("settled\n[ms]", "right"),
+        (f"{axis} velocity\n[{unit}/s]", "right"),
+        (f"acceleration\n[{unit}/s^2]", "right"),
+        (f"jerk\n[{unit}/s^3]", "right"),
+        (f"residual\n[{small}]", "right"),
+        *((f"+-{100 * band:.0f} %\n[{small}]", "right") for band in BANDS),
+        (f"limit\n[{small}]", "right"),
+    )
+    best = _Best(comparison)
+    for contender in comparison.contenders:
+        peak = axis_peaks(comparison, contender)[axis]
+        table.add_row(
+            contender.name + ("" if contender.within_limits else " *"),
+            f"{contender.time * MS_PER_S:.1f}",
+            best.of(contender, "settled", _settled(contender)),
+            f"{peak['velocity']:.2f}",
+            f"{peak['acceleration']:.0f}",
+            "step" if peak["jerk"] is None else f"{peak['jerk']:.3g}",
+            best.of(contender, "residual", _small(contender.worst)),
+            *(
+                best.of(contender, band, _small(worst))
+                for band, worst in zip(BANDS, contender.worst_band, strict=True)
+            ),
+            UNKNOWN if contender.limit is None else _small(contender.limit),
+        )
+    for name in comparison.absent:
+        table.add_row(f"{name} **", *[UNKNOWN] * (len(table.columns) - 1))
+    return table
+
+
+def compare_notes(comparison: Comparison) -> list[str]:
+    """What the table means, who is out of the ordinary, and what the user gains.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_move`.
+
+    Returns
+    -------
+    list of str
+        Lines; the last one or two say what is gained.
+    """
+    _, small = _units(comparison)
+    tolerance = comparison.machine.design.tolerance * UM_PER_MM
+    lines = [
+        f"residual: largest displacement of any mode; +-: at worst with every frequency off by "
+        f"as much; settled: below {tolerance:g} {small}",
+        "limit: the least that any profile of that time within the limits leaves; all of the "
+        "profiles themselves, before sampling",
+        _shapers(comparison),
+    ]
+    broken = [
+        f"{c.name} ({', '.join(f'{name} {_times(use)}' for name, use in c.broken)})"
+        for c in comparison.contenders
+        if c.broken
+    ]
+    if broken:
+        lines.append(f"* beyond the limits: {', '.join(broken)}")
+    reasons: dict[str, list[str]] = {}
+    for name, why in comparison.absent.items():
+        reasons.setdefault(why, []).append(name)
+    for why, names in reasons.items():
+        remedy = f" and for the limit: pip install '{NEEDS_SOLVER.split()[-1]}'"
+        lines.append(f"** {', '.join(names)}: {why}{remedy if why == NEEDS_SOLVER else ''}")
+    lines += [f"{c.name}: {c.note}" for c in comparison.contenders if c.note]
+    return [*lines, *_gains(comparison)]
+
+
+def _gains(comparison: Comparison) -> list[str]:
+    """What the best designs would bring, beside the controller's own G0."""
+    usual = comparison["conventional"]
+    designed = [c for c in comparison.contenders if c.name in DESIGNED and c.within_limits]
+    lines = []
+    settled = [c for c in designed if c.settling is not None]
+    if settled:
+        first = min(settled, key=lambda c: c.settling or 0.0)
+        now = (
+            "never settles"
+            if usual.settling is None
+            else f"is settled after {_time(usual.settling)}"
+        )
+        lines.append(
+            f"{first.name} is settled {_time(first.settling or 0.0)} after the start; "
+            f"the controller's own G0 {now}"
+        )
+    same = [c for c in designed if c.time <= comparison.time * SAME and c.name != "shortest"]
+    if same:
+        stillest = min(same, key=lambda c: c.worst)
+        if stillest.worst < usual.worst:
+            _, small = _units(comparison)
+            lines.append(
+                f"in {_time(comparison.time)}, {stillest.name} leaves "
+                f"{_small(stillest.worst)} {small}; the controller's own G0 leaves "
+                f"{_small(usual.worst)} {small} after {_time(usual.time)}"
+            )
+    return lines
+
+
+def _shapers(comparison: Comparison) -> str:
+    """What the shapers act on, and what they were made for."""
+    made = dict.fromkeys(
+        f"{frequency:.4g} Hz with damping {damping:.3g}" for frequency, damping in comparison.shaped
+    )
+    return (
+        f"{SHAPERS[0]} to {SHAPERS[-1]}: the controller's own G0 behind an input shaper, made for "
+        f"{', '.join(made)} (--shaper-damping), what shakes most"
+    )
+
+
+class _Best:
+    """The best figure of each column, among those who keep the limits."""
+
+    def __init__(self, comparison: Comparison) -> None:
+        figures: dict[object, Callable[[Contender], float]] = {
+            "settled": lambda c: float("inf") if c.settling is None else c.settling,
+            "residual": lambda c: c.worst,
+        }
+        for k, band in enumerate(BANDS):
+            figures[band] = lambda c, k=k: c.worst_band[k]  # type: ignore[misc]
+        self.figures = figures
+        fair = [c for c in comparison.contenders if c.within_limits]
+        self.least = {
+            column: min((figure(c) for c in fair), default=float("inf"))
+            for column, figure in figures.items()
+        }
+
+    def of(self, contender: Contender, column: object, text: str) -> Text:
+        """A figure, bold where it is the best of its column."""
+        value = self.figures[column](contender)
+        best = (
+            contender.within_limits
+            and value < float("inf")
+            and value <= max(self.least[column] * SAME, 0.5e-5)
+        )
+        return Text(text, style="bold" if best else "")
+
+
+def _units(comparison: Comparison) -> tuple[str, str]:
+    """Unit of the longest-moving axis, and that of its residuals."""
+    rotary = comparison.machine.axis(comparison.longest).rotary
+    return ("deg", "deg/1000") if rotary else ("mm", "um")
+
+
+def _settled(contender: Contender) -> str:
+    return NEVER if contender.settling is None else f"{contender.settling * MS_PER_S:.1f}"
+
+
+def _small(value: float) -> str:
+    return f"{value * UM_PER_MM:.2f}"
+
+
+def _times(use: float) -> str:
+    """How many times over a limit; a step of the acceleration is infinite jerk."""
+    return f"{use:.3g} x" if use < float("inf") else "steps"
+
+
+def _time(seconds: float) -> str:
+    """A time in the unit that is easiest to read."""
+    return f"{seconds:.2g} s" if seconds >= 1.0 else f"{seconds * MS_PER_S:.3g} ms"
