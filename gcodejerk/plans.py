@@ -68,7 +68,8 @@ class Modes:
             for frequency, weight in zip(spectrum.frequency, spectrum.weight, strict=True):
                 group.append(len(modes))
                 poles.append(complex(mode_poles(frequency, 0.0)))
-                rows.append(own * np.sqrt(weight))
+                # Accelerations are weighted, and stated as displacements at the peak.
+                rows.append(own * np.sqrt(weight) * (frequency / spectrum.peak) ** 2)
             labels.append(axis.name)
             excited = ((axis.name, spectrum.participation),)
             modes.append(Mode(f"spectrum {spectrum.source}", spectrum.peak, 0.0, excited))
@@ -84,7 +85,8 @@ class Modes:
 
     def accelerations(self, displacement: Array) -> Array:
         """Acceleration amplitudes of the entries, (..., m) -> (..., g) [mm/s^2]."""
-        return self.grouped(displacement * np.abs(self.poles) ** 2)
+        frequency = np.array([mode.frequency for mode in self.modes])
+        return self.grouped(displacement) * (2.0 * np.pi * frequency) ** 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -58,12 +58,15 @@ class Spectrum:
 
     Every line stands for an undamped oscillator that the axis drives. With :math:`w_k` the share of
     line k in the energy (the PSD times the width that the line stands for, over the sum of all) and
-    :math:`D_k` the residual displacement of its oscillator [mm], the residual of a move is
+    :math:`A_k = \omega_k^2 D_k` the acceleration amplitude that a move leaves in its oscillator,
+    the residual of the move is
 
-    .. math:: D = p \sqrt{\sum_k w_k D_k^2}
+    .. math:: A = p \sqrt{\sum_k w_k A_k^2}, \qquad D = A / (2 \pi f_{peak})^2
 
-    with the participation p: the spectrum-weighted mean, which is convex in the jerks. A spectrum
-    holds no phase and tells no damping apart, so the residual counts as if nothing decayed.
+    with the participation p: the spectrum-weighted mean, which is convex in the jerks. It is the
+    acceleration that is weighted, since that is what the sensor measured: of the displacements the
+    lines below 10 Hz, where it feels drift and the motion itself, would be most. A spectrum holds
+    no phase and tells no damping apart, so the residual counts as if nothing decayed.
     """
 
     source: str = field(compare=False)

@@ -150,24 +150,18 @@ def reduced(frequency: Array, psd: Array, width: Array) -> tuple[Array, Array]:
 
     Notes
     -----
-    A vibration of acceleration a at :math:`\omega` is a displacement of :math:`a/\omega^2`, so that
-    what is negligible to the sensor can be most of what is left to settle: eight spectra of
-    printers hold 0.2 % of the one and 20 % to 60 % of the other below 10 Hz. Lines are left out
-    only where they hold less than `NEGLIGIBLE` of both energies, that of the acceleration and that
-    of the displacement, PSD/f^4.
-
-    If too many are left, neighbours are merged in cells, each into its centroid. The cells are
-    those of an n-level quantiser with the least mean square error: of the density p^(1/3) for
-    values of the density p [1]_, here the displacement's.
+    Lines are left out only where together they hold less than `NEGLIGIBLE` of the energy. If too
+    many are left, neighbours are merged in cells, each into its centroid. The cells are those of an
+    n-level quantiser with the least mean square error: of the density p^(1/3) for values of the
+    density p [1]_, here the PSD.
 
     References
     ----------
     .. [1] P. F. Panter and W. Dite, Proceedings of the IRE 39(1), 1951, pp. 44-48.
     """
     energy = psd * width
-    displacement = psd / (frequency / frequency[0]) ** 4
-    kept = ~(_negligible(energy) & _negligible(displacement * width))
-    f, energy, density = frequency[kept], energy[kept], np.cbrt(displacement[kept]) * width[kept]
+    kept = ~_negligible(energy)
+    f, energy, density = frequency[kept], energy[kept], np.cbrt(psd[kept]) * width[kept]
     if len(f) > MOST_LINES:
         middle = np.cumsum(density) - 0.5 * density
         # The last line may round up into a cell of its own.
