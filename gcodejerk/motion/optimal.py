@@ -33,6 +33,8 @@ from gcodejerk.motion.programme import (
 )
 from gcodejerk.motion.residual import Complex
 
+FEWEST_INTERVALS = 3
+"""Two cannot begin and end at rest."""
 FULL_INTERVALS = 128
 """Moves of at most so many intervals have a jerk in each of them."""
 BLOCK = 4
@@ -229,10 +231,15 @@ class _Search:
 
     def least(self) -> Optimum | None:
         """Blocks and frequencies refined around the least residual."""
+        if self.move.count < 2:
+            return None  # a single interval has no law from rest to rest
+        if self.move.count < FEWEST_INTERVALS:
+            return None
         every = np.arange(self.move.count + 1)
         knots = every
         if self.move.count > FULL_INTERVALS:
-            coarse = np.union1d(every[::BLOCK], every[-1:])
+            first = every[: len(every) // 2 + 1 : BLOCK]
+            coarse = np.union1d(first, self.move.count - first)
             found = self._exchanged(coarse, 2, COARSE_ACCURACY)
             if found is not None:
                 knots = self._refined(coarse, found)
@@ -295,6 +302,9 @@ class _Search:
         """Blocks cut into single intervals where the jerk acts, and beside these."""
         size = np.abs(found.jerk)
         active = size > ACTIVE * size.max(initial=0.0)
+        if not self.poles.real.any():
+            # The jerk of an undamped optimum is even about the middle, and so are its blocks.
+            active |= active[::-1].copy()
         active[[0, -1]] = True
         active[1:] |= active[:-1].copy()
         active[:-1] |= active[1:].copy()

@@ -178,7 +178,7 @@ def _solve_once(
     rows = _Rows()
     unknowns.motion(rows)
     if cap == 0.0:
-        rows.dense(_parts(response), unknowns.a)
+        rows.dense(np.concatenate(response), unknowns.a)
     equalities = rows.count
     unknowns.limits(rows, curved)
     cones: list[Any] = [
@@ -191,8 +191,9 @@ def _solve_once(
                 rows.add([(unknowns.worst, -1.0)], 0.0)
             else:
                 rows.add([], cap)
-            rows.dense(_parts(response[part]), unknowns.a)
-            cones.append(clarabel.SecondOrderConeT(1 + 2 * (part.stop - part.start)))
+            own = np.concatenate(response[part])
+            rows.dense(own, unknowns.a)
+            cones.append(clarabel.SecondOrderConeT(1 + len(own)))
     width = unknowns.worst + (cap is None)
     matrix, bound = rows.assembled(width)
     cost = np.zeros(width)
@@ -250,27 +251,40 @@ class _Rows:
 class _Unknowns:
     """Acceleration and velocity at every knot, the peak jerk as a share of its limit, the residual.
 
-    Columns of the matrix; -1 stands for what is zero: rest at both ends.
+    Columns of the matrix; -1 stands for what is zero: rest at both ends. Without damping a law and
+    its mirror image in time (braking first, reversed) leave the same, and half of both no more: the
+    optimum can be odd about its middle, and the second half of the knots are images of the first.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        inner = len(problem.knots) - 2
-        self.h = np.diff(problem.knots) / problem.knots[-1]
-        self.at_v = np.concatenate([[-1], np.arange(inner), [-1]])
-        self.at_a = np.concatenate([[-1], inner + np.arange(inner), [-1]])
-        self.a = self.at_a[1:-1]
-        self.peak = 2 * inner
+        knots, blocks = problem.knots, len(problem.knots) - 1
+        self.h = np.diff(knots) / knots[-1]
+        undamped = not problem.poles.real.any()
+        self.odd = undamped and bool(np.all(knots + knots[::-1] == knots[-1]))
+        k = np.arange(blocks + 1)
+        image = np.minimum(k, blocks - k) if self.odd else k
+        self.sign = np.sign(blocks - 2 * k) if self.odd else np.ones(blocks + 1, dtype=np.int64)
+        self.speeds = blocks // 2 if self.odd else blocks - 1
+        slopes = (blocks - 1) // 2 if self.odd else blocks - 1
+        ends = (k == 0) | (k == blocks)
+        self.at_v = np.where(ends, -1, image - 1)
+        self.at_a = np.where(ends | (self.sign == 0), -1, self.speeds + image - 1)
+        self.a = self.speeds + np.arange(slopes)
+        self.peak = self.speeds + slopes
         self.worst = self.peak + 1
 
     def motion(self, rows: _Rows) -> None:
         """The velocity is the acceleration's integral, and its own is the length."""
         h, a, v = self.h, self.at_a, self.at_v
-        rows.add([(v[1:], 1.0), (v[:-1], -1.0), (a[1:], -0.5 * h), (a[:-1], -0.5 * h)], 0.0)
+        own = slice(0, len(h) // 2 if self.odd else len(h))
+        half = 0.5 * h[own]
+        end, begin = (a[1:][own], -half), (a[:-1][own], -half)
+        rows.add([(v[1:][own], 1.0), (v[:-1][own], -1.0), end, begin], 0.0)
         before, after = np.append(h, 0.0), np.insert(h, 0, 0.0)
         # Over a block: v h + (2 a + a') h^2 / 6, a' being the acceleration at its end.
         columns = np.concatenate([v, a])
-        values = np.concatenate([before, before**2 / 3.0 + after**2 / 6.0])
+        values = np.concatenate([before, self.sign * (before**2 / 3.0 + after**2 / 6.0)])
         used = columns >= 0
         rows.dense(values[np.newaxis, used], columns[used])
         rows.bounds[-1] = np.ones(1)
@@ -280,19 +294,22 @@ class _Unknowns:
 
         `curved`: and between them, where the velocity is a parabola.
         """
-        problem, h, a, v = self.problem, self.h, self.at_a, self.at_v
+        problem, h, a, sign = self.problem, self.h, self.at_a, self.sign
+        own = slice(0, (len(h) + 1) // 2 if self.odd else len(h))
         usable = 1.0 - MARGIN
-        for sign in (1.0, -1.0):
-            share = sign / (h * problem.jerk)
-            rows.add([(a[1:], share), (a[:-1], -share), (self.peak, -1.0)], 0.0)
+        for side in (1.0, -1.0):
+            share = side / (h[own] * problem.jerk)
+            end, begin = (a[1:][own], share * sign[1:][own]), (a[:-1][own], -share)
+            rows.add([end, begin, (self.peak, -1.0)], 0.0)
             if np.isfinite(problem.acceleration):
-                rows.add([(self.a, sign)], problem.acceleration * usable)
+                rows.add([(self.a, side)], problem.acceleration * usable)
         rows.add([(self.peak, 1.0)], usable)
         # v and the control point of the parabola, v + a h / 2, which lies above or below it.
-        inner = v[1:-1]
+        inner = np.arange(self.speeds)
         every = [[(inner, 1.0)]]
         if curved:
-            every.append([(inner, 1.0), (a[1:-1], 0.5 * h[1:])])
+            behind = 0.5 * h[1 : self.speeds + 1]
+            every.append([(inner, 1.0), (a[1 : self.speeds + 1], behind)])
         for terms in every:
             rows.add([(column, -np.asarray(value)) for column, value in terms], 0.0)
             # Half of the time at full acceleration reaches no more than this.
@@ -308,12 +325,20 @@ class _Unknowns:
         small = MARGIN * np.abs(v).max(initial=0.0)
         return bool(control.min() >= -small and control.max() <= self.problem.velocity + small)
 
-    def responses(self) -> Complex:
-        """Displacement of each pole for each unknown acceleration, shape (m, len(a))."""
+    def responses(self) -> list[Array]:
+        """Displacement of each pole for each unknown acceleration: real rows, shape (., len(a)).
+
+        Two rows a pole, real and imaginary part; one where the law is odd: seen from the middle,
+        its response is imaginary throughout.
+        """
         # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
         per_time = self.by_block() / self.h
         response: Complex = per_time[:, :-1] - per_time[:, 1:]
-        return response
+        if self.odd:
+            folded = (response - response[:, ::-1])[:, : len(self.a)]
+            seen = folded * np.exp(-0.5 * self.problem.poles)[:, np.newaxis]
+            return list(seen.imag[:, np.newaxis, :])
+        return list(_parts(response).reshape(len(response), 2, -1))
 
     def by_block(self) -> Complex:
         """Displacement of each pole for a unit jerk in each block, shape (m, k)."""
@@ -327,7 +352,7 @@ class _Unknowns:
 
     def solution(self, x: Array, null: bool) -> Solution:
         """The solver's answer, mended to the last digit where it must be exact."""
-        a = np.append(x, 0.0)[np.where(self.at_a < 0, len(x), self.at_a)]
+        a = self.sign * np.append(x, 0.0)[np.where(self.at_a < 0, len(x), self.at_a)]
         jerk = np.diff(a) / self.h
         by_block = self.by_block()
         # Rest and length: what a jerk does to acceleration, velocity and position at the end.

@@ -217,6 +217,19 @@ def test_a_time_that_the_limits_do_not_allow_has_no_optimum():
     assert least_residual(move_of(least + 1, 50, 5000, 5e6, [30.0]), 0.37) is not None
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_the_fewest_intervals_have_what_the_programme_has(count, damping):
+    # With limits far away three intervals are the first that can begin and end at rest.
+    move = move_of(count, 1e6, 1e9, 1e12, [30.0], damping)
+    optimum = least_residual(move, 1.0)
+    if count < 3:
+        assert optimum is None
+        return
+    least = by_linear_programme(count, 1e6, 1e9, 1e12, rows_of(count, [30.0], [damping], [1.0]))
+    assert optimum.worst == pytest.approx(least, rel=2e-3, abs=1e-6)
+
+
 def test_within_a_tolerance_the_smoothest_law_is_taken():
     move = move_of(40, 50, 5000, 5e6, [30.0], band=0.05)
     least = least_residual(move, 0.37)
