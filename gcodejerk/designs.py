@@ -350,7 +350,8 @@ def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
     weights = np.where(excited[plans.move] > 1, 0.0, task.objective.weights)
     task = replace(task, objective=replace(task.objective, weights=weights))
     least = np.where(plans.planned, 0.0, np.nan)
-    np.maximum.at(least, plans.move, bounds(task))
+    with np.errstate(invalid="ignore"):
+        np.maximum.at(least, plans.move, bounds(task))
     return least
 
 
