@@ -258,40 +258,35 @@ def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Laws, Array, NDArr
     task = replace(task, tolerance=ALLOWED * task.tolerance)
     low, high = task.counts - 1, longest.copy()
     reference = task.objective.of(task.conventional)
-    at_high = np.isfinite(_least(task.after(high), reference, task.tolerance)[1])
+    possible = np.isfinite(_quiet(task.after(high), reference)[1])
     while True:
-        open_ = np.nonzero(at_high & (high - low > 1))[0]
-        if not len(open_):
+        rows = np.nonzero(possible & (high - low > 1))[0]
+        if not len(rows):
             break
-        middle = (low[open_] + high[open_]) // 2
-        trial = task.take(open_).after(middle)
-        quiet = np.isfinite(_least(trial, reference[open_], task.tolerance)[1])
-        high[open_[quiet]] = middle[quiet]
-        low[open_[~quiet]] = middle[~quiet]
+        middle = (low[rows] + high[rows]) // 2
+        quiet = np.isfinite(_quiet(task.take(rows).after(middle), reference[rows])[1])
+        high[rows[quiet]] = middle[quiet]
+        low[rows[~quiet]] = middle[~quiet]
     final = task.after(high)
-    laws, worst = _least(final, reference, task.tolerance)
-    rows = np.nonzero(at_high & task.objective.weights.any(axis=1))[0]
-    questions = [_question(final, k, float(reference[k]), task.tolerance) for k in rows]
-    smooth = answers(questions, task.progress)
-    settled = [o if o is not None and o.worst <= task.tolerance else None for o in smooth]
-    # Below the tolerance all are equal: the smoothest is taken.
-    laws, worst = _answered(final, rows, settled, laws, np.where(np.isfinite(worst), np.inf, worst))
-    again, residual = _least(final, reference, task.tolerance)
-    missing = ~np.isfinite(worst) & np.isfinite(residual)
-    return laws.replaced(missing, again.take(missing)), np.where(missing, residual, worst), high
+    laws, worst = _quiet(final, reference)
+    # Within the tolerance all are equal: the smoothest is taken.
+    rows = np.nonzero(possible & task.objective.weights.any(axis=1))[0]
+    questions = [
+        _question(final, k, float(reference[k]), task.tolerance, smooth=True) for k in rows
+    ]
+    return *_answered(final, rows, answers(questions, task.progress), laws, worst), high
 
 
-def _least(task: Task, reference: Array, tolerance: float) -> tuple[Laws, Array]:
+def _quiet(task: Task, reference: Array) -> tuple[Laws, Array]:
     """Laws within the tolerance over the band, of Condition III or optimal; else infinite."""
     laws, nominal = condition3(task)
     worst = np.full(len(task), np.inf)
-    hope = nominal <= tolerance
+    hope = nominal <= task.tolerance
     worst[hope] = worst_in_band(task.take(hope), laws.take(hope))
-    worst = np.where(worst <= tolerance, worst, np.inf)
+    worst = np.where(worst <= task.tolerance, worst, np.inf)
     rows = np.nonzero(~np.isfinite(worst))[0]
-    found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
-    quiet = [o if o is not None and o.worst <= tolerance else None for o in found]
-    return _answered(task, rows, quiet, laws, worst)
+    questions = [_question(task, k, float(reference[k]), task.tolerance) for k in rows]
+    return _answered(task, rows, answers(questions, task.progress), laws, worst)
 
 
 def bounds(task: Task) -> Array:
@@ -390,7 +385,9 @@ def worst_in_band(task: Task, laws: Laws) -> Array:
     return worst
 
 
-def _question(task: Task, row: np.intp, reference: float, allowed: float | None = None) -> Question:
+def _question(
+    task: Task, row: np.intp, reference: float, allowed: float = 0.0, smooth: bool = False
+) -> Question:
     """What is asked about one of the moves."""
     V, A, J = (float(limit[row]) for limit in task.limits)
     objective = task.objective
@@ -398,7 +395,7 @@ def _question(task: Task, row: np.intp, reference: float, allowed: float | None 
         int(task.counts[row]), V, A, J, objective.poles, objective.weights[row], objective.group,
         task.band, task.interval,
     )  # fmt: skip
-    return Question(move, reference, allowed)
+    return Question(move, reference, allowed, smooth)
 
 
 def _answered(

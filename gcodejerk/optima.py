@@ -29,6 +29,7 @@ from gcodejerk.motion.optimal import (
     Optimum,
     least_residual,
     optimum_laws,
+    quiet_enough,
     smoothest_within,
 )
 from gcodejerk.motion.programme import require_solver
@@ -54,13 +55,16 @@ class Question:
         The move.
     reference : float
         Residual of the controller's own law: the measure for what is small. [mm]
-    allowed : float or None
-        None: the least residual. A number: the least peak jerk that leaves no more. [mm]
+    allowed : float
+        0: the least residual. Above: a law that leaves no more. [mm]
+    smooth : bool
+        Of those that leave no more than allowed, the one with the least peak jerk.
     """
 
     move: Move
     reference: float
-    allowed: float | None = None
+    allowed: float = 0.0
+    smooth: bool = False
 
     def key(self) -> tuple[bytes, float]:
         """A digest that equal problems share, and the weight [mm] that solutions are scaled by."""
@@ -68,10 +72,10 @@ class Question:
         scale = float(move.weights.max(initial=0.0)) or 1.0
         T = move.count * move.interval
         limits = (move.velocity * T, move.acceleration * T**2, move.jerk * T**3)
-        allowed = -1.0 if self.allowed is None else self.allowed / scale
         numbers = np.concatenate(
             [
-                [move.count, *limits, self.reference / scale, allowed, move.band, move.interval],
+                [move.count, *limits, self.reference / scale, self.allowed / scale],
+                [self.smooth, move.band, move.interval],
                 move.poles.real * T, move.poles.imag * T, move.weights / scale, move.group,
             ]
         )  # fmt: skip
@@ -151,10 +155,13 @@ def _answer(question: Question) -> Optimum | None:
     move = question.move
     scale = float(move.weights.max(initial=0.0)) or 1.0
     unit = replace(move, weights=move.weights / scale)
-    if question.allowed is None:
-        found = least_residual(unit, question.reference / scale)
+    reference, allowed = question.reference / scale, question.allowed / scale
+    if not allowed:
+        found = least_residual(unit, reference)
+    elif question.smooth:
+        found = smoothest_within(unit, allowed, reference)
     else:
-        found = smoothest_within(unit, question.allowed / scale, question.reference / scale)
+        found = quiet_enough(unit, allowed, reference)
     return found if found is not None and _holding([found], [move])[0] else None
 
 

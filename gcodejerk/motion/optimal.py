@@ -184,6 +184,33 @@ def smoothest_within(move: Move, worst: float, reference: float) -> Optimum | No
     return _Search(move, reference).within(worst)
 
 
+def quiet_enough(move: Move, worst: float, reference: float) -> Optimum | None:
+    """Any law that leaves at most `worst`; found sooner than the best or the smoothest.
+
+    Parameters
+    ----------
+    move : Move
+        At least one pole has a weight above zero.
+    worst : float
+        Residual allowed, above zero. [mm]
+    reference : float
+        As in `least_residual`. [mm]
+
+    Returns
+    -------
+    Optimum or None
+        None where no law on the grid does that within the limits.
+
+    Raises
+    ------
+    PlanError
+        scipy or clarabel is not installed.
+    """
+    search = _Search(move, reference)
+    found = search.least(worst / search.scale)
+    return found if found is not None and found.worst <= worst else None
+
+
 class _Search:
     """One move: its frequencies and its blocks, as they are refined."""
 
@@ -229,10 +256,8 @@ class _Search:
             group=group,
         )
 
-    def least(self) -> Optimum | None:
-        """Blocks and frequencies refined around the least residual."""
-        if self.move.count < 2:
-            return None  # a single interval has no law from rest to rest
+    def least(self, target: float = 0.0) -> Optimum | None:
+        """Blocks and frequencies refined around the least residual, until it is below a target."""
         if self.move.count < FEWEST_INTERVALS:
             return None
         every = np.arange(self.move.count + 1)
@@ -240,22 +265,29 @@ class _Search:
         if self.move.count > FULL_INTERVALS:
             first = every[: len(every) // 2 + 1 : BLOCK]
             coarse = np.union1d(first, self.move.count - first)
-            found = self._exchanged(coarse, 2, COARSE_ACCURACY)
+            found = self._exchanged(coarse, 2, target, COARSE_ACCURACY)
+            if found is not None and self._judged(coarse, found).max() <= target:
+                return self._optimum(coarse, found)
             if found is not None:
                 knots = self._refined(coarse, found)
                 self._drop_idle(coarse, found)
-        found = self._exchanged(knots, ROUNDS if knots is every else 2)
+        found = self._exchanged(knots, ROUNDS if knots is every else 2, target)
         if found is None and len(knots) < len(every):
             knots = every
-            found = self._exchanged(knots, ROUNDS)
+            found = self._exchanged(knots, ROUNDS, target)
         if found is None:
             return None
-        if found.worst <= NULL * self.reference:
+        if target == 0.0 and found.worst <= NULL * self.reference:
             found = smoothest(self._problem(knots, self.points), 0.0) or found
         return self._optimum(knots, found)
 
-    def _exchanged(self, knots: Index, rounds: int, accuracy: float = ACCURACY) -> Solution | None:
-        """The least residual for some blocks, frequencies added until none between is worse."""
+    def _exchanged(
+        self, knots: Index, rounds: int, target: float, accuracy: float = ACCURACY
+    ) -> Solution | None:
+        """The least residual for some blocks, frequencies added until none between is worse.
+
+        Or until it is clear on which side of the target it lies.
+        """
         cost = SMOOTHNESS * self.reference
         best: Solution | None = None
         best_worst = np.inf
@@ -271,18 +303,22 @@ class _Search:
             worst, missing = self._missing(knots, found)
             if worst < best_worst:
                 best, best_worst = found, worst
-            if not missing:
+            if not missing or worst <= target or (target > 0.0 and found.worst - cost > target):
                 break
         return best
 
+    def _judged(self, knots: Index, found: Solution) -> Array:
+        """Residuals over the whole band."""
+        return amplitudes(self._problem(knots, self.dense), found.jerk)
+
     def _missing(self, knots: Index, found: Solution) -> tuple[float, bool]:
         """The true worst residual; frequencies that are worse than the points become points."""
-        problem = self._problem(knots, self.dense)
-        amplitude = amplitudes(problem, found.jerk)
+        amplitude = self._judged(knots, found)
         worst = float(amplitude.max(initial=0.0))
         if worst <= max(WORSE * found.worst, NULL * self.reference):
             return worst, False
-        by_pole = np.split(amplitude[problem.group], np.cumsum([len(p) for p in self.dense])[:-1])
+        group = self._problem(knots, self.dense).group
+        by_pole = np.split(amplitude[group], np.cumsum([len(p) for p in self.dense])[:-1])
         for k, (dense, own) in enumerate(zip(self.dense, by_pole, strict=True)):
             peak = (own >= np.append(0.0, own[:-1])) & (own >= np.append(own[1:], 0.0))
             self.points[k] = np.union1d(self.points[k], dense[peak & (own > WORSE * found.worst)])
@@ -332,6 +368,5 @@ class _Search:
 
     def _optimum(self, knots: Index, found: Solution) -> Optimum:
         """The solution in the units of the move."""
-        amplitude = amplitudes(self._problem(knots, self.dense), found.jerk)
-        worst = float(amplitude.max(initial=0.0)) * self.scale
+        worst = float(self._judged(knots, found).max(initial=0.0)) * self.scale
         return Optimum(knots, found.jerk / self.move.count**3, worst)

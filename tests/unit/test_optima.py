@@ -31,13 +31,13 @@ def solved(monkeypatch):
     return asked
 
 
-def question(length=1.0, count=40, frequency=30.0, allowed=None):
+def question(length=1.0, count=40, frequency=30.0):
     poles = mode_poles([frequency], [0.0])
     move = Move(
         count, 600 / length, 5000 / length, 5e6 / length, poles, np.array([length]),
         np.arange(1), 0.05, MS,
     )  # fmt: skip
-    return Question(move, 0.37 * length, allowed)
+    return Question(move, 0.37 * length)
 
 
 def test_equal_problems_are_solved_once(solved):
