@@ -66,9 +66,11 @@ def worst_in_bands(
         poles = np.outer(relative, modes.poles[index]).ravel()
         every = np.tile(index, len(relative))
         D = np.abs(arrival_response(laws, weights[:, every], poles)) / poles.imag
-        together = np.repeat(np.arange(len(relative)), len(index))
-        for quantity, values in enumerate((D, D * np.abs(poles) ** 2)):
-            square = grouped(values, together) ** 2
+        displacement = grouped(D, np.repeat(np.arange(len(relative)), len(index)))
+        # As `Modes.accelerations` states them, at a frequency that is off by the share.
+        omega = 2.0 * np.pi * modes.modes[entry].frequency * relative
+        for quantity, values in enumerate((displacement, displacement * omega**2)):
+            square = values**2
             for k, band in enumerate(BANDS):
                 worst[quantity, k] = max(worst[quantity, k], _peak(square, band))
     return tuple(worst[0].tolist()), tuple(worst[1].tolist())

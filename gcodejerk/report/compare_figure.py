@@ -53,10 +53,10 @@ FLOOR = 1e-5
 """The residual's scale ends at this share of its largest: below is nothing."""
 PERIODS = 5.0
 """Periods of the mode that is shaken most, shown after arrival."""
-ROOM = 0.36
+ROOM = 0.44
 """Beyond these, as a share of what is shown, for the words of the lanes."""
-NOTABLE = 0.02
-"""Lines of a spectrum below this share of its largest do not widen the scale."""
+NOTABLE = 0.1
+"""The scale ends where the lines of a spectrum stay below this share of the largest."""
 CROWDED = 1.28
 """Modes whose frequencies differ by a smaller factor are named one above the other."""
 TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
@@ -249,7 +249,10 @@ class _Drawing:
             if not weights[here].any():
                 continue
             if np.count_nonzero(here) > 1:
-                lines.append(np.array([modes.poles[here].imag / (2.0 * np.pi), weights[here] ** 2]))
+                # Only an axis has a spectrum.
+                spectrum = self.comparison.machine.axis(modes.labels[g]).spectrum
+                assert spectrum is not None
+                lines.append(np.array([spectrum.frequency, spectrum.weight]))
             else:
                 own.append((modes.modes[g], float(weights[here][0])))
         frequency = _range([m.frequency for m, _ in own], lines)
@@ -270,8 +273,8 @@ class _Drawing:
         self._modes(axes, own, tolerance)
         for f, weight in lines:
             axes.fill_between(
-                f, 0.0, 0.3 * weight / weight.max(), transform=axes.get_xaxis_transform(),
-                color="0.88", linewidth=0, zorder=0,
+                f, 0.0, 0.5 * weight / weight.max(), transform=axes.get_xaxis_transform(),
+                color="0.88", linewidth=0, zorder=0.5,
             )  # fmt: skip
         ticks = [t * 10.0**k for k in range(-1, 5) for t in TICKS]
         ticks = [t for t in ticks if frequency[0] <= t <= frequency[-1]]
@@ -330,9 +333,10 @@ def acceleration_curve(laws: Laws) -> tuple[Array, Array]:
 
 
 def _range(modes: list[float], lines: list[Array]) -> Array:
-    """Frequencies from half the lowest to twice the highest [Hz], the modes' own among them."""
-    every = np.concatenate([np.array(modes), *(f[w > NOTABLE * w.max()] for f, w in lines)])
-    even = np.geomspace(0.5 * every.min(), 2.0 * every.max(), FREQUENCIES)
+    """From half the lowest mode to twice the highest, and all notable lines, the modes exactly."""
+    wide = [factor * f for f in modes for factor in (0.5, 2.0)]
+    every = np.concatenate([np.array(wide), *(f[w > NOTABLE * w.max()] for f, w in lines)])
+    even = np.geomspace(every.min(), every.max(), FREQUENCIES)
     return np.unique(np.concatenate([even, modes]))
 
 

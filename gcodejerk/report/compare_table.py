@@ -60,7 +60,7 @@ def compare_table(comparison: Comparison) -> Table:
             "step" if peak["jerk"] is None else f"{peak['jerk']:.3g}",
             best.of(contender, "residual", _small(contender.worst)),
             *(
-                best.of(contender, band, _small(worst))
+                best.of(contender, band, f"{worst * UM_PER_MM:.1f}")
                 for band, worst in zip(BANDS, contender.worst_band, strict=True)
             ),
             UNKNOWN if contender.limit is None else _small(contender.limit),
@@ -145,8 +145,8 @@ def _shapers(comparison: Comparison) -> str:
         f"{frequency:.4g} Hz with damping {damping:.3g}" for frequency, damping in comparison.shaped
     )
     return (
-        f"{SHAPERS[0]} to {SHAPERS[-1]}: the controller's own G0 behind an input shaper, made for "
-        f"{', '.join(made)} (--shaper-damping), what shakes most"
+        f"{SHAPERS[0]} to {SHAPERS[-1]}: today's G0 behind a shaper made for {', '.join(made)} "
+        "(--shaper-damping), what shakes most"
     )
 
 
