@@ -18,6 +18,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,12 +37,17 @@ from gcodejerk.motion.optimal import (
 from gcodejerk.motion.programme import require_solver
 from gcodejerk.solutions import cache_file, read_solutions, write_solutions
 
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
 HELD = 1e-6
 """Relative tolerance on limits of a solution that is used."""
 ARRIVED = 1e-9
 """Error of the end, for the unit length."""
 FEW = 16
 """Fewer problems than this are solved in this process."""
+NONE = b"none"
+"""In the cache: the problem has no solution."""
 BATCH = 64
 """Solutions are written to the disk so many at a time: a run that is cut keeps what it has."""
 
@@ -113,7 +120,10 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     distinct = {key: question for (key, _), question in zip(keys, questions, strict=True)}
     file = cache_file()
     found: dict[bytes, Optimum | None] = {}
-    known = {key: _decoded(value) for key, value in read_solutions(list(distinct), file).items()}
+    kept = read_solutions(list(distinct), file)
+    # That there is no solution is worth knowing, too; were it wrong, a move would lose, not break.
+    found.update((key, None) for key, value in kept.items() if value == NONE)
+    known = {key: _decoded(value) for key, value in kept.items() if value != NONE}
     good = _holding(list(known.values()), [distinct[key].move for key in known])
     found.update((key, known[key]) for key, holds in zip(known, good, strict=True) if holds)
     missing = [key for key in distinct if key not in found]
@@ -122,7 +132,7 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
         for begin in range(0, len(missing), BATCH):
             part = missing[begin : begin + BATCH]
             solved = dict(zip(part, solve_all([distinct[k] for k in part]), strict=True))
-            write_solutions({key: _encoded(x) for key, x in solved.items() if x is not None}, file)
+            write_solutions({key: _encoded(x) for key, x in solved.items()}, file)
             found.update(solved)
             done += len(part)
             if progress is not None:
@@ -150,8 +160,24 @@ def _workers(problems: int) -> Iterator[Callable[[list[Question]], list[Optimum 
         yield lambda questions: list(pool.map(_answer, questions))
 
 
+@cache
+def _linear_algebra() -> ThreadpoolController:
+    """What limits the threads of numpy's linear algebra; finding the libraries takes a while."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
 def _answer(question: Question) -> Optimum | None:
     """Solve one problem, for a largest weight of 1."""
+    # The matrices are small: several threads, and one set for each process, only wait for each
+    # other.
+    with _linear_algebra().limit(limits=1):
+        return _solved(question)
+
+
+def _solved(question: Question) -> Optimum | None:
+    """The same with as many threads as there are."""
     move = question.move
     scale = float(move.weights.max(initial=0.0)) or 1.0
     unit = replace(move, weights=move.weights / scale)
@@ -205,8 +231,10 @@ def _sound(optimum: Optimum, move: Move) -> bool:
     )
 
 
-def _encoded(optimum: Optimum) -> bytes:
+def _encoded(optimum: Optimum | None) -> bytes:
     """A solution as bytes."""
+    if optimum is None:
+        return NONE
     numbers: Array = np.concatenate([[optimum.worst], optimum.knots, optimum.jerk])
     return numbers.astype("<f8").tobytes()
 

@@ -65,9 +65,9 @@ class Modes:
                 continue
             spectrum = axis.spectrum
             own = np.array([spectrum.participation * (a == axis.name) for a in AXES], dtype=float)
-            for frequency, weight in zip(spectrum.frequency, spectrum.weight, strict=True):
+            for frequency, damping, weight in spectrum.oscillators():
                 group.append(len(modes))
-                poles.append(complex(mode_poles(frequency, 0.0)))
+                poles.append(complex(mode_poles(frequency, damping)))
                 # Accelerations are weighted, and stated as displacements at the peak.
                 rows.append(own * np.sqrt(weight) * (frequency / spectrum.peak) ** 2)
             labels.append(axis.name)

@@ -52,7 +52,7 @@ def plan(
     from gcodejerk.files import new_file
     from gcodejerk.move import plan_move
     from gcodejerk.report.records import conventional_motion, dump, move_record, stream_csv
-    from gcodejerk.report.tables import move_tables
+    from gcodejerk.report.tables import move_limit, move_tables
 
     described = load_machine(machine, None)
     planned = plan_move(_displacement(moves), described, profile, time=time, T1=t1)
@@ -70,6 +70,8 @@ def plan(
         screen = console()
         for table in move_tables(record, conventional_motion(planned)):
             screen.print(table)
+        if limit := move_limit(record):
+            print(limit)
 
 
 def map_amplitudes(

@@ -8,12 +8,15 @@ of these classes checks anything again.
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from gcodejerk.errors import MachineError
 
+OSCILLATORS = 4
+"""That a line of a spectrum stands for."""
 AXES = "XYZABCUVW"
 """Every axis letter, in the order in which axes are listed, written and reported."""
 
@@ -56,7 +59,7 @@ class Mode:
 class Spectrum:
     r"""How one axis shakes as it was measured: a line spectrum in place of modes.
 
-    Every line stands for an undamped oscillator that the axis drives. With :math:`w_k` the share of
+    Every line stands for oscillators that the axis drives. With :math:`w_k` the share of
     line k in the energy (the PSD times the width that the line stands for, over the sum of all) and
     :math:`A_k = \omega_k^2 D_k` the acceleration amplitude that a move leaves in its oscillator,
     the residual of the move is
@@ -66,7 +69,9 @@ class Spectrum:
     with the participation p: the spectrum-weighted mean, which is convex in the jerks. It is the
     acceleration that is weighted, since that is what the sensor measured: of the displacements the
     lines below 10 Hz, where it feels drift and the motion itself, would be most. A spectrum holds
-    no phase and tells no damping apart, so the residual counts as if nothing decayed.
+    no phase, and damping only as the width of its peaks. So the planner takes several oscillators
+    for a line, spread over its width, with the damping whose half-power width is the line's: they
+    overlap, and no law can hide between them (`oscillators`).
     """
 
     source: str = field(compare=False)
@@ -79,6 +84,22 @@ class Spectrum:
     """Frequency at which the measured PSD is largest. [Hz]"""
     participation: float = 1.0
     """How strongly the axis excites what was measured. [-]"""
+
+    def oscillators(self) -> list[tuple[float, float, float]]:
+        """Frequency [Hz], damping ratio [-] and share of the energy [-] of each oscillator."""
+        f = self.frequency
+        # The borders of the lines: half way between them.
+        inner = [0.5 * (a + b) for a, b in itertools.pairwise(f)]
+        first = f[0] - (inner[0] - f[0]) if inner else f[0]
+        last = f[-1] + (f[-1] - inner[-1]) if inner else f[-1]
+        borders = [first, *inner, last]
+        out = []
+        for (low, high), weight in zip(itertools.pairwise(borders), self.weight, strict=True):
+            for part in range(OSCILLATORS):
+                frequency = low + (high - low) * (part + 0.5) / OSCILLATORS
+                damping = min(0.5 * (high - low) / frequency, 0.5)
+                out.append((frequency, damping, weight / OSCILLATORS))
+        return out
 
 
 @dataclass(frozen=True, slots=True)

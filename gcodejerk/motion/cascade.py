@@ -29,6 +29,8 @@ GRID = 16
 """Values of w2 and of w3 each on the map."""
 PERIODS = 3
 """A box may be as wide as up to so many periods of a mode."""
+MODES = 8
+"""Modes whose periods are tried, those that count most."""
 REFINEMENTS = 14
 """Halvings of the step around the best of the map."""
 CELLS = 1 << 16
@@ -64,7 +66,7 @@ def design_cascade(
     """
     n = len(total)
     w2, w3, worst = (np.empty(n) for _ in range(3))
-    periods = 2.0 * np.pi / objective.poles.imag
+    periods = 2.0 * np.pi / objective.poles.imag[_leading(objective)]
     boxes = np.concatenate([k * periods for k in range(1, PERIODS + 1)])
     width = GRID * GRID + len(boxes) ** 2 + GRID * len(boxes)
     rows = max(1, CELLS // width)
@@ -85,6 +87,17 @@ def box_response(width: Array, poles: Complex) -> Complex:
     x = width[..., np.newaxis] * poles
     response: Complex = np.expm1(x) / x
     return response
+
+
+def _leading(objective: Objective) -> NDArray[np.intp]:
+    """The pole with the largest weight of each group, and of these the `MODES` largest."""
+    size = objective.weights.max(axis=0, initial=0.0)
+    # In order of the group, the largest first: the first of each group leads it.
+    order = np.lexsort((-size, objective.group))
+    first = np.flatnonzero(np.diff(objective.group[order], prepend=-1))
+    leading = order[first]
+    leading = leading[np.argsort(-size[leading], kind="stable")]
+    return leading[:MODES]
 
 
 class _Search:

@@ -37,6 +37,10 @@ Index = NDArray[np.int64]
 
 ACCURACY = 1e-6
 """Relative accuracy asked of the solver."""
+MANY = 24
+"""More rows of one cone than this are condensed."""
+CONDENSED = 1e-5
+"""Relative size of what is left out of them."""
 MARGIN = 2e-6
 """Share of each limit that is left unused, so that the solver's rounding stays within it."""
 
@@ -92,6 +96,7 @@ def require_solver() -> None:
     try:
         import clarabel
         import scipy.sparse  # noqa: F401
+        import threadpoolctl  # noqa: F401
     except ImportError as error:
         raise PlanError(
             f"optimal profiles and their bound need scipy and clarabel: {error.name} is missing",
@@ -178,7 +183,7 @@ def _solve_once(
     rows = _Rows()
     unknowns.motion(rows)
     if cap == 0.0:
-        rows.dense(np.concatenate(response), unknowns.a)
+        rows.dense(_condensed(np.concatenate(response)), unknowns.a)
     equalities = rows.count
     unknowns.limits(rows, curved)
     cones: list[Any] = [
@@ -191,7 +196,7 @@ def _solve_once(
                 rows.add([(unknowns.worst, -1.0)], 0.0)
             else:
                 rows.add([], cap)
-            own = np.concatenate(response[part])
+            own = _condensed(np.concatenate(response[part]))
             rows.dense(own, unknowns.a)
             cones.append(clarabel.SecondOrderConeT(1 + len(own)))
     width = unknowns.worst + (cap is None)
@@ -367,6 +372,16 @@ class _Unknowns:
         jerk += correction
         worst = grouped(np.abs(by_block @ jerk), self.problem.group).max(initial=0.0)
         return Solution(jerk, float(worst), float(x[self.peak]))
+
+
+def _condensed(rows: Array) -> Array:
+    """Fewer rows with the same norm of ``rows @ x``, where there are many nearly alike."""
+    if len(rows) <= MANY:
+        return rows
+    _, sizes, directions = np.linalg.svd(rows, full_matrices=False)
+    kept = sizes > CONDENSED * sizes.max(initial=0.0)
+    condensed: Array = sizes[kept, np.newaxis] * directions[kept]
+    return condensed
 
 
 def _moments(h: Array) -> tuple[Array, Array, Array]:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 UM_PER_MM = 1000.0
 MS_PER_S = 1000.0
+MOST_SEGMENTS = 9
+"""More are counted, not listed."""
 Record = dict[str, Any]
 
 
@@ -112,15 +114,34 @@ def move_tables(record: Record, conventional: Record) -> list[Table]:
             table.add_row(
                 name if k == 0 else "",
                 _ms(motion["time"], ".4g") if k == 0 else "",
-                " / ".join(f"{s['duration'] * MS_PER_S:.4g}" for s in segments)
-                if k == 0 or isinstance(motion["segments"], dict)
-                else "",
+                _segments(segments) if k == 0 or isinstance(motion["segments"], dict) else "",
                 axis,
                 _number(peak["velocity"], ".2f"),
                 _number(peak["acceleration"], ".1f"),
                 "step" if peak["jerk"] is None else _number(peak["jerk"], ".4g"),
             )
     return [table, _residual_table(row["residual"])]
+
+
+def move_limit(record: Record) -> str:
+    """One line on a planned move: how far it is from the least that any profile could leave."""
+    row = record["rapids"][0]
+    if row["limit"] is None or not row["residual"]:
+        return ""
+    worst = max(entry["displacement"] for entry in row["residual"]) * UM_PER_MM
+    least = row["limit"] * UM_PER_MM
+    return (
+        f"the worst mode keeps {worst:.2f} um; at exactly these frequencies no profile of this "
+        f"time can leave less than {least:.2f} um"
+    )
+
+
+def _segments(segments: Sequence[Record]) -> str:
+    """Durations of the segments; how many there are where they are many."""
+    times = [s["duration"] * MS_PER_S for s in segments]
+    if len(times) > MOST_SEGMENTS:
+        return f"{len(times)} of {min(times):.4g} to {max(times):.4g}"
+    return " / ".join(f"{t:.4g}" for t in times)
 
 
 def _residual_table(residual: Sequence[Record]) -> Table:

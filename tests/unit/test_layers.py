@@ -52,6 +52,7 @@ FOREIGN = {
     "scipy": {"motion"},
     "clarabel": {"motion"},
     "platformdirs": {"solutions"},
+    "threadpoolctl": {"optima", "motion"},
 }
 """Packages that only these parts may import; numpy is everyone's."""
 
