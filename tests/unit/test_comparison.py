@@ -373,10 +373,10 @@ def test_a_measured_spectrum_counts_as_one_mode(tmp_path):
     jsonschema.validate(record, SCHEMA)
     usual = found["conventional"]
     assert usual.displacement.shape == (1,)
-    lines = found.machine.axes[0].spectrum.frequency
+    oscillators = found.machine.axes[0].spectrum.oscillators()
     each = [
-        integral(found, "conventional", x, 0.0, participation)
-        for x, participation in zip(lines, found.modes.participation, strict=True)
+        integral(found, "conventional", x, zeta, participation)
+        for (x, zeta, _), participation in zip(oscillators, found.modes.participation, strict=True)
     ]
     assert usual.worst == pytest.approx(np.sqrt(np.square(each).sum()), rel=1e-4)
     assert usual.settling is None

@@ -1,5 +1,6 @@
 """Designs on machines: the shortest time, the bound, the band, and measured spectra."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -187,14 +188,32 @@ def test_a_measured_spectrum_takes_the_place_of_modes(tmp_path):
         assert entry["frequency"] == pytest.approx(43.0, abs=1.5)
         # The weighted mean over all lines, worked out line by line.
         spectrum = machine.axis("X").spectrum
-        poles = mode_poles(spectrum.frequency, np.zeros(len(spectrum.frequency)))
+        f, damping, share = np.array(spectrum.oscillators()).T
+        assert share.sum() == pytest.approx(1.0)
+        assert share @ f == pytest.approx(np.dot(spectrum.weight, spectrum.frequency), rel=0.02)
+        poles = mode_poles(f, damping)
         D = np.abs(laws_response(plan.laws, poles))[0] / poles.imag * 20.0
-        A = D * (2 * np.pi * np.array(spectrum.frequency)) ** 2
-        mean = np.sqrt(np.sum(np.array(spectrum.weight) * A**2)) / (2 * np.pi * spectrum.peak) ** 2
+        A = D * (2 * np.pi * f) ** 2
+        mean = np.sqrt(np.sum(share * A**2)) / (2 * np.pi * spectrum.peak) ** 2
         assert entry["displacement"] == pytest.approx(mean, rel=0.02, abs=3e-4)
         left[profile] = mean
     assert left["optimal"] == min(left.values())
     assert left["optimal"] < 0.8 * left["conventional"]
+
+
+def test_no_law_hides_between_the_lines_of_a_spectrum(tmp_path):
+    (tmp_path / "measured.csv").write_text(spectrum_of([(43.0, 0.05), (71.0, 0.08)]))
+    text = "interval: 0.001\npositioning: linear\naxes:\n  X:\n"
+    file = tmp_path / "printer.yaml"
+    file.write_text(text + "".join(f"    {line}\n" for line in SPECTRAL))
+    machine = Machine.load(file)
+    displacement = moves({"X": 20.0})
+    best = plan_moves(displacement, machine, "optimal")
+    usual = plan_moves(displacement, machine, "conventional")
+    task = task_of(machine, displacement)
+    for off in (0.99, 1.005, 1.02):
+        moved = replace(task.objective, poles=task.objective.poles * off)
+        assert moved.of(best.laws)[0] < 0.85 * moved.of(usual.laws)[0]
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured spectra lie beside the project")
