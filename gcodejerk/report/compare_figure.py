@@ -20,9 +20,9 @@ from gcodejerk.comparison import Comparison, Contender
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import AXES, Mode
 from gcodejerk.motion import laws_response, mode_poles
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.laws import Array
 from gcodejerk.motion.shapers import SHAPERS
-from gcodejerk.report.figures import FORMATS
+from gcodejerk.report.figures import FORMATS, acceleration_curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -312,24 +312,6 @@ class _Drawing:
                 ha="center", va="top", fontsize=TEXT - 1.5, color="0.2", zorder=7,
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},
             )  # fmt: skip
-
-
-def acceleration_curve(laws: Laws) -> tuple[Array, Array]:
-    """Corners of the acceleration of one unit law; steps are vertical lines.
-
-    Parameters
-    ----------
-    laws : Laws
-        One law of s segments.
-
-    Returns
-    -------
-    t, a : ndarray, shape (2 s + 2,)
-        [s], [1/s^2]
-    """
-    t = np.stack([laws.begin, laws.begin + laws.duration], axis=1).ravel()
-    a = np.stack([laws.acceleration, laws.end_acceleration], axis=1).ravel()
-    return np.concatenate([[0.0], t, t[-1:]]), np.concatenate([[0.0], a, [0.0]])
 
 
 def _range(modes: list[float], lines: list[Array]) -> Array:

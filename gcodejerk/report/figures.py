@@ -99,15 +99,37 @@ class _Curve:
             weights = modes.participation @ share[k]
             for pole, weight in zip(modes.poles, weights, strict=True):
                 self.vibration += weight * _response(v[0], step, complex(pole))
-        self.acceleration = np.gradient(self.velocity, step)
+            if share[k, axis]:
+                t, a = acceleration_curve(laws.take(slice(k, k + 1)))
+                self.corners, self.acceleration = t, a * share[k, axis]
 
     def draw(self, upper: Axes, middle: Axes, lower: Axes) -> None:
         """Add the three curves."""
         style: dict[str, Any] = {"color": self.colour, "linewidth": 1.4, "label": self.label}
         ms = self.t * 1e3
-        upper.plot(ms, self.acceleration, **style)
+        upper.plot(
+            np.append(self.corners * 1e3, ms[-1]), np.append(self.acceleration, 0.0), **style
+        )
         middle.plot(ms, self.velocity, **style)
         lower.plot(ms, self.vibration * 1e3, **style)
+
+
+def acceleration_curve(laws: Laws) -> tuple[Array, Array]:
+    """Corners of the acceleration of one unit law; steps are vertical lines.
+
+    Parameters
+    ----------
+    laws : Laws
+        One law of s segments.
+
+    Returns
+    -------
+    t, a : ndarray, shape (2 s + 2,)
+        [s], [1/s^2]
+    """
+    t = np.stack([laws.begin, laws.begin + laws.duration], axis=1).ravel()
+    a = np.stack([laws.acceleration, laws.end_acceleration], axis=1).ravel()
+    return np.concatenate([[0.0], t, t[-1:]]), np.concatenate([[0.0], a, [0.0]])
 
 
 def _response(velocity: Array, step: float, pole: complex) -> Array:
