@@ -16,7 +16,7 @@ import typer
 from gcodejerk import __version__
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
-from gcodejerk.cli.programs import inspect, process
+from gcodejerk.cli.programs import inspect, process, verify
 from gcodejerk.errors import GcodejerkError
 
 app = typer.Typer(
@@ -32,6 +32,7 @@ app.add_typer(machine_app, name="machine")
 
 app.command("process")(process)
 app.command("inspect")(inspect)
+app.command("verify")(verify)
 app.command("plan")(plan)
 app.command("map")(map_amplitudes)
 app.command("compare")(compare)

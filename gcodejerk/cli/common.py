@@ -21,7 +21,13 @@ MachineOption = Annotated[
         "--machine", "-m", metavar="M", help="machine file, or the name of a shipped machine"
     ),
 ]
-ProfileOption = Annotated[str | None, typer.Option(help="condition3 (default) or conventional")]
+ProfileOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="condition3 (default), cascade, optimal, shortest, conventional, condition1 or 2",
+    ),
+]
 
 
 def load_machine(name: str, program: str | None) -> Machine:

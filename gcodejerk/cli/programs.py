@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -141,6 +142,49 @@ def inspect(
     for note in record["notes"]:
         print(f"note: {note}")
     print(summary_line(file, record["summary"]).replace(" rewritten", " would be rewritten"))
+
+
+def verify(
+    original: Annotated[str, typer.Argument(metavar="ORIGINAL", help="the program as it was")],
+    processed: Annotated[
+        str, typer.Argument(metavar="PROCESSED", help="the rewritten program, or its .csv table")
+    ],
+    machine: MachineOption,
+    profile: ProfileOption = None,
+    dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    most: Annotated[int, typer.Option(min=1, help="stop after so many violations")] = 100,
+) -> None:
+    """Prove that a program is the original with only its rapids re-timed; list what it is not."""
+    from gcodejerk.files import open_input
+    from gcodejerk.start import program_start
+    from gcodejerk.verification import verify_csv, verify_files
+
+    if original == processed == "-":
+        raise typer.BadParameter("only one of the two can be standard input")
+    described = load_machine(machine, original)
+    if profile is not None:
+        described = replace(described, design=replace(described.design, profile=profile))
+    judge = verify_csv if processed.lower().endswith(".csv") else verify_files
+    with open_input(original) as one, open_input(processed) as other:
+        found = judge(
+            one, other, described, names=(original, processed), dialect=dialect,
+            start=program_start(described), most=most,
+        )  # fmt: skip
+    for violation in found.violations:
+        file, line = (
+            (processed, violation.line) if violation.line else (original, violation.original_line)
+        )
+        place = f"{file}:{line}" if line else file
+        print(f"{place}: {violation.kind}: {violation.problem}")
+    if found.ok:
+        print(
+            f"{processed}: is {original} with {found.rewritten} of its {found.rapids} rapids "
+            f"re-timed and nothing else changed"
+        )
+        return
+    more = " or more" if len(found.violations) >= most else ""
+    print(f"{processed}: {len(found.violations)}{more} violations: do not run it")
+    raise typer.Exit(1)
 
 
 def _output(

@@ -1,0 +1,83 @@
+"""The command verify: what it accepts, what it lists, and its exit status."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from gcodejerk import cli
+from gcodejerk.errors import GcodejerkError
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(SAMPLES / "plate.ngc", tmp_path)
+
+    def command(*arguments, input=None):
+        result = CliRunner().invoke(cli.app, [str(a) for a in arguments], input=input)
+        if isinstance(result.exception, GcodejerkError):
+            return 1, str(result.exception)
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result.exit_code, result.output
+
+    return command
+
+
+@pytest.fixture
+def processed(run, tmp_path):
+    assert run("process", "-q", "plate.ngc", "-m", "vmc")[0] == 0
+    return tmp_path / "plate.jerk.ngc"
+
+
+def test_what_process_wrote_is_accepted(run, processed):
+    code, out = run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "vmc")
+    assert code == 0
+    assert "19 of its 26 rapids re-timed and nothing else changed" in out
+
+
+def test_the_original_is_the_original_with_nothing_re_timed(run):
+    code, out = run("verify", "plate.ngc", "plate.ngc", "-m", "vmc")
+    assert (code, "0 of its 26" in out) == (0, True)
+
+
+def test_every_damage_is_listed_with_its_line(run, processed):
+    lines = processed.read_bytes().split(b"\n")
+    first = next(k for k, line in enumerate(lines) if line.startswith(b"G1 Z9."))
+    lines[first + 3] = lines[first + 3].replace(b"Z9.", b"Z8.", 1)
+    last = next(k for k in reversed(range(len(lines))) if lines[k].startswith(b"N"))
+    lines[last] += b" X1"
+    processed.write_bytes(b"\n".join(lines))
+    code, out = run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "vmc")
+    assert code == 1
+    assert f"plate.jerk.ngc:{first + 4}: " in out
+    assert f"plate.jerk.ngc:{last + 1}: line changed" in out
+    assert "do not run it" in out
+    code, out = run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "vmc", "--most", "1")
+    assert (code, "1 or more violations" in out) == (1, True)
+
+
+def test_another_machines_limits_are_not_kept(run, processed):
+    assert run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "router")[0] == 1
+
+
+def test_a_table_of_streams_is_verified(run, tmp_path):
+    assert run("process", "-q", "plate.ngc", "-m", "vmc", "--controller", "csv")[0] == 0
+    code, out = run("verify", "plate.ngc", "plate.jerk.csv", "-m", "vmc")
+    assert (code, "19 of its 26" in out) == (0, True)
+
+
+def test_the_processed_program_may_come_from_standard_input(run, processed):
+    given = processed.read_bytes()
+    code, _ = run("verify", "plate.ngc", "-", "-m", "vmc", input=given)
+    assert code == 0
+
+
+def test_a_missing_file_is_refused_and_two_standard_inputs_are_wrong_usage(run):
+    code, out = run("verify", "plate.ngc", "none.ngc", "-m", "vmc")
+    assert (code, "none.ngc" in out) == (1, True)
+    assert run("verify", "-", "-", "-m", "vmc")[0] == 2
