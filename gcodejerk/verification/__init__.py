@@ -9,7 +9,8 @@ side is `nc`, which says where the rapids are and what is in force there.
 
 What is checked, module by module: `walk` (every other byte is kept), `form` (the lines of a stream,
 modal values restored), `points` (exact ends, straight, never backwards), `dynamics` (duration and
-limits), `feeds` (F words), `table` (controller `csv`).
+limits), `feeds` and `speeds` (F words), `residual` (no more vibration than the controller's own
+rapid leaves), `table` (controller `csv`).
 """
 
 from __future__ import annotations

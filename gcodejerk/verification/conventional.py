@@ -45,6 +45,39 @@ def rapid_speed(t: Array, total: Array, peak: Array, acceleration: Array, jerk: 
     return np.where(t <= 0.0, 0.0, np.where(t >= ramp, peak, speed))
 
 
+def box_widths(velocity: Array, acceleration: Array, jerk: Array) -> tuple[Array, Array, Array]:
+    """Widths [s] of the boxes that such a move's velocity is folded of, as for `rapid_time`.
+
+    Examples
+    --------
+    The paper's case has no cruise and no constant acceleration:
+
+    >>> [float(w[0].round(9)) for w in box_widths(*np.array([[600.0], [5000.0], [5e5]]))]
+    [0.02, 0.01, 0.01]
+    """
+    peak = peak_velocity(velocity, acceleration, jerk)
+    ramp = _ramp(peak, acceleration, jerk)
+    rise = np.minimum(acceleration, np.sqrt(peak * jerk)) / jerk
+    cruise = np.maximum(1.0 - peak * ramp, 0.0) / peak
+    return ramp + cruise, ramp - rise, rise
+
+
+def rapid_position(t: Array, velocity: Array, acceleration: Array, jerk: Array) -> Array:
+    """Position [-] of such moves at moments t since their start."""
+    peak = peak_velocity(velocity, acceleration, jerk)
+    wide, narrow, rise = box_widths(velocity, acceleration, jerk)
+    ramp, total = narrow + rise, wide + narrow + rise
+    u = np.clip(np.minimum(t, total - t), 0.0, None)
+    full = peak / narrow
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rising = full / rise * u**3 / 6.0
+        falling = peak * (u - 0.5 * ramp) + full / rise * (ramp - u) ** 3 / 6.0
+    straight = full * (0.5 * (u - 0.5 * rise) ** 2 + rise**2 / 24.0)
+    half = np.where(u < rise, rising, np.where(u > ramp - rise, falling, straight))
+    half = np.where(u >= ramp, peak * (u - 0.5 * ramp), half)
+    return np.where(t >= total, 1.0, np.where(t > 0.5 * total, 1.0 - half, half))
+
+
 def _ramp(v: Array, acceleration: Array, jerk: Array) -> Array:
     """Time [s] from rest to a velocity."""
     full: Array = v / acceleration + acceleration / jerk

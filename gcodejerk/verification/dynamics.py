@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import rapid_time
-from gcodejerk.verification.feeds import judge_feeds, rapid_limits
+from gcodejerk.verification.feeds import NOT_OWN, judge_feeds, rapid_limits
 from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.oscillators import Oscillators
 from gcodejerk.verification.points import Array, Index, Paths, resolutions
+from gcodejerk.verification.residual import leaves_more
 
 BLOCK_TIME = 0.002
 """Of a G-code block. [s]"""
@@ -53,18 +55,41 @@ def limits_of(machine: Machine) -> Array:
 
 def conventional_counts(displacement: Array, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
-    limits = rapid_limits(displacement, machine)
-    if machine.positioning == "linear":
-        total = rapid_time(*limits.min(axis=2))
-    else:
-        moving = displacement != 0.0
-        each = np.zeros(displacement.shape)
-        each[moving] = rapid_time(*limits[:, moving])
-        total = each.max(axis=1, initial=0.0)
+    total = _move_time(rapid_limits(displacement, machine), displacement, machine)
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
-    longest = total * (1.0 + machine.design.max_extension) / machine.interval
-    most = np.maximum(usual, np.floor(longest + ON_GRID))
+    longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
+    if machine.design.profile == "shortest":
+        longest = _longest(total, displacement, machine)
+    most = np.maximum(usual, longest)
     return usual.astype(np.int64), most.astype(np.int64)
+
+
+def _move_time(limits: Array, displacement: Array, machine: Machine) -> Array:
+    """Duration [s] of the fastest symmetric moves within limits, shape (3, moves, 9)."""
+    if machine.positioning == "linear":
+        return rapid_time(*limits.min(axis=2))
+    moving = displacement != 0.0
+    each = np.zeros(displacement.shape)
+    each[moving] = rapid_time(*limits[:, moving])
+    total: Array = each.max(axis=1, initial=0.0)
+    return total
+
+
+def _longest(total: Array, displacement: Array, machine: Machine) -> Array:
+    """Intervals after which a rapid of the profile `shortest` is settled in any case.
+
+    Two periods of every mode are enough to leave it at rest, whatever it does before; the time
+    itself is that of the controller, or the least that the limits allow where that is longer.
+    """
+    with np.errstate(divide="ignore"):
+        own = limits_of(machine)[:, np.newaxis, :] / np.abs(displacement)
+    # A design's acceleration rises for an interval at least.
+    V, A, J = own
+    own = np.stack([V, A, np.minimum(J, A / machine.interval)])
+    fastest = _move_time(own, displacement, machine)
+    periods = (2.0 * np.pi / Oscillators.of(machine).poles.imag).sum()
+    longest: Array = np.ceil((np.maximum(total, fastest) + 2.0 * periods) / machine.interval)
+    return longest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,13 +118,14 @@ def check_dynamics(paths: Paths, machine: Machine, stride: int, found: Findings)
         found.add(Kind.TIME, int(paths.line[k]), int(paths.original_line[k]), problem)
     highest = np.maximum(np.minimum(blocks * stride + stride - 1, most), fewest)
     count = np.clip(usual, fewest, highest)
-    best: list[Complaint | None] = _judge(
-        paths, machine, Clock.of(paths, count, stride, blocks // 2)
-    )
+    clock = Clock.of(paths, count, stride, blocks // 2)
+    best: list[Complaint | None] = _judge(paths, machine, clock)
     # Another duration may fit where the usual one does not: nothing says which was meant.
     for other in range(stride if stride > 1 else 0):
         for late in (blocks // 2, (blocks - 1) // 2):
-            bad = np.array([k for k, c in enumerate(best) if c is not None], dtype=np.int64)
+            # What is nearly the controller's own rapid at its own times is that one, damaged.
+            open_ = [k for k, c in enumerate(best) if c is not None and c.problem != NOT_OWN]
+            bad = np.array(open_, dtype=np.int64)
             guess = np.where(blocks > 1, blocks * stride + other, 1 + other)
             bad = bad[(guess[bad] >= fewest[bad]) & (guess[bad] <= highest[bad])]
             if not len(bad):
@@ -138,6 +164,15 @@ def _judge(paths: Paths, machine: Machine, clock: Clock) -> list[Complaint | Non
             k = int(owner[at])
             if out[k] is None:
                 out[k] = Complaint(kind, int(bad[at] - paths.begin[k]) - 1, problem)
+    own = rapid_limits(paths.displacement, machine)
+    excess = leaves_more(paths, machine, clock.moment, own)
+    for k, left, allowed in zip(*excess.columns(), strict=True):
+        if out[k] is None:
+            problem = (
+                f"leaves {1e3 * left:.3g} um of vibration, at most {1e3 * allowed:.3g} um are "
+                "left by the controller's own rapid"
+            )
+            out[k] = Complaint(Kind.RESIDUAL, 0, problem)
     return out
 
 

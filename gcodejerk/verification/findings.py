@@ -43,6 +43,7 @@ class Kind(enum.StrEnum):
     JERK = "jerk limit"
     FEED = "feed of a block"
     TIME = "duration"
+    RESIDUAL = "residual"
     TABLE = "table"
 
 

@@ -1,0 +1,206 @@
+r"""Whether a stream leaves less vibration than the rapid that it replaces.
+
+What a mode keeps after a motion that rests from T on is
+
+.. math:: D = \frac{p}{\omega_d} \left| \int a(t)\, e^{\lambda (T - t)} dt \right|,
+          \qquad \lambda = -\zeta\omega + j\omega_d .
+
+The controller's own rapid is judged in closed form: its velocity is three boxes of unit area folded
+with each other, of widths T - r (cruise and one ramp), r - r1 (a ramp less one of its ends) and r1
+(the end of a ramp, A/J), so with :math:`\varphi(x) = (e^x - 1)/x` the integral is
+:math:`L \lambda\, \varphi(\lambda w_1)\, \varphi(\lambda w_2)\, \varphi(\lambda w_3)`; r1 = 0 is a
+trapezoid. The stream is judged by its points as they are written, straight lines between them: the
+sum of its velocity steps, each times :math:`e^{\lambda (T - t)}`.
+
+Rule: a stream is refused only if it leaves more than the controller's own rapid in every reading
+that is fair: more than that rapid in closed form, and more than it through straight lines at the
+same moments, by more than what rounding and the distance of the points may make of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.machine import Machine
+from gcodejerk.nc import AXES
+from gcodejerk.verification.conventional import box_widths, rapid_position
+from gcodejerk.verification.oscillators import Oscillators
+from gcodejerk.verification.points import Array, Index, Paths, resolutions
+
+RELATIVE = 0.02
+"""Share by which a stream may leave more: straight lines filter both motions nearly alike."""
+SIGMAS = 3.0
+"""Roundings of points add up at random, of up to a step each: so many of their deviations."""
+BAND_POINTS = 9
+"""Frequencies at which a band is judged."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Excess:
+    """Streams that leave too much: which they are, what they leave, what they may leave, in mm."""
+
+    stream: Index
+    left: Array
+    allowed: Array
+
+    def columns(self) -> tuple[list[int], list[float], list[float]]:
+        """The same as numbers."""
+        return self.stream.tolist(), self.left.tolist(), self.allowed.tolist()
+
+
+def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) -> Excess:
+    """Find the streams that leave more vibration than the controller's own rapid.
+
+    Parameters
+    ----------
+    paths : Paths
+        The streams.
+    machine : Machine
+        Its modes.
+    moment : ndarray of int, shape (rows,)
+        When each point is reached, since the start of its stream. [intervals]
+    limits : ndarray, shape (3, streams, 9)
+        Of the controller's own rapid, over the displacement of each axis. [1/s], [1/s^2], [1/s^3]
+    """
+    modes = Oscillators.of(machine)
+    none = Excess(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+    if not len(modes.poles):
+        return none
+    streams = _Streams(paths, machine, moment, limits)
+    left = modes.largest(np.abs(streams.lines(modes, paths.position)))
+    # Nearly every stream leaves less by far: only the others are looked at closely.
+    rapid = modes.largest(np.abs(streams.own(modes)))
+    allowed = (1.0 + RELATIVE) * rapid + streams.noise(modes)
+    if machine.design.profile == "shortest":
+        allowed = np.maximum(allowed, machine.design.tolerance + streams.noise(modes))
+    suspects = np.flatnonzero(left > allowed)
+    if not len(suspects):
+        return none
+    sampled = modes.largest(np.abs(streams.lines(modes, streams.own_positions())))
+    allowed = np.maximum(allowed, (1.0 + RELATIVE) * sampled + streams.noise(modes))
+    allowed = allowed + modes.largest(streams.coarseness(modes))
+    for factor in np.linspace(1.0 - machine.design.band, 1.0 + machine.design.band, BAND_POINTS):
+        near = modes.largest(np.abs(streams.own(modes.at(float(factor)))))
+        allowed = np.where(streams.banded, np.maximum(allowed, (1.0 + RELATIVE) * near), allowed)
+    suspects = np.flatnonzero(left > allowed)
+    return Excess(suspects.astype(np.int64), left[suspects], allowed[suspects])
+
+
+class _Streams:
+    """The motions of many streams, and of the rapids that they replace."""
+
+    def __init__(self, paths: Paths, machine: Machine, moment: Index, limits: Array) -> None:
+        self.paths, self.machine = paths, machine
+        self.owner = paths.owner
+        self.left = (moment[paths.end - 1][self.owner] - moment).astype(np.int64)
+        """Until arrival, row by row. [intervals]"""
+        self.t = moment * machine.interval
+        self.count = moment[paths.end - 1]
+        self.axes = np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist()
+        if machine.positioning == "linear":
+            limits = np.repeat(limits.min(axis=2)[:, :, np.newaxis], len(AXES), axis=2)
+        self.limits = limits
+        self.begins = np.zeros(len(self.t), dtype=np.bool_)
+        self.begins[paths.begin] = True
+
+    @property
+    def banded(self) -> NDArray[np.bool_]:
+        """Streams whose own rapid no stream can be: a design need be better over the band only."""
+        out = np.zeros(len(self.count), dtype=np.bool_)
+        for axis in self.machine.axes:
+            own, limit = axis.rapid, axis.limit
+            fits = np.isfinite(own.jerk) and own.jerk <= limit.jerk
+            fits = fits and own.acceleration <= limit.acceleration
+            moves = self.paths.displacement[:, AXES.index(axis.name)] != 0.0
+            out |= moves & (not (fits and own.velocity <= limit.velocity))
+        return out
+
+    def lines(self, modes: Oscillators, position: Array) -> NDArray[np.complex128]:
+        """Vibration left by straight lines through positions, shape (streams, m) [mm]."""
+        h = np.where(self.begins, 1.0, np.diff(self.t, prepend=0.0))
+        out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
+        clock = np.arange(int(self.left.max(initial=0)) + 1) * self.machine.interval
+        steps = {}
+        for a in self.axes:
+            x = position[:, a]
+            v = np.where(self.begins, 0.0, np.diff(x, prepend=0.0) / h)
+            after = np.where(np.roll(self.begins, -1), 0.0, np.roll(v, -1))
+            steps[a] = after - v
+        for m, pole in enumerate(modes.poles):
+            parts = [modes.participation[m, a] * steps[a] for a in self.axes]
+            driven = np.sum(parts, axis=0) * np.exp(pole * clock)[self.left]
+            out[:, m] = np.add.reduceat(driven, self.paths.begin) / pole.imag
+        return out
+
+    def own(self, modes: Oscillators) -> NDArray[np.complex128]:
+        """Vibration left by the controller's own rapid, shape (streams, m) [mm]."""
+        displacement = self.paths.displacement
+        out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
+        ends = np.zeros(displacement.shape)
+        widths = {}
+        for a in self.axes:
+            moves = displacement[:, a] != 0.0
+            V, A, J = (np.where(moves, limit[:, a], 1.0) for limit in self.limits)
+            widths[a] = box_widths(V, A, J)
+            ends[:, a] = np.where(moves, np.sum(widths[a], axis=0), 0.0)
+        rest = ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
+        for m, pole in enumerate(modes.poles):
+            for a in self.axes:
+                amount = modes.participation[m, a] * displacement[:, a]
+                if not amount.any():
+                    continue
+                factor = pole * np.exp(pole * rest[:, a])
+                for width in widths[a]:
+                    factor = factor * _phi(pole * width)
+                out[:, m] += amount * factor / pole.imag
+        return out
+
+    def own_positions(self) -> Array:
+        """Positions of the controller's own rapid at the moments of the points."""
+        out = np.array(self.paths.position)
+        t = self.t - self.t[self.paths.begin][self.owner]
+        for a in self.axes:
+            D = self.paths.displacement[:, a]
+            V, A, J = (np.where(D != 0.0, limit[:, a], 1.0) for limit in self.limits)
+            share = rapid_position(t, *(column[self.owner] for column in (V, A, J)))
+            out[:, a] = self.paths.start[self.owner, a] + share * D[self.owner]
+        return out
+
+    def noise(self, modes: Oscillators) -> Array:
+        """What rounding to steps may add, shape (streams,) [mm]."""
+        step = np.where(self.paths.displacement != 0.0, resolutions(self.machine), 0.0)
+        blocks = np.maximum(self.paths.count, 1)
+        h = (self.count * self.machine.interval / blocks)[:, np.newaxis]
+        omega = np.abs(modes.poles)
+        # An error of one point is a second difference of the velocity: 2 - 2 cos(omega h).
+        each = (2.0 - 2.0 * np.cos(np.minimum(omega * h, np.pi))) / h / modes.poles.imag
+        each = each * (step @ np.abs(modes.participation).T)
+        return modes.largest(each * (SIGMAS * np.sqrt(blocks / 3.0) + 1.0)[:, np.newaxis])
+
+    def coarseness(self, modes: Oscillators) -> Array:
+        """What reading the points differently changes, shape (streams, m) [mm].
+
+        The other reading leaves out every second point: errors of straight lines grow with the
+        square of their length, so the points themselves are wrong by a third of the difference.
+        """
+        position = np.array(self.paths.position)
+        place = np.arange(len(position)) - self.paths.begin[self.owner]
+        odd = (place % 2 == 1) & (np.arange(len(position)) != (self.paths.end - 1)[self.owner])
+        k = np.flatnonzero(odd)
+        share = (self.t[k] - self.t[k - 1]) / (self.t[k + 1] - self.t[k - 1])
+        middle = position[k - 1] + share[:, np.newaxis] * (position[k + 1] - position[k - 1])
+        fine = self.lines(modes, position)
+        position[k] = middle
+        out: Array = np.abs(self.lines(modes, position) - fine) / 3.0
+        return out
+
+
+def _phi(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """(exp(x) - 1)/x, 1 at 0."""
+    small = np.abs(x) < 1e-6
+    safe = np.where(small, 1.0, x)
+    out: NDArray[np.complex128] = np.where(small, 1.0 + 0.5 * x, (np.exp(safe) - 1.0) / safe)
+    return out
