@@ -17,12 +17,11 @@ import numpy as np
 
 from gcodejerk.arrival import arrival_response
 from gcodejerk.comparison import Comparison, Contender
-from gcodejerk.errors import EmitError
 from gcodejerk.machine import AXES, Mode
 from gcodejerk.motion import laws_response, mode_poles
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.shapers import SHAPERS
-from gcodejerk.report.figures import FORMATS, acceleration_curve
+from gcodejerk.report.figures import acceleration_curve, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,19 +79,8 @@ def plot_comparison(comparison: Comparison, file: BinaryIO, suffix: str) -> None
     EmitError
         The format is unknown, or matplotlib is not installed.
     """
-    if suffix.lower() not in FORMATS:
-        raise EmitError(
-            f"a figure cannot be {suffix or 'without suffix'}", f"use {', '.join(FORMATS)}"
-        )
-    try:
-        from matplotlib.figure import Figure
-        from matplotlib.layout_engine import ConstrainedLayoutEngine
-    except ImportError:
-        raise EmitError(
-            "figures need matplotlib, which is not installed",
-            "install it with: pip install 'gcodejerk[figures]'",
-        ) from None
-    figure = Figure(figsize=(WIDTH, HEIGHT), layout=ConstrainedLayoutEngine(w_pad=0.07))
+    figure = new_figure(suffix, (WIDTH, HEIGHT))
+    figure.set_layout_engine("constrained", w_pad=0.07)
     places = figure.subplot_mosaic(
         [["a", "b"], ["c", "c"]], height_ratios=[1.45, 1.0], width_ratios=[1.0, 1.15]
     )

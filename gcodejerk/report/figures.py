@@ -18,6 +18,7 @@ from gcodejerk.move import Plan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FORMATS = (".png", ".svg", ".pdf")
 TODAY, PLANNED = "#c44e52", "#1f5fa8"
@@ -26,6 +27,40 @@ FINE = 8
 """Points of a curve for each interval."""
 PERIODS = 4.0
 """Periods of the slowest mode that are shown after arrival."""
+
+
+def new_figure(suffix: str, size: tuple[float, float]) -> Figure:
+    """An empty figure, refused before anything is computed for it.
+
+    Parameters
+    ----------
+    suffix : str
+        Of the file that it is for.
+    size : tuple of float
+        Width and height [inch].
+
+    Returns
+    -------
+    Figure
+        Whose parts find their places by themselves.
+
+    Raises
+    ------
+    EmitError
+        The format is unknown, or matplotlib is not installed.
+    """
+    if suffix.lower() not in FORMATS:
+        raise EmitError(
+            f"a figure cannot be {suffix or 'without suffix'}", f"use {', '.join(FORMATS)}"
+        )
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise EmitError(
+            "figures need matplotlib, which is not installed",
+            "install it with: pip install 'gcodejerk[figures]'",
+        ) from None
+    return Figure(figsize=size, layout="constrained")
 
 
 def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
@@ -45,20 +80,9 @@ def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
     EmitError
         The format is unknown, or matplotlib is not installed.
     """
-    if suffix.lower() not in FORMATS:
-        raise EmitError(
-            f"a figure cannot be {suffix or 'without suffix'}", f"use {', '.join(FORMATS)}"
-        )
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise EmitError(
-            "figures need matplotlib, which is not installed",
-            "install it with: pip install 'gcodejerk[figures]'",
-        ) from None
+    figure = new_figure(suffix, (7.2, 7.2))
     shown = [_Curve("controller's own G0", TODAY, plan.plans.conventional, plan)]
     shown.append(_Curve(f"{plan.profile}, as written", PLANNED, plan.laws, plan))
-    figure = Figure(figsize=(7.2, 7.2), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
     for curve in shown:
         curve.draw(upper, middle, lower)

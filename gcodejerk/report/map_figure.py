@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.errors import EmitError
-from gcodejerk.report.figures import FORMATS
+from gcodejerk.report.figures import new_figure
 from gcodejerk.survey import Chosen, Survey
 
 if TYPE_CHECKING:
@@ -61,19 +60,8 @@ def plot_map(
     PlanError
         The longest time leaves no room.
     """
-    if suffix.lower() not in FORMATS:
-        raise EmitError(
-            f"a figure cannot be {suffix or 'without suffix'}", f"use {', '.join(FORMATS)}"
-        )
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise EmitError(
-            "figures need matplotlib, which is not installed",
-            "install it with: pip install 'gcodejerk[figures]'",
-        ) from None
+    figure = new_figure(suffix, (7.4, 5.6))
     T1, T = survey.axes(points, longest)
-    figure = Figure(figsize=(7.4, 5.6), layout="constrained")
     axes = figure.subplots()
     drawing = _Drawing(survey, axes, T1, T)
     image = drawing.amplitudes()

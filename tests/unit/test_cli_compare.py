@@ -10,31 +10,18 @@ from importlib.resources import files
 import jsonschema
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from gcodejerk import cli
 from gcodejerk.comparison import CONTENDERS
-from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import find_machine
 
 SCHEMA = json.loads(files("gcodejerk.report").joinpath("compare.schema.json").read_text())
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
-    """A command's exit status and everything that it says."""
-    monkeypatch.chdir(tmp_path)
+def run(command, monkeypatch):
+    """The command compare."""
     monkeypatch.setenv("COLUMNS", "120")
-
-    def command(*arguments):
-        result = CliRunner().invoke(cli.app, ["compare", *(str(a) for a in arguments)])
-        if isinstance(result.exception, GcodejerkError):
-            return 1, str(result.exception)
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        return result.exit_code, result.output
-
-    return command
+    return lambda *arguments: command("compare", *arguments)
 
 
 def rows(said):

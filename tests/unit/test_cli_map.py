@@ -8,10 +8,7 @@ import zlib
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from gcodejerk import cli
-from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion.amplitudes import undamped_amplitude
 from gcodejerk.motion.residual import residual_acceleration
@@ -20,20 +17,9 @@ MOVE = ("--axis", "Z", "--length", "1")
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
-    """A command's exit status and everything that it says."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "150")
-
-    def command(*arguments):
-        result = CliRunner().invoke(cli.app, ["map", *(str(a) for a in arguments)])
-        if isinstance(result.exception, GcodejerkError):
-            return 1, str(result.exception)
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        return result.exit_code, result.output
-
-    return command
+def run(command):
+    """The command map."""
+    return lambda *arguments: command("map", *arguments)
 
 
 def table(path):

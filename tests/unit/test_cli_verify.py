@@ -4,27 +4,13 @@ import shutil
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from gcodejerk import cli
-from gcodejerk.errors import GcodejerkError
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def run(command, tmp_path):
     shutil.copy(SAMPLES / "plate.ngc", tmp_path)
-
-    def command(*arguments, input=None):
-        result = CliRunner().invoke(cli.app, [str(a) for a in arguments], input=input)
-        if isinstance(result.exception, GcodejerkError):
-            return 1, str(result.exception)
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        return result.exit_code, result.output
-
     return command
 
 
