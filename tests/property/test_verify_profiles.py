@@ -5,7 +5,8 @@ have another mean speed by J h^2/12. Where a machine's limit of jerk is high aga
 one F changed by 1 % is another motion that the machine could make, and nobody can tell. What tells
 nevertheless: laws of few segments are smooth, symmetric ones are their own mirror image, and in
 laws with a jerk per interval the trapezoids add up to the way exactly where blocks have two
-intervals. Measured over all blocks of drawn programs, single F words changed by 1 % are noticed in:
+intervals. Measured on six blocks of each stream of drawn programs, single F words changed by 1 %
+are noticed in:
 
     profile         all    vmc  router  drill  paper
     conventional    98 %  100 %    -     97 %   97 %
