@@ -165,8 +165,9 @@ def _make_batch(plans: Plans, moves: NDArray[np.int64], spelling: Spelling, stri
     """One batch; where rounding made a move worse than the conventional law, it gets that law."""
     rows = np.concatenate([np.arange(*_bounds(plans, move)) for move in moves]).astype(np.int64)
     row_of = np.searchsorted(moves, plans.move[rows])
-    kept = np.zeros(len(moves), dtype=bool)
-    np.logical_or.at(kept, row_of, plans.kept[rows])
+    # Of axes that run on their own, some may keep the conventional law: the move has not kept it.
+    kept = np.ones(len(moves), dtype=bool)
+    np.logical_and.at(kept, row_of, plans.kept[rows])
     made = _Maker(plans, moves, rows, row_of, spelling, stride)
     conventional = made.conventional_residual()
     batch = made.batch(plans.laws.take(rows), kept, conventional)
@@ -217,8 +218,10 @@ class _Maker:
         )
 
     def writable(self, laws: Laws) -> NDArray[np.bool_]:
-        """Whether the moves' laws, all of them, have finite jerk within the limits."""
+        """Whether the moves' laws, all of them, fit the time and have jerk within the limits."""
         out = np.ones(len(self.moves), dtype=bool)
+        room = self.grid.counts[self.row_of] * self.interval * (1.0 + 1e-9)
+        np.logical_and.at(out, self.row_of, laws.total <= room)
         jerk = laws.peak_jerk
         finite = np.isfinite(jerk)
         np.logical_and.at(out, self.row_of, finite)

@@ -6,6 +6,7 @@ import pytest
 from gcodejerk import stream
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import polyline_response, sample_laws
+from gcodejerk.move import plan_move
 from gcodejerk.plan import plan_moves
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.stream import FINE_DECIMALS, Spelling, make_streams
@@ -253,3 +254,33 @@ def test_a_kept_law_reaches_its_end_before_the_last_interval_has_passed():
     t, q = batch.positions(0)
     assert t[-1] == pytest.approx(np.ceil(float(batch.plans.conventional_time[0]) * 1e3) / 1e3)
     assert q[-1, Z] == 1.07
+
+
+def test_a_move_has_kept_the_conventional_law_only_if_all_of_its_axes_have():
+    axis = "rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}"
+    machine = Machine.loads(
+        "interval: 0.001\npositioning: independent\naxes:\n"
+        f"  X: {{{axis}}}\n"
+        f"  Z: {{{axis}, modes: [{{frequency: 30, damping: 0.02}}]}}\n"
+    )
+    plan = plan_move({"X": 5.0, "Z": 1.0}, machine)
+    # X shakes nothing and keeps its law; Z does not.
+    assert plan.plans.kept.tolist() == [True, False]
+    assert plan.kept.tolist() == [False]
+    assert plan.profile == "condition3"
+    assert plan.residual.max() < 0.5 * plan.conventional_residual.max()
+
+
+def test_a_conventional_law_that_does_not_fit_the_time_is_never_written():
+    # Steps of 0.3 mm spoil the design; the conventional law takes 58 ms and would be cut off.
+    machine = Machine.loads(
+        "interval: 0.001\npositioning: linear\naxes:\n  Z: {resolution: 0.3, "
+        "rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}, limit: {acceleration: 20000}, "
+        "modes: [{frequency: 170, damping: 0.0}]}\n"
+    )
+    plan = plan_move({"Z": 3.0}, machine, time=0.045)
+    assert plan.residual.max() > plan.conventional_residual.max()
+    assert plan.profile == "condition3"
+    t, q = plan.t, plan.positions["Z"]
+    assert t[-1] == pytest.approx(0.045)
+    assert np.abs(np.diff(q)).max() < 0.7
