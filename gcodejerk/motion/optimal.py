@@ -37,6 +37,8 @@ FEWEST_INTERVALS = 3
 """Two cannot begin and end at rest."""
 FULL_INTERVALS = 128
 """Moves of at most so many intervals have a jerk in each of them."""
+LONG_INTERVALS = 600
+"""Longer ones have none of single intervals."""
 BLOCK = 4
 """Intervals of a block in the first programme of a longer move."""
 ACTIVE = 0.02
@@ -51,12 +53,14 @@ WORSE = 1.012
 """A frequency is added where the residual is this much above that of the points."""
 COARSE_ACCURACY = 1e-4
 """Relative accuracy of the programme that only shows where the jerk acts."""
-SMOOTHNESS = 1e-4
+SMOOTHNESS = 2e-5
 """What the full jerk costs, as a share of the reference residual."""
+CHEAPEST = 1e-9
+"""Below it, the jerk's cost is lost in the solver's rounding."""
 LOSS = 3e-3
 """What smoothness may cost of the residual at most."""
 NULL = 1e-6
-"""A residual below this share of the reference is tried as an exact null."""
+"""A residual below this share of the reference is as good as none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,6 +228,9 @@ class _Search:
         self.total = move.count * move.interval
         sizes = np.bincount(self.group, minlength=1)
         self.single = sizes[self.group] == 1
+        # A very long move has so many freedoms that blocks of two intervals lose next to nothing.
+        self.cut = 2 if move.count > LONG_INTERVALS else 1
+        self.rounds = ROUNDS if self.cut == 1 else 2
         self.points = self._points(SPACING, 1)
         self.dense = self._points(DENSE, FEWEST)
 
@@ -265,21 +272,28 @@ class _Search:
         if self.move.count > FULL_INTERVALS:
             first = every[: len(every) // 2 + 1 : BLOCK]
             coarse = np.union1d(first, self.move.count - first)
-            found = self._exchanged(coarse, 2, target, COARSE_ACCURACY)
+            found = self._null(coarse) or self._exchanged(coarse, 2, target, COARSE_ACCURACY)
             if found is not None and self._judged(coarse, found).max() <= target:
                 return self._optimum(coarse, found)
             if found is not None:
                 knots = self._refined(coarse, found)
                 self._drop_idle(coarse, found)
-        found = self._exchanged(knots, ROUNDS if knots is every else 2, target)
+        found = self._null(knots)
+        if found is not None:
+            return self._optimum(knots, found)
+        found = self._exchanged(knots, self.rounds, target)
         if found is None and len(knots) < len(every):
             knots = every
             found = self._exchanged(knots, ROUNDS, target)
         if found is None:
             return None
-        if target == 0.0 and found.worst <= NULL * self.reference:
-            found = smoothest(self._problem(knots, self.points), 0.0) or found
         return self._optimum(knots, found)
+
+    def _null(self, knots: Index) -> Solution | None:
+        """The smoothest exact null, which a band of frequencies does not have."""
+        if any(len(points) > 1 for points in self.points) or not self.single.all():
+            return None
+        return smoothest(self._problem(knots, self.points), 0.0)
 
     def _exchanged(
         self, knots: Index, rounds: int, target: float, accuracy: float = ACCURACY
@@ -288,22 +302,24 @@ class _Search:
 
         Or until it is clear on which side of the target it lies.
         """
-        cost = SMOOTHNESS * self.reference
+        cost = SMOOTHNESS
         best: Solution | None = None
         best_worst = np.inf
         while rounds > 0:
             rounds -= 1
-            found = solve(self._problem(knots, self.points), cost, accuracy)
+            found = solve(self._problem(knots, self.points), self.reference, cost, accuracy)
             if found is None:
                 return best
             # Smoothness has cost at most this; where that is too much, it is made cheaper.
-            if cost * (1.0 - found.peak) > LOSS * found.worst > LOSS * NULL * self.reference:
+            paid = cost * self.reference * (1.0 - found.peak)
+            dear = paid > LOSS * found.worst > LOSS * NULL * self.reference
+            if dear and accuracy == ACCURACY:
                 cost *= 0.02
-                rounds += cost > 1e-9 * self.reference
+                rounds += cost > CHEAPEST
             worst, missing = self._missing(knots, found)
             if worst < best_worst:
                 best, best_worst = found, worst
-            if not missing or worst <= target or (target > 0.0 and found.worst - cost > target):
+            if not missing or worst <= target or (target > 0.0 and found.worst - paid > target):
                 break
         return best
 
@@ -335,7 +351,7 @@ class _Search:
             self.points[k] = self.points[k][keep]
 
     def _refined(self, knots: Index, found: Solution) -> Index:
-        """Blocks cut into single intervals where the jerk acts, and beside these."""
+        """Blocks cut into intervals where the jerk acts, and beside these."""
         size = np.abs(found.jerk)
         active = size > ACTIVE * size.max(initial=0.0)
         if not self.poles.real.any():
@@ -346,7 +362,7 @@ class _Search:
         active[:-1] |= active[1:].copy()
         every = np.arange(knots[-1] + 1)
         block = np.searchsorted(knots, every, side="right") - 1
-        keep = active[np.minimum(block, len(active) - 1)]
+        keep = active[np.minimum(block, len(active) - 1)] & (every % self.cut == 0)
         return np.union1d(knots, every[keep])
 
     def within(self, worst: float) -> Optimum | None:

@@ -105,18 +105,23 @@ def require_solver() -> None:
     del clarabel
 
 
-def solve(problem: Problem, jerk_cost: float, accuracy: float = ACCURACY) -> Solution | None:
+def solve(
+    problem: Problem, reference: float, jerk_cost: float, accuracy: float = ACCURACY
+) -> Solution | None:
     """The law that has the least sum of residual and cost of its peak jerk.
 
     Parameters
     ----------
     problem : Problem
         The move.
+    reference : float
+        A residual, such as that of the controller's own law: the solver's accuracy is a share of
+        it. [-]
     jerk_cost : float
-        What the full jerk costs, in units of the residual: it decides among laws that are equal.
-        [-]
+        What the full jerk costs, as a share of the reference: it decides among laws that are
+        equal. [-]
     accuracy : float, optional
-        Relative accuracy asked of the solver.
+        Asked of the solver. [-]
 
     Returns
     -------
@@ -128,7 +133,9 @@ def solve(problem: Problem, jerk_cost: float, accuracy: float = ACCURACY) -> Sol
     PlanError
         scipy or clarabel is not installed.
     """
-    return _solve(problem, None, jerk_cost, accuracy)
+    found = _solve(problem, None, (1.0 / reference, jerk_cost), accuracy)
+    # Where next to nothing is left, the solver may not get on at that scale.
+    return found or _solve(problem, None, (1.0, jerk_cost * reference), accuracy)
 
 
 def smoothest(problem: Problem, worst: float) -> Solution | None:
@@ -151,7 +158,7 @@ def smoothest(problem: Problem, worst: float) -> Solution | None:
     PlanError
         scipy or clarabel is not installed.
     """
-    return _solve(problem, worst, 1.0, ACCURACY)
+    return _solve(problem, worst, (0.0, 1.0), ACCURACY)
 
 
 def amplitudes(problem: Problem, jerk: Array) -> Array:
@@ -160,20 +167,24 @@ def amplitudes(problem: Problem, jerk: Array) -> Array:
 
 
 def _solve(
-    problem: Problem, cap: float | None, jerk_cost: float, accuracy: float
+    problem: Problem, cap: float | None, costs: tuple[float, float], accuracy: float
 ) -> Solution | None:
     """Residual and jerk are minimised, or the jerk under a cap."""
-    found = _solve_once(problem, cap, jerk_cost, accuracy, curved=False)
+    found = _solve_once(problem, cap, costs, accuracy, curved=False)
     if found is not None and not _Unknowns(problem).keeps_velocity(found.jerk):
         # Seldom: between two knots the velocity goes beyond its bounds.
-        return _solve_once(problem, cap, jerk_cost, accuracy, curved=True)
+        return _solve_once(problem, cap, costs, accuracy, curved=True)
     return found
 
 
 def _solve_once(
-    problem: Problem, cap: float | None, jerk_cost: float, accuracy: float, curved: bool
+    problem: Problem,
+    cap: float | None,
+    costs: tuple[float, float],
+    accuracy: float,
+    curved: bool,
 ) -> Solution | None:
-    """One call of the solver."""
+    """One call of the solver; `costs` are those of the residual and of the full jerk."""
     require_solver()
     import clarabel
     from scipy import sparse
@@ -202,9 +213,9 @@ def _solve_once(
     width = unknowns.worst + (cap is None)
     matrix, bound = rows.assembled(width)
     cost = np.zeros(width)
-    cost[unknowns.peak] = jerk_cost
+    cost[unknowns.peak] = costs[1]
     if cap is None:
-        cost[unknowns.worst] = 1.0
+        cost[unknowns.worst] = costs[0]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"
