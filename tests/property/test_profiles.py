@@ -73,7 +73,7 @@ def drawn_moves(machine, seed):
 
 def frequencies(mode, band):
     """The mode's own frequency, and points within its band."""
-    return mode.frequency * np.linspace(1.0 - band, 1.0 + band, 9) if band else [mode.frequency]
+    return mode.frequency * np.linspace(1.0 - band, 1.0 + band, 41) if band else [mode.frequency]
 
 
 def worst(machine, share, motion, band):
