@@ -22,6 +22,7 @@ from gcodejerk.motion import (
     joined,
     whole_intervals,
 )
+from gcodejerk.motion.condition3 import TIE
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.nc import Rapids
@@ -320,7 +321,7 @@ class _Planner:
         fits = self._within_limits(self.conventional)
         if self.time is None:
             reference = self._judged(self.task.after(counts), self.conventional.general())
-            keep = fits & (worst >= reference - self._noise())
+            keep = fits & (worst >= reference - self._worthwhile())
             laws = laws.replaced(keep, self.conventional.take(keep).general())
             worst = np.where(keep, reference, worst)
             kept |= keep
@@ -365,8 +366,13 @@ class _Planner:
             counts[rows] += 1
         return laws, counts, worst
 
-    def _noise(self) -> Array:
-        """What rounding may add to a residual: below this a design has gained nothing [mm]."""
+    def _worthwhile(self) -> Array:
+        """The gain below which the conventional law stays: what rounding may add to it [mm].
+
+        The optimum promises the least there is; where rounding spoils it, its stream falls back.
+        """
+        if self.profile == "optimal":
+            return np.full(len(self.share), TIE)
         resolution = np.array(
             [self.machine.axis(a).resolution if a in self.machine.axis_names else 0.0 for a in AXES]
         )

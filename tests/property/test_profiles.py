@@ -134,6 +134,5 @@ def test_every_profile_keeps_what_it_promises(machine, seed):
             if name == "optimal":
                 best[key] = in_band, own.law_counts[k]
             elif key in best and best[key][1] == own.law_counts[k]:
-                # The programme is solved to about 2 %, and beside the points that it was judged on
-                # a law may be worse by a little: 3 % has been seen once.
-                assert best[key][0] <= in_band * 1.05 + 1e-7, name
+                # Points beside those that the optimum was judged on may be worse by a little.
+                assert best[key][0] <= in_band * 1.02 + 2e-7, name
