@@ -73,7 +73,7 @@ class Task:
     @classmethod
     def of(
         cls, machine: Machine, modes: Modes, share: Array, counts: NDArray[np.int64] | None = None,
-        progress: Progress | None = None,
+        progress: Progress | None = None, speed: Array | None = None,
     ) -> Task:  # fmt: skip
         """Moves on a machine.
 
@@ -89,12 +89,15 @@ class Task:
             T_SUM; the conventional time rounded up by default. [intervals]
         progress : callable, optional
             See `Progress`.
+        speed : ndarray, shape (n,), optional
+            Speed of unit laws that the controller's own rapid keeps to, NaN for none. [1/s]
 
         Returns
         -------
         Task
         """
-        conventional = conventional_laws(*unit_limits(machine, share, "rapid"))
+        V, A, J = unit_limits(machine, share, "rapid")
+        conventional = conventional_laws(V if speed is None else np.fmin(V, speed), A, J)
         if counts is None:
             counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
         weights = np.abs(share @ modes.participation.T)

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from gcodejerk import __version__
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.errors import EmitError, Place, ProgramError
-from gcodejerk.machine import Machine
+from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.motion.laws import Array
-from gcodejerk.nc import Program, read_program
+from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
 from gcodejerk.start import program_start
@@ -242,12 +242,18 @@ def process_file(
             target,
             replace(machine, design=design),
             names=(name, f"the output for {name}"),
-            dialect=settings.dialect,
+            dialect=program.dialect,
             start=program_start(machine),
         )
         require(verification)
         report("verifying", 1, 1)
     notes = [_finding(finding.line, finding.message) for finding in program.findings]
+    home = DIALECT_OF_CONTROLLER.get(emitter.name)
+    if emitter.in_place and home is not None and not program.dialect.startswith(home):
+        notes.append(
+            f"the program is read as {program.dialect}, controller {emitter.name} reads {home}: "
+            "how the program's control follows its streams was not measured"
+        )
     return Result(
         program=program,
         plans=plans,
@@ -264,14 +270,14 @@ def process_file(
 
 
 def stamp_comment(machine: Machine, settings: Settings, emitter: Controller) -> bytes:
-    """The comment at the top of an output: version, machine and a hash of the settings."""
+    """Text of the comment at the top of an output: version, machine and a hash of the settings."""
     chosen = (emitter.name, settings.form, settings.profile or machine.design.profile)
     text = " ".join((machine.settings_hash, *chosen)).encode()
     digest = hashlib.blake2b(text, digest_size=4).hexdigest()
     plain = "".join(
         c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name
     )
-    return f"{f'(gcodejerk stamp {__version__} {digest} {plain}'[: STAMP_LENGTH - 1]})".encode()
+    return f"gcodejerk stamp {__version__} {digest} {plain}"[: STAMP_LENGTH - 2].encode()
 
 
 def _with_output(result: Result, output: bytes) -> Result:
@@ -328,8 +334,13 @@ class _Writer:
     ) -> None:
         self.source, self.target, self.program = source, target, program
         self.emitter = emitter
-        self.options = Options(comments=settings.comments)
-        self.stamp = stamp_comment(machine, settings, emitter) + program.newline
+        self.dialect = find_dialect(program.dialect)
+        self.options = Options(settings.comments, self.dialect)
+        self.stamp = b""
+        if emitter.in_place and self.dialect.writing is not None:
+            opens, closes = self.dialect.writing.comment
+            stamp = stamp_comment(machine, settings, emitter)
+            self.stamp = opens + stamp + closes + program.newline
         self.digest = hashlib.blake2b(digest_size=16)
         self.at = 0
         self.edits: list[tuple[int, int, int]] = []

@@ -67,6 +67,7 @@ def plan_moves(
     time: float | None = None,
     T1: float | None = None,
     progress: Progress | None = None,
+    speed: Array | None = None,
 ) -> Plans:
     """Plan moves, all of them together.
 
@@ -86,6 +87,9 @@ def plan_moves(
         T1 of a four-segment law for all moves, in place of the best. [s]
     progress : callable, optional
         Called while optima are computed.
+    speed : ndarray, shape (n,), optional
+        What the controller's own rapid keeps to along the path, NaN where only the axes limit it.
+        [mm/s]
 
     Returns
     -------
@@ -111,7 +115,7 @@ def plan_moves(
     known = np.array([axis in machine.axis_names for axis in AXES])
     _rule_out(reason, (length == 0.0), Reason.NO_MOTION)
     _rule_out(reason, (displacement[:, ~known] != 0.0).any(axis=1), Reason.AXIS_UNKNOWN)
-    return _Planner(machine, profile, displacement, length, reason, time, T1, progress).run()
+    return _Planner(machine, profile, displacement, length, reason, time, T1, progress, speed).run()
 
 
 def plan_rapids(
@@ -169,7 +173,7 @@ def plan_rapids(
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)
     _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
-    return plan_moves(displacement, machine, profile, reason, progress=progress)
+    return plan_moves(displacement, machine, profile, reason, progress=progress, speed=rapids.speed)
 
 
 def _is_rotary(machine: Machine, axis: str) -> bool:
@@ -197,6 +201,7 @@ class _Planner:
         time: float | None,
         T1: float | None,
         progress: Progress | None,
+        speed: Array | None,
     ) -> None:
         self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
         self.displacement, self.length, self.reason = displacement, length, reason
@@ -211,7 +216,8 @@ class _Planner:
             self.share = np.zeros((len(index), len(AXES)))
             self.share[np.arange(len(index)), axis] = displacement[self.move, axis]
         self.move = self.move.astype(np.int64)
-        self.task = Task.of(machine, self.modes, self.share, progress=progress)
+        cap = None if speed is None else speed[self.move] / length[self.move]
+        self.task = Task.of(machine, self.modes, self.share, progress=progress, speed=cap)
         self.limits, self.conventional = self.task.limits, self.task.conventional
 
     def run(self) -> Plans:

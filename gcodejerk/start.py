@@ -42,6 +42,7 @@ def program_start(machine: Machine) -> Start:
         offsets=program.offsets,
         tool_lengths=program.tool_lengths,
         startup=program.startup,
+        decimal_point=program.decimal_point,
         inch=machine.inch,
         diameter=any(axis.diameter for axis in machine.axes),
     )

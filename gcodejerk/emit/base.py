@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import AXES, Machine
-from gcodejerk.nc import Rapids
+from gcodejerk.nc import DIALECTS, Dialect, Rapids
 from gcodejerk.plans import Plans
 from gcodejerk.stream import Batch, Spelling
 from gcodejerk.units import MM_PER_INCH
@@ -46,6 +46,8 @@ class Options:
 
     comments: bool = True
     """Name the original block in a comment in front of its stream."""
+    dialect: Dialect = DIALECTS["linuxcnc"]
+    """In which the program is written, and the streams in it."""
 
 
 class Controller(Protocol):

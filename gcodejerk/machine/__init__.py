@@ -13,10 +13,12 @@ from gcodejerk.machine.model import (
 )
 from gcodejerk.machine.problems import MachineFileError
 from gcodejerk.machine.schema import machine_schema
+from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.writer import machine_yaml
 
 __all__ = [
     "AXES",
+    "DIALECT_OF_CONTROLLER",
     "Axis",
     "Design",
     "Limits",

@@ -221,4 +221,5 @@ def _program(values: dict[str, Any]) -> ProgramStart:
             int(key[1:]): value for key, value in offsets.items() if not isinstance(value, dict)
         },
         startup=values["startup"],
+        decimal_point=values.get("decimal_point"),
     )

@@ -151,6 +151,8 @@ class ProgramStart:
     """Number of the length offset (1 for `H1`) -> its value. [mm]"""
     startup: str
     """The codes in force, as a line of G-code; empty for the dialect's own."""
+    decimal_point: str | None = None
+    """What a number without a decimal point is: ``calculator``, ``standard``, None unknown."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -275,6 +275,11 @@ _PROGRAM = Section(
             ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3", "H1")),
             "Work offsets, and tool lengths, that are known.",
             example="{G54: {X: 10}, H1: 87.2}"),
+        Key("decimal_point", Choice(("calculator", "standard")),
+            "What X100 without a decimal point is, where a parameter of the control decides (Fanuc "
+            "3401, Haas setting 162): calculator 100 mm, standard 0.1 mm (100 least increments of "
+            "0.001 mm or 0.0001 inch). Left out: unknown, and such rapids are left alone.",
+            example="calculator"),
         Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*", "G-code words"),
             "The codes in force when a program starts (LinuxCNC: RS274NGC_STARTUP_CODE).",
             default="", example='"G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"'),

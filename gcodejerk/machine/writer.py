@@ -56,6 +56,11 @@ def machine_yaml(machine: Machine) -> str:
             f"  start: {_flow(program.start)}",
             f"  offsets: {_braces(offsets | lengths)}",
             f"  startup: {_text(program.startup)}",
+            *(
+                [f"  decimal_point: {program.decimal_point}"]
+                if program.decimal_point is not None
+                else []
+            ),
             "",
         ]
     )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from gcodejerk.nc.block import Block, Word
-from gcodejerk.nc.dialect import AXES, DIALECTS, Dialect
+from gcodejerk.nc.block import Block, Name, Word
+from gcodejerk.nc.dialect import AXES, Dialect
+from gcodejerk.nc.dialects import AUTO, DIALECTS, find_dialect
 from gcodejerk.nc.program import Finding, Program, parse_block, read_program, trace
 from gcodejerk.nc.rapids import CERTAIN, REASONS, Rapids
 from gcodejerk.nc.start import Start
 
 __all__ = [
+    "AUTO",
     "AXES",
     "CERTAIN",
     "DIALECTS",
@@ -16,10 +18,12 @@ __all__ = [
     "Block",
     "Dialect",
     "Finding",
+    "Name",
     "Program",
     "Rapids",
     "Start",
     "Word",
+    "find_dialect",
     "parse_block",
     "read_program",
     "trace",

@@ -20,6 +20,20 @@ class Word:
     """The word is ``line[begin:end]``."""
     end: int
     text: bytes
+    whole: bool = False
+    """The number has no decimal point."""
+    function: str = ""
+    """``IC`` and its kin, in ``X=IC(5)``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A word that has a name, for example ``CYCLE81(..)``, ``TRANS`` or ``GOTO 100``."""
+
+    name: str
+    """Upper case."""
+    arguments: bytes
+    """What belongs to it, brackets included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +48,7 @@ class Block:
     """What follows an O number or name, for example ``endif``; empty after a bare one."""
     o_name: str = ""
     percent: bool = False
-    """The line is a lone ``%``."""
+    """The line holds a ``%``, alone or with a name."""
     assigns: tuple[str, ...] = ()
     """Targets of assignments, for example ``1`` or ``<depth>``; empty text where computed."""
     rest: bytes = b""
@@ -42,3 +56,4 @@ class Block:
     problem: str | None = None
     column: int | None = None
     """Where the problem is, counted from 1."""
+    names: tuple[Name, ...] = ()

@@ -10,12 +10,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gcodejerk.nc.dialect import AXES, PLANES
+from gcodejerk.nc.dialect import AXES, PLANES, Drilling
 from gcodejerk.nc.modal import NAN, State
 
 
-def run_cycle(state: State, code: int, values: Mapping[str, float]) -> bool:
+def begin_cycle(state: State, code: int, values: Mapping[str, float]) -> None:
+    """Note a cycle that is stated without a position."""
+    if state.cycle is None and state.plane is not None:
+        state.put("cycle_level", state.position[AXES.index(PLANES[state.plane][2])])
+    state.put("cycle", (code, NAN, values.get("R", NAN)))
+
+
+def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drilling) -> bool:
     """Execute one block of a cycle.
+
+    Parameters
+    ----------
+    state : State
+        In force before the block; changed to what is in force behind it.
+    code : int
+        The cycle, times ten.
+    values : mapping of str to float
+        The block's numbers by letter.
+    rules : Drilling
+        The dialect's.
 
     Returns
     -------
@@ -31,12 +49,13 @@ def run_cycle(state: State, code: int, values: Mapping[str, float]) -> bool:
     series = state.cycle is not None
     sticky = state.cycle if state.cycle is not None and state.cycle[0] == code else None
     if sticky is None and not ("R" in values and plane[2] in values):
-        if state.cycle is not None or state.motion not in (code, None):
+        begins = state.cycle is not None or state.motion not in (code, None)
+        if begins and rules.missing == "error":
             return False
         sticky = (code, NAN, NAN)  # in force since somewhere that we could not follow
     depth = values.get(plane[2], sticky[1] if sticky else NAN)
     clearance = values.get("R", sticky[2] if sticky else NAN)
-    repeats = values.get("L", 1.0)
+    repeats = next((values[letter] for letter in rules.repeats if letter in values), 1.0)
     if repeats <= 0 or any(axis in values for axis in AXES if axis not in plane):
         return False
     state.put("cycle", (code, depth, clearance))

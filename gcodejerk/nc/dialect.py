@@ -1,13 +1,21 @@
-"""What differs between controllers when a program is read, as tables.
+"""What a dialect is: the questions that the reader asks of every controller's language.
 
-Rule: code asks the table and never the name of a dialect. A G code is written as ten times its
-number (G92.1 is 921), so that codes are integers and compare exactly.
+This module owns the questions and the words of the answers; the answers stand in
+`gcodejerk.nc.dialects`, one file per dialect, each with its source, so that two dialects can be
+read side by side. Code asks the table and never the name of a dialect.
+
+Rule 1: a G code is written as ten times its number (G92.1 is 921), so that codes are integers and
+compare exactly.
+
+Rule 2: what a table does not name is not known: a block that holds it is left alone, and what it
+might have changed is unknown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 AXES = "XYZABCUVW"
 """Column order of every position array."""
@@ -27,130 +35,196 @@ PLANES: dict[int, tuple[str, str, str]] = {
 ARC_CENTRES: dict[int, tuple[str, str]] = {170: ("I", "J"), 180: ("I", "K"), 190: ("J", "K")}
 """The centre words that an arc may carry in each plane; the remaining one is an error."""
 
+Effect = Literal[
+    "none",  # nothing that moves an axis or a frame
+    "words",  # takes the words of the block for something else than a move: a dwell, a blank
+    "store",  # stores where the axes stand
+    "return",  # to a stored point, by way of the point that the words give
+    "machine",  # the words are machine coordinates
+    "system",  # selects a work coordinate system
+    "numbered system",  # selects the one whose number P gives
+    "length",  # tool length
+    "set",  # the axis words rename where the axes stand
+    "clear",  # takes such names back
+    "restore",  # puts them in force again
+    "local",  # a further offset
+    "table",  # writes data of tools or systems
+    "frames",  # changes a frame in a way that is not followed
+    "cycle",  # moves, and leaves the modes as they were but for motion and F
+    "modal cycle",  # every position that follows is one of a cycle, until called without
+    "transform",  # turns, scales or mirrors what follows, for good
+    "home",  # moves the axes that it names, or all, to a place that is not known
+    "flow",  # a jump, a loop, a branch or a call: nothing is certain behind it
+    "diameter",  # X is a diameter from here on
+    "radius",  # it is none
+    "either",  # it is one or the other, depending on the word
+]
+"""What a code, or a name such as ``TRANS``, does besides changing its modal group."""
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """How a line is written."""
+
+    parentheses: Literal["comment", "open comment", "code"] = "comment"
+    """A comment that has to close on its line; one that the line's end closes too; no comment."""
+    semicolon: Literal["comment", "end", "error"] = "comment"
+    """A comment; the end of the block, behind which nothing may stand; neither."""
+    slashes: bool = False
+    """``//`` begins a comment."""
+    python: bool = False
+    """A comment may run a program: ``(py, ...)``."""
+    delete: Literal["first", "numbered", "ignored", "none"] = "first"
+    """A ``/`` skips the block where the operator says so: in front of everything; there or behind
+    N, also with a level ``/1`` to ``/9``; the ``/`` is thrown away and the block runs; an error."""
+    o_word: Literal["flow", "program", "error"] = "error"
+    """``o100 while [..]``; ``O1234`` names a program (and so does ``:1234``); neither."""
+    percent: Literal["lone", "named", "error"] = "lone"
+    """A ``%`` stands alone; a name may follow it; it is an error."""
+    names: bool = False
+    """Words may have names, and arguments in parentheses: ``CYCLE81(..)``."""
+    equals: bool = False
+    """A value may follow an equals sign: ``X=IC(5)``, ``T1=5``."""
+    variables: Literal["#", "R", "Q", "none"] = "none"
+    """What a variable begins with."""
+    keywords: tuple[str, ...] = ()
+    """Words of program flow that hold no number: ``GOTO``."""
+    blanks: Literal["anywhere", "between"] = "between"
+    """Blanks count nowhere, also within numbers; or they stand between words only."""
+    checksum: bool = False
+    """``*123`` may end a line."""
+    end: bytes = b""
+    """What ends every block."""
+    line_limit: int = 512
+    """Longest line that the controller reads, in bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drilling:
+    """How canned cycles of the drilling kind behave."""
+
+    codes: frozenset[int] = frozenset()
+    own_group: bool = False
+    """They do not replace G0 or G1, which are in force again after G80."""
+    repeats: str = "L"
+    """Letters of the number of repeats."""
+    missing: Literal["error", "unknown"] = "error"
+    """What follows where no R or depth was ever given: the block is refused, or nobody knows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Writing:
+    """How a stream is spelled in the dialect."""
+
+    comment: tuple[bytes, bytes] = (b"(", b")")
+    standstill: bytes = b"G4 P0"
+    """A block that waits until the machine stands."""
+    measured: bool = False
+    """Streams in this form were played by the controller itself, and compared."""
+
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
     """One way of writing and reading programs."""
 
     name: str
+    title: str
+    """For people."""
+    sources: tuple[str, ...]
+    text: Text
     groups: Mapping[int, str]
-    """G code -> modal group; two codes of one group in a block are an error."""
-    defaults: Mapping[str, int]
-    """Modal group -> code in force when a program starts; a group not named is unknown."""
+    """G code -> modal group."""
     m_groups: Mapping[int, str]
-    """M code -> group; a code not named here is not known to the dialect."""
-    uses: Mapping[str, frozenset[str]]
-    """Letter -> codes ("G43", "M66") one of which has to stand in the block or be in force."""
-    line_limit: int
-    """Longest line that the controller reads, in bytes."""
+    """M code -> group."""
+    defaults: Mapping[str, int] = field(default_factory=dict)
+    """Modal group -> code in force when a program starts; a group not named is unknown."""
+    effects: Mapping[int, Effect] = field(default_factory=dict)
+    """G code -> what it does besides."""
+    names: Mapping[str, Effect] = field(default_factory=dict)
+    """Named word -> what it does; one that is not listed may do anything."""
+    letters: str = "FSTXYZABCUVWDEHIJKLPQR"
+    """Addresses that a block may hold, N, G and M left out."""
+    calls: str = ""
+    """Addresses that call a subprogram by themselves."""
+    uses: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Letter -> codes ("G43", "M66") one of which has to stand in the block or be in force; where
+    the table is empty, every letter may stand everywhere."""
+    strict: bool = False
+    """Only one code may use the axis words, and a code that needs some has to have them."""
+    modal_motion: bool = True
+    """G0 to G3 stay in force; otherwise every block states its own."""
+    one_command: bool = False
+    """The first G or M is the command, and all other words are its parameters."""
+    units: Mapping[int, bool] = field(default_factory=lambda: {200: True, 210: False})
+    """G code -> whether lengths are inches."""
+    feed_modes: Mapping[int, int] = field(default_factory=lambda: {930: 93, 940: 94, 950: 95})
+    """G code -> 93 inverse time, 94 per minute, 95 per revolution."""
+    paths: Mapping[int, int] = field(default_factory=lambda: {610: 61, 640: 64})
+    """G code -> 61 exact stop, 62 exact path, 64 continuous."""
+    transforms: Mapping[int, tuple[str, bool]] = field(default_factory=dict)
+    """G code -> name of a rotation, scaling, mirroring or polar frame, and whether it begins."""
+    increments: Mapping[str, str] = field(default_factory=dict)
+    """Address of increments -> its axis, for example U -> X."""
+    increment_functions: bool = False
+    """``X=IC(5)`` is an increment and ``X=AC(5)`` is not, whatever mode is in force."""
+    whole_numbers: Literal["units", "machine"] = "units"
+    """Is X100 100 mm? It is; or a parameter of the machine decides."""
+    diameter_codes: bool = False
+    """A program may state whether X is a diameter."""
+    feed_of_mixed: bool = False
+    """What F means where linear and rotary axes move together is known: it is the speed of the
+    linear ones."""
+    feed_on_rapids: bool = False
+    """G0 runs at F, like G1."""
+    tool_frame: frozenset[str] = frozenset()
+    """Addresses that change a tool's offset, and with it the frame: T on a lathe, D."""
+    tool_cancelled_by_return: bool = False
+    """G28 cancels the tool length."""
+    other_m: Literal["unknown", "positions"] = "unknown"
+    """An M code that is not listed: not understood, or a program of the builder's that may move."""
+    contours: frozenset[int] = frozenset()
+    """Codes whose P and Q name the first and last block of a contour: those blocks do not run."""
+    redrawn: frozenset[int] = frozenset()
+    """Motions whose end is not what their words say."""
+    drilling: Drilling = field(default_factory=Drilling)
     rapid: int = 0
-    cycles: frozenset[int] = field(default_factory=frozenset)
-    frame_changes: frozenset[int] = field(default_factory=frozenset)
-    """Codes that, in the block of a rapid, move the origin that its numbers refer to."""
+    arcs: frozenset[int] = frozenset({20, 30})
     harmless: frozenset[int] = field(default_factory=frozenset)
     """G codes whose effect does not depend on when, within its block, a rapid runs."""
-    harmless_m: frozenset[int] = field(default_factory=frozenset)
+    harmless_m: frozenset[int] = frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9})
+    quick: bool = False
+    """Plain lines mean what they mean in RS274/NGC, so that they can be read as arrays."""
+    writing: Writing | None = None
+    """None where no form of a stream is known."""
+
+    @property
+    def cycles(self) -> frozenset[int]:
+        """Codes of the drilling cycles."""
+        return self.drilling.codes
+
+    def effect(self, code: int | None) -> Effect:
+        """What a G code does besides changing its group."""
+        return "none" if code is None else self.effects.get(code, "none")
+
+    def feed_code(self, mode: int) -> int | None:
+        """G code of a feed mode."""
+        return next((code for code, m in self.feed_modes.items() if m == mode), None)
+
+    def path_code(self, mode: int) -> int | None:
+        """G code of a path mode."""
+        return next((code for code, m in self.paths.items() if m == mode), None)
 
 
-def _groups(table: Mapping[str, tuple[int, ...]]) -> dict[int, str]:
-    """Turn the table round: code -> group."""
+def grouped(table: Mapping[str, tuple[int, ...]]) -> dict[int, str]:
+    """Turn a table round: code -> group."""
     return {code: group for group, codes in table.items() for code in codes}
 
 
-_SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
-_CYCLES = frozenset({730, 740, 760, *range(810, 900, 10)})
-
-# LinuxCNC 2.9, G-code overview, "Modal groups"; each entry that matters here was checked against
-# its stand-alone interpreter (tests/clients).
-_LINUXCNC_GROUPS = _groups(
-    {
-        "motion": (
-            *(0, 10, 20, 30, 50, 51, 52, 53, 330, 331, 382, 383, 384, 385, 800),
-            *sorted(_CYCLES),
-        ),
-        "plane": tuple(PLANES),
-        "distance": (900, 910),
-        "arc distance": (901, 911),
-        "feed mode": (930, 940, 950),
-        "units": (200, 210),
-        "compensation": (400, 410, 411, 420, 421),
-        "tool length": (430, 431, 432, 490),
-        "retract": (980, 990),
-        "system": _SYSTEMS,
-        "path": (610, 611, 640),
-        "spindle mode": (960, 970),
-        "diameter": (70, 80),
-        "non-modal": (40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923),
-    }
-)
-
-_LINUXCNC_M = _groups(
-    {
-        "stop": (0, 1, 2, 30, 60, 98, 99),
-        "tool": (6, 61),
-        "spindle": (3, 4, 5, 19),
-        "coolant": (7, 8, 9),
-        "override": (48, 49, 50, 51, 52, 53),
-        "output": (62, 63, 64, 65, 66, 67, 68),
-        "state": (70, 71, 72, 73),
-        "user": tuple(range(100, 200)),
-    }
-)
-
-
-def _codes(*names: str) -> frozenset[str]:
+def code_names(*names: str) -> frozenset[str]:
+    """Names of codes as `Dialect.uses` holds them."""
     return frozenset(names)
 
 
-_CYCLE_NAMES = _codes(*(f"G{code // 10}" for code in _CYCLES))
-
-_LINUXCNC_USES = {
-    "D": _codes("G41", "G41.1", "G42", "G42.1", "G96"),
-    "E": _codes("M66", "M67", "M68", "G76"),
-    "H": _codes("G43", "G43.2", "G76"),
-    "I": _codes("G2", "G3", "G5", "G5.1", "G10", "G33.1", "G43.1", "G76", "G87"),
-    "J": _codes("G2", "G3", "G5", "G5.1", "G10", "G43.1", "G76", "G87"),
-    "K": _codes("G2", "G3", "G33", "G33.1", "G43.1", "G76", "G87"),
-    "L": _CYCLE_NAMES | _codes("G10", "G5.2", "M66", "M98", "G76"),
-    "P": _codes(
-        *("G2", "G3", "G4", "G5", "G5.2", "G10", "G64", "G74", "G76", "G82", "G84"),
-        *("G86", "G88", "G89", "M19", "M50", "M51", "M52", "M53", "M98"),
-        *(f"M{n}" for n in range(62, 69)),
-        *(f"M{n}" for n in range(100, 200)),
-    ),
-    "Q": _codes(
-        *("G5", "G10", "G64", "G73", "G76", "G83", "M19", "M61", "M66", "M67", "M68"),
-        *(f"M{n}" for n in range(100, 200)),
-    ),
-    "R": _CYCLE_NAMES | _codes("G2", "G3", "G10", "G76", "M19"),
-}
-
-LINUXCNC = Dialect(
-    name="linuxcnc",
-    groups=_LINUXCNC_GROUPS,
-    # What M2 leaves behind and the interpreter starts with. Path mode, feed and units are a matter
-    # of the configuration, and nothing resets G98/G99 (mmount.ngc starts in G99): not here.
-    defaults={
-        "motion": 10,
-        "plane": 170,
-        "distance": 900,
-        "arc distance": 911,
-        "feed mode": 940,
-        "compensation": 400,
-        "system": 540,
-    },
-    m_groups=_LINUXCNC_M,
-    uses=_LINUXCNC_USES,
-    line_limit=254,
-    cycles=_CYCLES,
-    frame_changes=frozenset(
-        {280, 281, 300, 301, 530, 430, 431, 432, 490, *_SYSTEMS, 920, 921, 922, 923, 520, 100}
-    ),
-    harmless=frozenset(
-        {0, 40, 70, 80, 170, 171, 180, 181, 190, 191, 200, 210, 400, 610, 611, 640}
-        | {900, 910, 901, 911, 930, 940, 950, 960, 970, 980, 990}
-    ),
-    harmless_m=frozenset({0, 1, 2, 30, 60, 3, 4, 5, 7, 8, 9, 48, 49, 50, 51, 52, 53}),
-)
-
-DIALECTS: dict[str, Dialect] = {LINUXCNC.name: LINUXCNC}
+def code_name(code: int) -> bytes:
+    """Spell a G code: 921 is ``G92.1``."""
+    return b"G%d" % (code // 10) + (b".%d" % (code % 10) if code % 10 else b"")

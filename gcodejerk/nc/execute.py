@@ -9,58 +9,50 @@ out, and whatever they touched is unknown afterwards.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-
 from gcodejerk.nc import frames
-from gcodejerk.nc.block import Block
-from gcodejerk.nc.cycles import run_cycle
-from gcodejerk.nc.dialect import AXES, PLANES, Dialect
+from gcodejerk.nc.block import Block, Name
+from gcodejerk.nc.codes import Codes, sort_words
+from gcodejerk.nc.cycles import begin_cycle, run_cycle
+from gcodejerk.nc.dialect import AXES, PLANES, Dialect, Effect
+from gcodejerk.nc.judge import Step, judge, looks_rapid
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
-from gcodejerk.nc.rules import Codes, arc_words, is_complete, takes_axes
-from gcodejerk.reasons import Reason
+from gcodejerk.nc.rules import arc_words, is_complete, takes_axes
 from gcodejerk.units import MM_PER_INCH
 
-_RETURNS = frozenset({280, 300})
-_REDRAWN = frozenset({331, 382, 383, 384, 385, 52, 53})
-"""Motions whose end is not what their words say."""
-_GROUPED_M = frozenset({"stop", "spindle", "coolant", "tool"})
-
-
-@dataclass(slots=True)
-class Step:
-    """What a block did."""
-
-    rapid: bool = False
-    reason: Reason | None = None
-    start: list[float] = field(default_factory=list)
-    words: int = 0
-    """Bit k set: a word for AXES[k]."""
-    feed_event: int = NO_FEED
-    fault: bool = False
-    unknown: bool = False
-    """A code that the dialect does not know."""
-    ends: bool = False
-    """The program ends behind the block's motion."""
+_TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
+"""Effects beside which the axis words of the block are no straight move."""
+_CALLS = frozenset({47, 96, 97, 98})
+"""M codes of the group "stop" that go on elsewhere."""
 
 
 class Executor:
     """Runs blocks against a state that it owns."""
 
-    def __init__(self, dialect: Dialect, state: State, lengths: dict[int, float]) -> None:
+    def __init__(
+        self,
+        dialect: Dialect,
+        state: State,
+        lengths: dict[int, float],
+        decimal_point: str | None = None,
+    ) -> None:
         self.dialect = dialect
         self.state = state
         self.lengths = lengths
+        self.decimal_point = decimal_point
+        self._contour: float | None = None
+        """N of the block that ends a contour, which a cycle runs by itself."""
 
     def run(self, block: Block) -> Step:
         """Execute a block that is not an O-word line."""
         state = self.state
-        codes = self.sort(block)
+        if not self.dialect.modal_motion:
+            state.motion = None
+        inch = state.unit == MM_PER_INCH
+        codes = sort_words(block, self.dialect, inch, self.decimal_point)
         step = Step(start=state.position.copy())
-        for bit, axis in enumerate(AXES):
-            if axis in codes.values:
-                step.words |= 1 << bit
+        for axis in codes.moved():
+            step.words |= 1 << AXES.index(axis)
         for target in block.assigns:
             self._assign(target)
         step.unknown = codes.unknown and not codes.expression
@@ -74,52 +66,14 @@ class Executor:
             self._doubt(block, codes, step)
         else:
             self._act(codes, step)
-        self._judge(block, codes, step, before, ended)
+        contour = self._contour is not None
+        if contour and any(w.letter == "N" and w.value == self._contour for w in block.words):
+            self._contour = None
+        if step.fault or codes.unknown:
+            step.rapid = step.rapid or looks_rapid(block, codes, step, before, self.dialect)
+        if step.rapid:
+            step.reason = judge(block, codes, step, state, self.dialect, ended, contour)
         return step
-
-    def sort(self, block: Block) -> Codes:
-        """Sort the words of a block into codes and values."""
-        codes = Codes()
-        values, dialect = codes.values, self.dialect
-        for word in block.words:
-            value = word.value
-            if value is None:
-                codes.expression = True
-                if word.letter in "GM":
-                    codes.unknown = True
-                    continue
-                value = NAN
-            letter = word.letter
-            if letter == "G":
-                code = round(value * 10.0)
-                group = dialect.groups.get(code) if abs(value * 10.0 - code) < 1e-3 else None
-                if group is None:
-                    codes.unknown = True
-                elif group not in codes.g:
-                    codes.g[group] = code
-                elif 800 in (code, codes.g[group]):
-                    codes.g[group] = max(codes.g[group], code) if code != 800 else codes.g[group]
-                    if codes.g[group] == 800:
-                        codes.g[group] = code
-                else:
-                    codes.fault = True
-                    codes.g[group] = code
-            elif letter == "M":
-                number = round(value)
-                m_group = dialect.m_groups.get(number) if number == value else None
-                if m_group is None:
-                    codes.unknown = True
-                elif m_group in _GROUPED_M and any(dialect.m_groups[m] == m_group for m in codes.m):
-                    codes.fault = True
-                codes.m.append(number)
-            elif letter != "N":
-                if letter in values:
-                    codes.fault = True
-                    value = NAN
-                values[letter] = value
-        if block.assigns:
-            codes.expression = True
-        return codes
 
     def _doubt(self, block: Block, codes: Codes, step: Step) -> None:
         """Forget what a block that is not understood may have changed."""
@@ -146,23 +100,30 @@ class Executor:
 
     def _act(self, codes: Codes, step: Step) -> None:
         """Execute, in the fixed order."""
-        state, g, values = self.state, codes.g, codes.values
-        if codes.unknown:
+        state, g, values, dialect = self.state, codes.g, codes.values, self.dialect
+        if codes.unknown or any(self._named(name) == "flow" for name in codes.names):
             state.forget()
             step.feed_event = USES_FEED
             return
         if "feed mode" in g:
-            mode = g["feed mode"] // 10
+            mode = dialect.feed_modes.get(g["feed mode"])
             if mode != state.feed_mode:
                 state.put("feed", NAN)
             state.put("feed_mode", mode)
             state.put("feed_mode_stated", True)
-        if "F" in values:
+        words_taken = any(dialect.effect(code) == "words" for code in g.values()) or (
+            dialect.one_command and not g
+        )
+        if "F" in values and not words_taken:
             state.put("feed", values["F"])
+            state.put("feed_whole", codes.feed_whole)
             if values["F"] == values["F"]:
                 step.feed_event = GIVES_FEED
         for m in codes.m:
             self._miscellaneous(m, step)
+        if not dialect.tool_frame.isdisjoint(values):
+            state.put("tool", [NAN] * len(AXES))
+            state.forget_positions()
         if state.cycle is not None and g.get("distance", state.distance) != state.distance:
             # R and Z that stay in force across G90/G91 are read anew in a way not documented
             state.put("cycle", (state.cycle[0], NAN, NAN))
@@ -170,44 +131,116 @@ class Executor:
         for group, code in g.items():
             if (name := GROUP_FIELDS.get(group)) is not None and group != "motion":
                 state.put(name, code)
-        if "diameter" in g:
-            state.put("turns", state.turns or g["diameter"] == 70)
-            state.put("diameter", g["diameter"] == 70)
+            if code in dialect.transforms:
+                self._transform(*dialect.transforms[code])
         if "units" in g:
-            unit = MM_PER_INCH if g["units"] == 200 else 1.0
-            if unit != state.unit:
-                for name in ("feed", "path_p", "path_q"):
-                    state.put(name, NAN)
-                state.put("cycle", None)
-            state.put("unit", unit)
-            state.put("unit_stated", True)
-        if "tool length" in g:
-            frames.tool_length(state, g["tool length"], values, self.lengths)
-        if "system" in g:
-            frames.select_system(state, g["system"])
+            self._units(MM_PER_INCH if dialect.units[g["units"]] else 1.0)
+        for code in g.values():
+            self._effect(dialect.effect(code), code, values, step)
+        for named in codes.names:
+            effect = self._named(named)
+            self._effect(effect, 0, values, step, named.arguments)
+            words_taken |= effect in _TAKES_WORDS or effect in ("frames", "transform")
         if "path" in g:
             code = g["path"]
-            state.put("path", 62 if code == 611 else code // 10)
-            state.put("path_p", values.get("P", NAN) if code == 640 else NAN)
-            state.put("path_q", values.get("Q", NAN) if code == 640 else NAN)
+            continuous = code == 640
+            state.put("path", dialect.paths.get(code))
+            state.put("path_p", values.get("P", NAN) if continuous else NAN)
+            state.put("path_q", values.get("Q", NAN) if continuous else NAN)
         if "distance" in g:
             state.put("distance_stated", True)
-        self._move(codes, step)
+        if words_taken or any(dialect.effect(code) in _TAKES_WORDS for code in g.values()):
+            if "motion" in g:
+                self._select_motion(g["motion"])
+            self._contour = values.get("Q") if g.get("non-modal") in dialect.contours else None
+            if dialect.one_command and not g and step.words and not codes.m:
+                state.forget_positions()  # words without a command: a build may take them for one
+        else:
+            self._move(codes, step)
         for m in codes.m:
-            if m in (2, 30, 99) and self.dialect.m_groups[m] == "stop":
+            if m in (2, 17, 30, 99) and self.dialect.m_groups.get(m) == "stop":
                 step.ends = True
+
+    def _named(self, name: Name) -> Effect:
+        """What a named word does; one that is not known may do anything."""
+        if name.name in self.dialect.text.keywords:
+            return "flow"
+        return self.dialect.names.get(name.name, "flow")
+
+    def _units(self, unit: float) -> None:
+        state = self.state
+        if unit != state.unit:
+            for name in ("feed", "path_p", "path_q"):
+                state.put(name, NAN)
+            state.put("cycle", None)
+        state.put("unit", unit)
+        state.put("unit_stated", True)
+
+    def _transform(self, name: str, on: bool) -> None:
+        """Begin or end a rotation, scaling, mirroring or polar frame."""
+        state = self.state
+        if on or state.transforms.get(name, False) is not False:
+            state.forget_positions()
+        if on or name in state.transforms:
+            state.put("transforms", {**state.transforms, name: on})
+
+    def _effect(
+        self,
+        effect: Effect,
+        code: int,
+        values: dict[str, float],
+        step: Step,
+        arguments: bytes = b"",
+    ) -> None:
+        """Do what a code outside the non-modal group, or a name, does besides."""
+        state = self.state
+        if effect in ("diameter", "radius"):
+            state.put("turns", state.turns or effect == "diameter")
+            state.put("diameter", effect == "diameter")
+        elif effect == "either":
+            state.put("turns", True)
+            state.put("diameter", None)
+        elif effect == "length":
+            frames.tool_length(state, code, values, self.lengths)
+        elif effect == "system":
+            frames.select_system(state, code)
+        elif effect == "numbered system":
+            number = values.get("P", NAN)
+            frames.select_system(state, frames.numbered_system(number))
+        elif effect == "frames":
+            state.forget_frame()
+            state.forget_positions()
+        elif effect == "transform":
+            self._transform("frame", on=True)
+        elif effect == "modal cycle":
+            # MCALL without a cycle ends it; G66 ends with G67, which the table of transforms holds.
+            begins = bool(code or arguments.strip())
+            state.put("transforms", {**state.transforms, "modal macro": begins})
+            state.forget_positions()
+        elif effect == "cycle":
+            step.feed_event = USES_FEED
+            state.forget_positions()
+            state.put("motion", None)
+            state.put("feed", NAN)
+        elif effect == "home":
+            state.forget_positions()
+        elif effect == "flow":
+            state.forget()
+            step.feed_event = USES_FEED
 
     def _miscellaneous(self, m: int, step: Step) -> None:
         """Execute an M code, the end of the program excepted."""
         state = self.state
-        group = self.dialect.m_groups[m]
-        if m == 6 or group == "user":
+        group = self.dialect.m_groups.get(m)
+        if group is None:
+            state.forget_positions()
+        elif m == 6 or group == "user":
             # A tool change may go anywhere, and so may a program of the user's.
             state.forget_positions()
-        elif m == 72:
+        elif m == 72 and group == "state":
             state.forget_modes()
             state.forget_positions()
-        elif m == 98:
+        elif m in _CALLS:
             state.forget()
             step.feed_event = USES_FEED
 
@@ -219,66 +252,91 @@ class Executor:
 
     def _move(self, codes: Codes, step: Step) -> None:
         """Execute the motion, or what takes its axis words away."""
-        state, g, values = self.state, codes.g, codes.values
+        state, g, values, dialect = self.state, codes.g, codes.values, self.dialect
         user = g.get("non-modal")
+        effect = dialect.effect(user)
         step.start = state.position.copy()  # behind a tool change or a new frame, before the move
-        if user in _RETURNS:
-            self._return(values, step)
+        if not dialect.strict and "motion" in g:
+            self._select_motion(g["motion"])
+        if effect == "return":
+            self._return(codes, step)
             return
-        if user == 100:
-            frames.write_table(state, values, self.lengths)
+        frames.change(state, effect, values, self.lengths)
+        if effect in ("table", "local", "set", "frames"):
             return
-        if user == 520:
-            frames.set_local(state, values)
-            return
-        if user in (920, 921, 922, 923):
-            frames.set_g92(state, user, values)
-            if user == 920:
-                return
         if step.words and takes_axes(codes):
             return
-        if "motion" in g:
-            state.put("motion", g["motion"])
-            if g["motion"] not in self.dialect.cycles:
-                state.put("cycle", None)
+        if dialect.strict and "motion" in g:
+            self._select_motion(g["motion"])
+        cycle = self._cycle(g)
         if not step.words and not arc_words(values, self.state):
+            if cycle is not None and "cycle" in g:
+                begin_cycle(state, cycle, values)
             return
         motion = state.motion
-        if motion is None:
+        if motion is None and cycle is None:
             state.forget_positions()
             state.put("cycle", None)
             step.feed_event = USES_FEED
             return
-        if motion != self.dialect.rapid and step.feed_event == NO_FEED:
+        runs_at_feed = motion != dialect.rapid or dialect.feed_on_rapids
+        if (runs_at_feed or cycle is not None) and step.feed_event == NO_FEED:
             step.feed_event = USES_FEED
-        if motion in self.dialect.cycles:
-            step.rapid = True
-            if not run_cycle(state, motion, values):
+        if cycle is not None:
+            step.rapid = step.cycle = True
+            beside = "cycle" in g and "motion" in g
+            if beside or codes.increments or not run_cycle(state, cycle, values, dialect.drilling):
                 step.fault = True
                 state.forget_positions()
                 state.put("cycle", None)
             return
-        step.rapid = motion == self.dialect.rapid
-        if user == 530:
+        step.rapid = motion == dialect.rapid
+        if effect == "machine":
             self._machine_move(values)
-        elif motion in _REDRAWN:
+        elif motion in dialect.redrawn or motion is None:
             state.forget_positions(self._plane_axes())
-            state.forget_positions(k for k, axis in enumerate(AXES) if axis in values)
+            state.forget_positions(AXES.index(axis) for axis in codes.moved())
         else:
-            self._straight(values)
+            self._straight(codes)
         if state.compensation != 400:
             state.forget_positions(self._plane_axes())
+        if any(on is not False for on in state.transforms.values()):
+            state.forget_positions()
 
-    def _straight(self, values: dict[str, float]) -> None:
+    def _select_motion(self, code: int) -> None:
+        self.state.put("motion", code)
+        if code not in self.dialect.cycles:
+            self.state.put("cycle", None)
+
+    def _cycle(self, g: dict[str, int]) -> int | None:
+        """Code of the canned cycle that the block's positions belong to."""
+        state, drilling = self.state, self.dialect.drilling
+        if not drilling.own_group:
+            return state.motion if state.motion in drilling.codes else None
+        code = g.get("cycle")
+        if code is None:
+            return None if state.cycle is None else state.cycle[0]
+        if code in drilling.codes:
+            return code
+        state.put("cycle", None)
+        return None
+
+    def _straight(self, codes: Codes) -> None:
         """Go to where the axis words say."""
-        state = self.state
+        state, values = self.state, codes.values
         for axis, letter in enumerate(AXES):
-            if letter in values:
+            if letter in codes.increments:
+                step = codes.increments[letter] * state.scale(axis)
+                state.move(axis, state.position[axis] + step)
+            elif letter in values:
                 value = values[letter] * state.scale(axis)
-                if state.distance == 910:
+                function = codes.functions.get(letter)
+                if function == "IC" or (function is None and state.distance == 910):
                     value = state.position[axis] + value
-                elif state.distance is None:
-                    value = NAN
+                elif function in (None, "AC") and (function or state.distance is not None):
+                    pass
+                else:
+                    value = NAN  # the shortest way, or this way round: the machine decides
                 state.move(axis, value)
 
     def _machine_move(self, values: dict[str, float]) -> None:
@@ -286,14 +344,18 @@ class Executor:
         state = self.state
         for axis, letter in enumerate(AXES):
             if letter in values:
-                state.move(axis, values[letter] * state.scale(axis) - state.shift(axis))
+                at = values[letter] * state.scale(axis) - state.shift(axis)
+                state.move(axis, NAN if state.distance == 910 else at)
 
-    def _return(self, values: dict[str, float], step: Step) -> None:
+    def _return(self, codes: Codes, step: Step) -> None:
         """G28 and G30: to a stored point that the program does not tell."""
         step.rapid = True
-        named = [k for k, axis in enumerate(AXES) if axis in values]
+        if self.dialect.tool_cancelled_by_return:
+            self.state.put("tool", [NAN] * len(AXES))
+            self.state.forget_positions()
+        named = [AXES.index(axis) for axis in codes.moved()]
         self.state.forget_positions(named or range(len(AXES)))
-        if self.state.rotated is not False:
+        if self.state.transformed:
             self.state.forget_positions()
 
     def _plane_axes(self) -> list[int]:
@@ -301,63 +363,3 @@ class Executor:
         plane = self.state.plane
         letters = "XYZUVW" if plane is None else PLANES[plane][:2]
         return [AXES.index(letter) for letter in letters]
-
-    def _judge(
-        self, block: Block, codes: Codes, step: Step, motion_before: int | None, ended: bool
-    ) -> None:
-        """Decide whether this is a rapid, and why it would have to be left alone."""
-        rapid = self.dialect.rapid
-        if step.fault or codes.unknown:
-            stated = [word.value for word in block.words if word.letter == "G"]
-            looks = rapid in stated or ("motion" not in codes.g and motion_before == rapid)
-            axes = step.words or any(axis in block.rest.decode("latin-1").upper() for axis in AXES)
-            step.rapid = step.rapid or bool(looks and axes)
-        if not step.rapid:
-            return
-        g = codes.g
-        if ended:
-            step.reason = Reason.AFTER_END
-        elif block.block_delete:
-            step.reason = Reason.BLOCK_DELETE
-        elif step.fault or (codes.unknown and not codes.expression):
-            step.reason = Reason.NOT_UNDERSTOOD
-        elif codes.expression:
-            step.reason = Reason.EXPRESSION
-        elif g.get("non-modal") in (280, 300):
-            step.reason = Reason.FRAME_CHANGE
-        elif self.state.motion in self.dialect.cycles:
-            step.reason = Reason.CANNED_CYCLE
-        elif any(code in self.dialect.frame_changes for code in g.values()):
-            step.reason = Reason.FRAME_CHANGE
-        elif self.state.compensation != 400:
-            step.reason = Reason.CUTTER_COMPENSATION
-        elif self.state.rotated is not False:
-            step.reason = Reason.ROTATION
-        else:
-            step.reason = self._judge_move(block, codes, step)
-
-    def _judge_move(self, block: Block, codes: Codes, step: Step) -> Reason | None:
-        """Find the reasons that lie in the move itself."""
-        state = self.state
-        named = [k for k in range(len(AXES)) if step.words >> k & 1]
-        moves = unknown = False
-        for axis in named:
-            a, b = step.start[axis], state.position[axis]
-            if math.isnan(a) or math.isnan(b):
-                unknown = True
-            elif a != b:
-                moves = True
-        if not moves and not unknown:
-            return Reason.NO_MOTION
-        if state.distance is None:
-            return Reason.DISTANCE_MODE_UNKNOWN
-        if state.unit is None:
-            return Reason.UNITS_UNKNOWN
-        if unknown:
-            return Reason.START_UNKNOWN
-        dialect = self.dialect
-        if any(code not in dialect.harmless for code in codes.g.values()) or any(
-            m not in dialect.harmless_m for m in codes.m
-        ):
-            return Reason.OTHER_WORDS
-        return None

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gcodejerk.nc.dialect import AXES
+from gcodejerk.nc.dialect import AXES, Effect
 from gcodejerk.nc.modal import NAN, State
 
 Values = Mapping[str, float]
@@ -42,9 +42,22 @@ def tool_length(state: State, code: int, values: Values, lengths: Mapping[int, f
         _rename(state, "tool", unknown)
 
 
+def numbered_system(number: float) -> int:
+    """Key of the system that ``G54.1 P`` selects; 0 for one that nobody knows."""
+    return 541_000 + int(number) if number > 0.0 else 0
+
+
+def system_key(name: str) -> int:
+    """Key of a system by its name in a machine file, for example ``G54`` or ``G54.1 P3``."""
+    code, _, number = name.upper().partition("P")
+    if number:
+        return numbered_system(float(number))
+    return round(float(code.strip().removeprefix("G")) * 10.0)
+
+
 def select_system(state: State, code: int) -> None:
-    """G54 to G59.3."""
-    if state.system == code:
+    """G54 to G59.3, and those with a number."""
+    if state.system == code and code:
         return
     state.put("system", code)
     if state.rotates:
@@ -53,25 +66,34 @@ def select_system(state: State, code: int) -> None:
     _rename(state, "g5x", state.offsets.get(code, [NAN] * len(AXES)))
 
 
-def set_g92(state: State, code: int, values: Values) -> None:
-    """G92, G92.1, G92.2 and G92.3."""
-    if code in (921, 922):
+def change(state: State, effect: Effect, values: Values, lengths: dict[int, float]) -> None:
+    """Do what a non-modal code does to the frames: G92 and its kin, G52, G10."""
+    if effect == "set":
+        _set_g92(state, values)
+    elif effect == "clear":
         _rename(state, "g92", [0.0] * len(AXES))
-    elif code == 923:
+    elif effect == "restore":
         _rename(state, "g92", [NAN] * len(AXES))
-    else:
-        after = list(state.g92)
-        for axis, letter in enumerate(AXES):
-            if letter in values:
-                named = values[letter] * state.scale(axis)
-                after[axis] += state.position[axis] - named
-                state.move(axis, named)
-        state.put("g92", after)
-        if state.rotates:
-            state.forget_positions()
+    elif effect == "local":
+        _set_local(state, values)
+    elif effect == "table":
+        _write_table(state, values, lengths)
 
 
-def set_local(state: State, values: Values) -> None:
+def _set_g92(state: State, values: Values) -> None:
+    """G92: the axis words are the new names of where the axes stand."""
+    after = list(state.g92)
+    for axis, letter in enumerate(AXES):
+        if letter in values:
+            named = values[letter] * state.scale(axis)
+            after[axis] += state.position[axis] - named
+            state.move(axis, named)
+    state.put("g92", after)
+    if state.rotates or state.transforms:
+        state.forget_positions()
+
+
+def _set_local(state: State, values: Values) -> None:
     """G52: an offset given outright, kept where G92 keeps its own."""
     after = list(state.g92)
     for axis, letter in enumerate(AXES):
@@ -84,7 +106,7 @@ def set_local(state: State, values: Values) -> None:
         state.forget_positions()
 
 
-def write_table(state: State, values: Values, lengths: dict[int, float]) -> None:
+def _write_table(state: State, values: Values, lengths: dict[int, float]) -> None:
     """G10: data of a tool or of a coordinate system."""
     kind, number = values.get("L", NAN), values.get("P", NAN)
     if kind in (1, 10, 11):

@@ -15,6 +15,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.numbers import parse_numbers
 from gcodejerk.nc.tokenizer import LARGEST
 from gcodejerk.nc.words import BIT, PLAIN_LETTERS, Lines, Words
@@ -53,7 +54,7 @@ _BIT_OF = _bits()
 _ONES = np.array([bin(n).count("1") for n in range(1 << 9)], dtype=np.uint8)
 
 
-def _blank_comments(classes: NDArray[np.uint8], text: bytes) -> NDArray[np.int64]:
+def _blank_comments(classes: NDArray[np.uint8], text: bytes, semicolon: bool) -> NDArray[np.int64]:
     """Turn plain comments into blanks; the lines that hold any other."""
     at = np.flatnonzero((classes >= _END) & (classes <= _SEMICOLON) & (classes != _CR))
     kind = classes[at]
@@ -61,7 +62,7 @@ def _blank_comments(classes: NDArray[np.uint8], text: bytes) -> NDArray[np.int64
     is_open, is_semicolon = kind == _OPEN, kind == _SEMICOLON
     bad = is_open & (following != _CLOSE)
     bad |= (kind == _CLOSE) & (previous != _OPEN)
-    bad |= is_semicolon & (following != _END)
+    bad |= is_semicolon & ((following != _END) | (not semicolon))
     # A comment may run Python: (py,...)
     starts = np.flatnonzero(is_open | is_semicolon)
     source = np.frombuffer(text, dtype=np.uint8)
@@ -80,15 +81,29 @@ def _blank_comments(classes: NDArray[np.uint8], text: bytes) -> NDArray[np.int64
     return lines
 
 
-def read_lines(data: bytes, line_limit: int) -> Lines:
+def _whole(
+    source: NDArray[np.uint8],
+    letter: NDArray[np.uint8],
+    begin: NDArray[np.int64],
+    end: NDArray[np.int64],
+    value: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Which words hold a number whose meaning hangs on a decimal point that it lacks."""
+    points = np.add.accumulate(source == ord("."), dtype=np.int64)
+    silent = (letter == ord("G")) | (letter == ord("N")) | (letter == ord("S"))
+    plain: NDArray[np.bool_] = (points[end - 1] == points[begin]) & (value != 0.0) & ~silent
+    return plain
+
+
+def read_lines(data: bytes, dialect: Dialect) -> Lines:
     """Read the plain lines of a chunk.
 
     Parameters
     ----------
     data : bytes
         Whole lines; the last one may lack its end.
-    line_limit : int
-        Longer lines are odd.
+    dialect : Dialect
+        One whose plain lines mean what they mean in RS274/NGC (`Dialect.quick`).
 
     Returns
     -------
@@ -102,7 +117,8 @@ def read_lines(data: bytes, line_limit: int) -> Lines:
     inner = classes[_PAD:-1]
     odd_lines = []
     if any(mark in translated for mark in (b"\x04", b"\x05", b"\x06")):
-        odd_lines.append(_blank_comments(inner, text[_PAD:-1]))
+        semicolon = dialect.text.semicolon == "comment"
+        odd_lines.append(_blank_comments(inner, text[_PAD:-1], semicolon))
 
     joint = np.flatnonzero(classes[:-1] != _NUMBER)[_PAD:]
     kind = classes[joint]
@@ -134,6 +150,8 @@ def read_lines(data: bytes, line_limit: int) -> Lines:
     good &= ~is_g | (value == 0.0) | (value == 1.0) | (value == 2.0) | (value == 3.0)
     unsigned = (letter == ord("F")) | (letter == ord("S"))
     good &= ~(unsigned & (value < 0.0))
+    if dialect.whole_numbers == "machine":
+        good &= ~_whole(source, letter, begin, end, value)
     numbers = np.flatnonzero(letter == ord("N"))
     if len(numbers):
         follows = begin[numbers] - _PAD != line_begin[word_line[numbers]]
@@ -145,11 +163,13 @@ def read_lines(data: bytes, line_limit: int) -> Lines:
     odd = np.zeros(len(line_end), dtype=np.bool_)
     for lines in odd_lines:
         odd[lines] = True
-    odd |= line_end - line_begin > line_limit
+    odd |= line_end - line_begin > dialect.text.line_limit
     # Bits add up to their union unless one occurs twice: then the sum has fewer ones than terms.
     total = np.bincount(word_line, weights=_BIT_OF[letter], minlength=len(odd)).astype(np.uint32)
     ones = _ONES[total & 511] + _ONES[(total >> 9) & 511]
     odd |= (ones != np.bincount(word_line, minlength=len(odd))) | (total >= 1 << 18)
+    foreign = sum(bit for name, bit in BIT.items() if name not in dialect.letters + "GN")
+    odd |= total & np.uint32(foreign) != 0
     crlf = source[line_end + (_PAD - 1)] == 0x0D
     crlf &= line_end > line_begin
     terminator = np.where(crlf, 2, 1).astype(np.uint8)

@@ -52,6 +52,7 @@ class State:
         "ended",
         "feed",
         "feed_mode_stated",
+        "feed_whole",
         "g5x",
         "g92",
         "offsets",
@@ -62,6 +63,7 @@ class State:
         "rotates",
         "tool",
         "touched",
+        "transforms",
         "turns",
         "unit_stated",
     )
@@ -88,13 +90,17 @@ class State:
         self.tool = [NAN] * len(AXES)
         self.offsets: dict[int, list[float]] = {}
         self.feed = NAN
+        self.feed_whole = False  # F was written without a decimal point
         self.path_p = NAN
         self.path_q = NAN
         self.distance_stated = False
         self.feed_mode_stated = False
         self.unit_stated = False
         self.ended = False
-        self.rotated: bool | None = False
+        self.transforms: dict[str, bool | None] = {}
+        """Name of a rotation, a scaling... -> in force, None where that is unknown; a name that
+        the program never used is not in force."""
+        self.rotated: bool | None = False  # the coordinate system is turned
         self.rotates = False  # the program turns a coordinate system somewhere
         self.turns = False  # the program uses G7, so X may be a diameter
         self.cycle: tuple[int, float, float] | None = None  # code in force, its Z and R words
@@ -111,6 +117,7 @@ class State:
         other.g92 = self.g92.copy()
         other.tool = self.tool.copy()
         other.offsets = dict(self.offsets)
+        other.transforms = dict(self.transforms)
         return other
 
     def put(self, field: str, value: object) -> None:
@@ -141,6 +148,8 @@ class State:
         self.put("cycle", None)
         if self.rotates:
             self.put("rotated", None)
+        if self.transforms:
+            self.put("transforms", dict.fromkeys(self.transforms))
         self.forget_frame()
 
     def forget_frame(self) -> None:
@@ -172,12 +181,21 @@ class State:
                 self.put(name, NAN)
             elif name in STICKY:
                 self.put(name, True)
+            elif name == "transforms":
+                self.put(name, dict.fromkeys(self.transforms))
+            elif name == "feed_whole":
+                pass  # F itself is unknown
             else:
                 self.put(name, None)
 
+    @property
+    def transformed(self) -> bool:
+        """Whether a rotation, scaling, mirroring or polar frame is, or may be, in force."""
+        return self.rotated is not False or any(on is not False for on in self.transforms.values())
+
     def shift(self, axis: int) -> float:
         """Machine coordinate minus program coordinate of an axis [mm, deg]; NaN if unknown."""
-        if self.rotated is not False and axis < 2:
+        if self.transformed and (axis < 2 or self.rotated is False):
             return NAN
         return self.g5x[axis] + self.g92[axis] + self.tool[axis]
 
@@ -213,6 +231,9 @@ def join(before: State, after: State) -> State:
         joined.put("rotated", None)
     if before.cycle != after.cycle:
         joined.put("cycle", None)
+    names = before.transforms.keys() | after.transforms.keys()
+    both = {n: (before.transforms.get(n, False), after.transforms.get(n, False)) for n in names}
+    joined.put("transforms", {n: a if a == b else None for n, (a, b) in both.items()})
     for name in ("g5x", "g92", "tool"):
         pairs = zip(getattr(before, name), getattr(after, name), strict=True)
         joined.put(name, [a if a == b else NAN for a, b in pairs])

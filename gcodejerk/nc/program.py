@@ -7,6 +7,7 @@ line through the careful tokenizer and `execute`. Which way a line took shows no
 from __future__ import annotations
 
 import hashlib
+import itertools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,14 +15,17 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gcodejerk.errors import Place, ProgramError
+from gcodejerk.errors import Place
 from gcodejerk.nc.block import Block
 from gcodejerk.nc.chunks import Chunk, read_chunks
-from gcodejerk.nc.dialect import DIALECTS, Dialect
-from gcodejerk.nc.execute import Executor, Step
+from gcodejerk.nc.detect import detect_dialect
+from gcodejerk.nc.dialect import Dialect
+from gcodejerk.nc.dialects import AUTO, find_dialect
+from gcodejerk.nc.execute import Executor
 from gcodejerk.nc.flow import Flow
+from gcodejerk.nc.judge import Step
 from gcodejerk.nc.lexer import read_lines
-from gcodejerk.nc.modal import State, join
+from gcodejerk.nc.modal import NAN, State, join
 from gcodejerk.nc.rapids import (
     GIVES_FEED,
     USES_FEED,
@@ -34,6 +38,7 @@ from gcodejerk.nc.start import NOTHING_KNOWN, Start, initial_state
 from gcodejerk.nc.tokenizer import parse_line
 from gcodejerk.nc.words import Lines
 from gcodejerk.reasons import Reason
+from gcodejerk.units import SECONDS_PER_MINUTE
 
 STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""
@@ -76,16 +81,6 @@ class Program:
     rapids: Rapids
 
 
-def find_dialect(dialect: str | Dialect) -> Dialect:
-    """Look a dialect up by its name."""
-    if isinstance(dialect, Dialect):
-        return dialect
-    if dialect not in DIALECTS:
-        known = ", ".join(sorted(DIALECTS))
-        raise ProgramError(f"dialect '{dialect}' is not known", f"choose one of: {known}")
-    return DIALECTS[dialect]
-
-
 def parse_block(text: bytes, dialect: str | Dialect = "linuxcnc") -> Block:
     """Read one line, without its line end, the careful way."""
     return parse_line(text, find_dialect(dialect))
@@ -100,7 +95,7 @@ class Reader:
         self.log = RapidLog()
         self.flow = Flow()
         state = initial_state(dialect, start)
-        self.executor = Executor(dialect, state, dict(start.tool_lengths))
+        self.executor = Executor(dialect, state, dict(start.tool_lengths), start.decimal_point)
         self.blocks = 0
         self.percent: int | None = None
         """The line of the opening ``%``."""
@@ -127,13 +122,21 @@ class Reader:
         block = parse_line(text, self.dialect)
         if block.percent:
             self._percent(number, begin + len(text) + (terminator and (terminator % 2 or 2)))
-            return
-        if not (block.words or block.assigns or block.problem or block.o_word is not None):
+            if not any(word.letter == "G" for word in block.words):
+                return
+        says = block.words or block.assigns or block.names or block.problem
+        if not says and block.o_word is None:
+            if text.startswith(b";$") and not self.blocks and terminator:
+                # ;$PATH= belongs to the head of a Siemens program
+                self.insert_at = begin + len(text) + (terminator % 2 or 2)
             self.started = self.started or bool(block.comments)
             return
         first = not self.blocks
         self.started = True
-        self.blocks += bool(block.words or block.o_word is not None)
+        line_end = begin + len(text) + (terminator and (terminator % 2 or 2))
+        if first and block.o_word == "" and terminator:
+            self.insert_at = line_end  # the number of a program goes first
+        self.blocks += bool(block.words or block.names or block.o_word is not None)
         if block.problem is not None:
             self._odd(number, block.problem, block.column, text)
         if block.o_word is not None and block.problem is None:
@@ -143,7 +146,7 @@ class Reader:
 
     def can_run(self) -> bool:
         """Whether the lines that follow may be taken as a run."""
-        return self.started and not self.flow.inside and can_run(self.state)
+        return self.dialect.quick and self.started and not self.flow.inside and can_run(self.state)
 
     def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
         """Take plain lines of a chunk as arrays; the first that was not taken."""
@@ -185,6 +188,11 @@ class Reader:
         outer = (Reason.AFTER_END, Reason.BLOCK_DELETE)
         if self.flow.inside and reason not in outer:
             reason = Reason.SUBPROGRAM
+        speed = NAN
+        if self.dialect.feed_on_rapids:
+            speed = state.feed * (state.unit or NAN) / SECONDS_PER_MINUTE
+            if reason is None and not speed > 0.0:
+                reason = Reason.FEED_UNKNOWN
         if reason is None:
             self._ask(number)
         row = common_columns(state)
@@ -194,6 +202,7 @@ class Reader:
             target=state.position.copy(),
             words=step.words,
             feed=state.feed,
+            speed=speed,
         )
         self.log.add(reason, row)
 
@@ -295,7 +304,7 @@ def read_program(
     name : str, optional
         For messages.
     dialect : str or Dialect, optional
-        How the program is written.
+        How the program is written; ``auto`` finds it from the text.
     start : Start, optional
         What may be assumed when the program starts.
     progress : callable, optional
@@ -311,7 +320,8 @@ def read_program(
     Raises
     ------
     ProgramError
-        The file is empty or cannot be an NC program; the dialect is not known.
+        The file is empty or cannot be an NC program; the dialect is not known, or cannot be told
+        from the text.
 
     Examples
     --------
@@ -322,18 +332,27 @@ def read_program(
     >>> program.rapids.reason == 255
     array([False,  True])
     """
-    return follow(file, Reader(name, find_dialect(dialect), start), progress, fast)
+    chunks = read_chunks(file, name)
+    why = ""
+    if dialect == AUTO:
+        first = next(chunks)
+        dialect, why = detect_dialect(first.data, name)
+        chunks = itertools.chain([first], chunks)
+    reader = Reader(name, find_dialect(dialect), start)
+    if why:
+        reader.odd_lines.append(Finding(None, f"read as {reader.dialect.name}: {why}"))
+    return follow(chunks, reader, progress, fast)
 
 
 def follow(
-    file: BinaryIO, reader: Reader, progress: Callable[[int], None] | None, fast: bool
+    chunks: Iterator[Chunk], reader: Reader, progress: Callable[[int], None] | None, fast: bool
 ) -> Program:
-    """Take a whole file; the reader keeps the state that the program ends in."""
+    """Take all chunks; the reader keeps the state that the program ends in."""
     name, chosen = reader.name, reader.dialect
     digest = hashlib.blake2b(digest_size=16)
     size = lines = 0
     newline, stamp = b"\n", None
-    for chunk in read_chunks(file, name):
+    for chunk in chunks:
         digest.update(chunk.data)
         if not size:
             stamp = find_stamp(chunk, chosen)
@@ -362,11 +381,11 @@ def follow(
 
 def read_chunk(reader: Reader, chunk: Chunk, fast: bool) -> None:
     """Take the lines of one chunk."""
-    if not fast:
+    if not fast or not reader.dialect.quick:
         for line in split_lines(chunk):
             reader.read_line(*line)
         return
-    lines = read_lines(chunk.data, reader.dialect.line_limit)
+    lines = read_lines(chunk.data, reader.dialect)
     complete = chunk.data.endswith(b"\n")
     begins = lines.begin.tolist()
     ends = [begin - 1 for begin in begins[1:]] + [len(chunk.data) - complete]

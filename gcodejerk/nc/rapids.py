@@ -54,8 +54,12 @@ class Rapids:
     feed_mode_stated: NDArray[np.bool_]
     feed: NDArray[np.float64]
     """F in force after the block, in the program's own unit; NaN unknown."""
+    feed_whole: NDArray[np.bool_]
+    """F was written without a decimal point, which some controls read differently."""
     feed_needed: NDArray[np.bool_]
     """A later block may use F before a new one is certain to be given."""
+    speed: NDArray[np.float64]
+    """Of a rapid that runs at F [mm/s]; NaN where rapids run as fast as the axes allow."""
     path: NDArray[np.uint8]
     """61, 62 (G61.1), 64, or 0 unknown; after the block's own words."""
     path_p: NDArray[np.float64]
@@ -72,13 +76,13 @@ _TYPES: dict[str, tuple[type, int]] = {
     **{name: (np.int64, 0) for name in ("line", "begin", "end")},
     **{name: (np.uint8, 0) for name in ("terminator", "reason", "feed_mode", "path")},
     **{name: (np.float64, len(AXES)) for name in ("start", "target", "offset")},
-    **{name: (np.float64, 0) for name in ("feed", "path_p", "path_q")},
+    **{name: (np.float64, 0) for name in ("feed", "path_p", "path_q", "speed")},
     "words": (np.uint16, 0),
     **{
         name: (np.bool_, 0)
         for name in (
             *("inch", "incremental", "diameter", "distance_stated"),
-            *("feed_mode_stated", "feed_needed"),
+            *("feed_mode_stated", "feed_needed", "feed_whole"),
         )
     },
 }
@@ -98,6 +102,8 @@ def common_columns(state: State) -> dict[str, object]:
         "path_p": state.path_p,
         "path_q": state.path_q,
         "offset": unknown,
+        "feed_whole": state.feed_whole,
+        "speed": np.nan,
     }
 
 

@@ -6,31 +6,13 @@ accepted moves the tool somewhere else than we believe.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
-from gcodejerk.nc.dialect import ARC_CENTRES, AXES, PLANES, Dialect
+from gcodejerk.nc.codes import Codes
+from gcodejerk.nc.dialect import ARC_CENTRES, PLANES, Dialect
 from gcodejerk.nc.modal import State
 
-_ARCS = frozenset({20, 30})
-_AXIS_USERS = frozenset({100, 280, 300, 520, 920})
-"""Codes that take the axis words of the block, so that no motion may be stated beside them."""
+_AXIS_USERS = frozenset({"return", "table", "local", "set"})
+"""Effects that take the axis words of the block, so that no motion may be stated beside them."""
 _OFF = frozenset({400, None})
-
-
-@dataclass(slots=True)
-class Codes:
-    """The words of a block, sorted."""
-
-    g: dict[str, int] = field(default_factory=dict)
-    """Modal group -> G code."""
-    m: list[int] = field(default_factory=list)
-    values: dict[str, float] = field(default_factory=dict)
-    """Letter -> number, NaN for an expression; G, M and N left out."""
-    unknown: bool = False
-    """A code that is computed or that the dialect does not know."""
-    fault: bool = False
-    """The controller refuses the block."""
-    expression: bool = False
 
 
 def takes_axes(codes: Codes) -> bool:
@@ -44,48 +26,64 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     if codes.unknown:
         return True
     values, g = codes.values, codes.g
-    motion, user = g.get("motion"), g.get("non-modal")
-    axes = any(axis in values for axis in AXES)
-    if user in _AXIS_USERS or (axes and takes_axes(codes)):
-        if motion not in (None, 800) or (user in (520, 920) and not axes):
+    if values.get("F", 0.0) < 0.0 or values.get("S", 0.0) < 0.0:
+        return False
+    axes = bool(codes.moved())
+    if dialect.strict:
+        motion = _strict_motion(codes, state, dialect, axes)
+        if motion is None:
             return False
+        if motion < 0:
+            motion = None
+    else:
+        # The block of a dwell, or of a return, may name a motion that it does not make.
+        taken = any(dialect.effect(code) in ("words", "return", "set") for code in g.values())
+        motion = None if taken else g.get("motion", state.motion)
+        if dialect.effect(g.get("non-modal")) == "machine" and axes and motion not in (0, 10):
+            return False
+    drawn = dialect.strict or axes or arc_words(values, state)
+    if motion in dialect.arcs and drawn and not _arc_complete(values, g.get("plane", state.plane)):
+        return False
+    inverse = (
+        dialect.feed_modes.get(g["feed mode"]) == 93 if "feed mode" in g else state.feed_mode == 93
+    )
+    if motion not in (None, 0, 800) and inverse and axes and "F" not in values:
+        return False
+    return _words_used(codes, motion, state, dialect)
+
+
+def _strict_motion(codes: Codes, state: State, dialect: Dialect, axes: bool) -> int | None:
+    """Motion code that the block's axis words are for, -1 for none, None where it is refused."""
+    values, g = codes.values, codes.g
+    motion, effect = g.get("motion"), dialect.effect(g.get("non-modal"))
+    if effect in _AXIS_USERS or (axes and takes_axes(codes)):
+        if motion not in (None, 800) or (effect in ("local", "set") and not axes):
+            return None
         motion = None
     elif motion is None and (axes or arc_words(values, state)):
         motion = state.motion
         if motion == 800:
-            return False
-    elif (motion not in (None, 0, 10, 20, 30, 800) and not axes) or (motion == 800 and axes):
-        return False
-    if user == 530 and not (
+            return None
+    elif (motion not in (None, 0, 10, *dialect.arcs, 800) and not axes) or (motion == 800 and axes):
+        return None
+    if effect == "machine" and not (
         axes
         and motion in (0, 10)
         and state.compensation in _OFF
         and g.get("distance", state.distance) != 910
     ):
-        return False
-    if values.get("F", 0.0) < 0.0 or values.get("S", 0.0) < 0.0:
-        return False
-    if motion in _ARCS and not _arc_complete(values, g.get("plane", state.plane)):
-        return False
-    if (
-        motion is not None
-        and motion not in (0, 800)
-        and (g["feed mode"] == 930 if "feed mode" in g else state.feed_mode == 93)
-        and axes
-        and "F" not in values
-    ):
-        return False
-    return _words_used(codes, motion, state, dialect)
+        return None
+    return -1 if motion is None else motion
 
 
 def _words_used(codes: Codes, motion: int | None, state: State, dialect: Dialect) -> bool:
     """Whether every letter has a code that uses it."""
     in_force = None
     for letter in codes.values:
+        if letter not in dialect.letters:
+            return False
         users = dialect.uses.get(letter)
         if users is None:
-            if letter not in "FSTXYZABCUVW":
-                return False
             continue
         if in_force is None:
             used = list(codes.g.values())
@@ -101,7 +99,7 @@ def _words_used(codes: Codes, motion: int | None, state: State, dialect: Dialect
 
 def arc_words(values: dict[str, float], state: State) -> bool:
     """Whether centre words alone make an arc, one being in force."""
-    return state.motion in _ARCS and ("I" in values or "J" in values or "K" in values)
+    return state.motion in (20, 30) and ("I" in values or "J" in values or "K" in values)
 
 
 def _arc_complete(values: dict[str, float], plane: int | None) -> bool:

@@ -35,6 +35,8 @@ def can_run(state: State) -> bool:
         and state.plane in ARC_CENTRES
         and state.feed_mode is not None
         and state.touched is None
+        and state.cycle is None
+        and not any(on is not False for on in state.transforms.values())
     )
 
 
@@ -131,12 +133,15 @@ def run_plain(
         target=target,
         words=named[rapid],
         feed=history[np.searchsorted(feeds, rapid, side="right")],
+        # A whole number that matters would have made its line odd.
+        feed_whole=np.searchsorted(feeds, rapid, side="right") == 0 if state.feed_whole else False,
         reason=_reasons(state, named[rapid], start, target),
     )
     # What stands behind the end of the program uses no F.
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
     state.motion = int(motion[-1]) * 10
     state.feed = float(history[-1])
+    state.feed_whole &= not len(feeds)
     certain = np.flatnonzero(columns["reason"] == CERTAIN)
     return last, int(row[certain[0]]) + place[0] if len(certain) else None
 
@@ -167,7 +172,7 @@ def _reasons(
     """Why each rapid has to be left alone, as `execute` would decide."""
     if state.ended:
         return np.full(len(named), _INDEX[Reason.AFTER_END], dtype=np.uint8)
-    if state.rotated is not False:
+    if state.transformed:
         return np.full(len(named), _INDEX[Reason.ROTATION], dtype=np.uint8)
     is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
     unknown = (is_named & (np.isnan(start) | np.isnan(target))).any(axis=1)

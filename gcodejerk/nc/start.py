@@ -12,6 +12,7 @@ from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.block import Block
 from gcodejerk.nc.dialect import AXES, Dialect
 from gcodejerk.nc.execute import Executor
+from gcodejerk.nc.frames import system_key
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.tokenizer import parse_line
 from gcodejerk.units import MM_PER_INCH
@@ -32,7 +33,10 @@ class Start:
     inch: bool = False
     """Unit where the program states none."""
     diameter: bool = False
-    """X is a diameter where the program states neither G7 nor G8."""
+    """X is a diameter where the program does not say whether it is."""
+    decimal_point: str | None = None
+    """What X100 means where the dialect leaves it to the machine: ``calculator`` 100 mm,
+    ``standard`` 100 least increments of 0.001 mm; None unknown."""
 
 
 NOTHING_KNOWN = Start()
@@ -46,12 +50,13 @@ def initial_state(dialect: Dialect, start: Start) -> State:
             setattr(state, name, code)
     state.system = dialect.defaults.get("system")
     mode = dialect.defaults.get("feed mode")
-    state.feed_mode = None if mode is None else mode // 10
+    state.feed_mode = None if mode is None else dialect.feed_modes.get(mode, mode // 10)
+    path = dialect.defaults.get("path")
+    state.path = None if path is None else dialect.paths[path]
     state.unit = MM_PER_INCH if start.inch else 1.0
     state.diameter = state.turns = start.diameter
     for system, offsets in start.offsets.items():
-        code = round(float(system.upper().removeprefix("G")) * 10.0)
-        state.offsets[code] = [offsets.get(axis, NAN) for axis in AXES]
+        state.offsets[system_key(system)] = [offsets.get(axis, NAN) for axis in AXES]
     if start.positions or start.offsets:
         # Who states where the axes are, states it for the modes that the dialect starts in: no
         # tool length and no G92, which would otherwise outlive the program before this one.
@@ -67,7 +72,13 @@ def initial_state(dialect: Dialect, start: Start) -> State:
                 "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
                 Place("startup", 1, block.column, start.startup),
             )
-        Executor(dialect, state, dict(start.tool_lengths)).run(block)
+        executor = Executor(dialect, state, dict(start.tool_lengths), start.decimal_point)
+        if executor.run(block).fault:
+            raise ProgramError(
+                f"startup codes: the dialect {dialect.name} refuses {start.startup!r}",
+                "give codes that may stand together",
+                Place("startup", 1, None, start.startup),
+            )
         if "tool length" in _groups_of(block, dialect):
             state.tool = [0.0] * len(AXES)
     for axis, letter in enumerate(AXES):

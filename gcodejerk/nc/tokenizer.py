@@ -3,24 +3,31 @@
 Rule: it never raises. A line that the controller would refuse becomes a block with a `problem`,
 its column, and the words in front of it.
 
-The grammar is that of RS274/NGC as LinuxCNC reads it: case does not matter, blanks and tabs count
-nowhere outside comments (``g0x +0. 12 34y 7`` is X0.1234 Y7), numbers have no exponent, ``( )``
-comments end on their line and do not nest, ``;`` comments run to its end.
+The grammar is RS274/NGC's: words of a letter and a number without exponent, in any case. What
+differs between dialects (comments, block delete, blanks within numbers, names, ``X=5``) is asked of
+`Dialect.text`.
 """
 
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
-from gcodejerk.nc.block import Block, Word
+from gcodejerk.nc.block import Block, Name, Word
 from gcodejerk.nc.dialect import Dialect
 
 LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
 
 _BLANKS = re.compile(rb"[ \t]*")
-_WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[0-9.]+)[ \t]*(?![-+0-9. \t#\[])")
+_WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[0-9.]+)[ \t]*(?![-+0-9. \t#\[=])")
 _NUMBER = re.compile(rb"[-+]?[0-9. \t]*")
+_CLOSED_NUMBER = re.compile(rb"[-+]?[ \t]*[0-9.]*")
+_IDENTIFIER = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
+_INDEX = re.compile(rb"[0-9]*")
+_FUNCTION = re.compile(rb"(IC|AC|DC|ACP|ACN)[ \t]*\(", re.IGNORECASE)
+_TO_BLANK = re.compile(rb"[^ \t;]*")
+_CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
 _SHAPE = re.compile(rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 _UNSIGNED = re.compile(rb"[0-9]+(?:\.[0-9]*)?")
 _OPERATOR_TEXT = re.compile(rb"[ \t]*([A-Za-z][A-Za-z \t]*?)[ \t]*(?=\[)")
@@ -43,16 +50,24 @@ class _Odd(Exception):  # noqa: N818 - not an error of ours: a place in the line
 class _Line:
     """A cursor over one line."""
 
-    __slots__ = ("assigns", "at", "comments", "o_name", "o_word", "text", "words")
+    __slots__ = (
+        *("assigns", "at", "comments", "delete", "dialect", "names", "o_name", "o_word"),
+        *("percent", "rules", "text", "words"),
+    )
 
-    def __init__(self, text: bytes) -> None:
+    def __init__(self, text: bytes, dialect: Dialect) -> None:
         self.text = text
+        self.dialect = dialect
+        self.rules = dialect.text
         self.at = 0
         self.words: list[Word] = []
         self.comments: list[tuple[int, int]] = []
         self.assigns: list[str] = []
+        self.names: list[Name] = []
         self.o_word: str | None = None
         self.o_name = ""
+        self.delete = False
+        self.percent = False
 
     def skip(self) -> bytes:
         """Pass over blanks; the next byte, empty at the end."""
@@ -62,16 +77,17 @@ class _Line:
     def comment(self) -> None:
         """Pass over the comment that begins here."""
         begin, text = self.at, self.text
-        if text[begin] == 0x3B:  # ;
-            self.at = len(text)
-        else:
+        if text[begin] == 0x28:  # (
             end = text.find(b")", begin)
-            if end < 0:
+            strict = self.rules.parentheses == "comment"
+            if end < 0 and strict:
                 raise _Odd("comment is not closed", begin)
-            if text.find(b"(", begin + 1, end) >= 0:
+            if strict and text.find(b"(", begin + 1, end) >= 0:
                 raise _Odd("comment within a comment", text.find(b"(", begin + 1))
-            self.at = end + 1
-        if _ACTIVE.match(text, begin + 1):
+            self.at = end + 1 if end >= 0 else len(text)
+        else:
+            self.at = len(text)
+        if self.rules.python and _ACTIVE.match(text, begin + 1):
             raise _Odd("comment runs Python", begin)
         self.comments.append((begin, self.at))
 
@@ -85,9 +101,12 @@ class _Line:
                 self.at = after
                 byte = self.text[after : after + 1]
         if byte in (b"#", b"[") or byte.isalpha():
+            if self.rules.variables != "#":
+                raise _Odd("a number is missing", begin)
             self.operand()
             return None
-        match = _NUMBER.match(self.text, self.at)
+        pattern = _NUMBER if self.rules.blanks == "anywhere" else _CLOSED_NUMBER
+        match = pattern.match(self.text, self.at)
         assert match is not None
         digits = match[0].replace(b" ", b"").replace(b"\t", b"")
         if not _SHAPE.fullmatch(digits):
@@ -169,6 +188,8 @@ class _Line:
         assert match is not None
         self.o_word = match[0].decode().lower()
         self.at = match.end()
+        if self.o_word and self.rules.o_word == "program":
+            raise _Odd("text after the number of a program", match.start())
         while byte := self.skip():
             if byte in b"(;":
                 self.comment()
@@ -181,9 +202,10 @@ class _Line:
         """Take one word."""
         begin = self.at
         letter = self.text[begin : begin + 1].decode().upper()
-        if letter == "N" and (self.words or self.comments):
+        if letter == "N" and (self.words or self.comments or self.names):
             raise _Odd("N stands behind something else", begin)
         match = _WORD.match(self.text, begin)
+        function = ""
         if match and _SHAPE.fullmatch(match[2]):  # the usual case, made quick
             self.at = match.end(2)
             value: float | None = float(match[2])
@@ -191,11 +213,194 @@ class _Line:
                 raise _Odd(f"'{match[2].decode()}' is beyond any machine", begin + 1)
         else:
             self.at = begin + 1
-            value = self.number()
+            if self.rules.equals and self._equals(letter):
+                if letter == "R" and self.rules.variables == "R":
+                    self.assigns.append(self.text[begin : self.at].split(b"=")[0].decode().upper())
+                    self._value()
+                    return
+                function = self._function()
+                value = self._value()
+                if function:
+                    self._close()
+            else:
+                value = self.number()
         if letter == "N" and (value is None or not self.text[begin + 1 :].lstrip()[:1].isdigit()):
             raise _Odd("N without a plain number", begin)
         text = self.text[begin : self.at]
-        self.words.append(Word(letter, value, begin, self.at, text))
+        whole = value is not None and b"." not in text
+        self.words.append(Word(letter, value, begin, self.at, text, whole, function))
+
+    def _equals(self, letter: str) -> bool:
+        """Pass over an index and ``=``, where that stands here: the 1 of ``T1=5``."""
+        match = _INDEX.match(self.text, self.at)
+        assert match is not None
+        after = _BLANKS.match(self.text, match.end()).end()  # type: ignore[union-attr]
+        if self.text[after : after + 1] != b"=":
+            return False
+        if match[0] and letter not in "TSMDHR" and self.rules.variables == "R":
+            raise _Odd("axis with a number: not known here", self.at)
+        self.at = after + 1
+        self.skip()
+        return True
+
+    def _function(self) -> str:
+        """Pass over ``IC(`` or its kin; which it is."""
+        match = _FUNCTION.match(self.text, self.at)
+        if not match:
+            return ""
+        self.at = match.end()
+        self.skip()
+        return match[1].decode().upper()
+
+    def _value(self) -> float | None:
+        """Read what follows ``=``: a number, or an expression up to the next blank."""
+        match = _CLOSED_NUMBER.match(self.text, self.at)
+        assert match is not None
+        after = self.text[match.end() : match.end() + 1]
+        ends = not after or after in b" \t;)" or after.isalpha()
+        if ends and _SHAPE.fullmatch(match[0]):
+            return self.number()
+        match = _TO_BLANK.match(self.text, self.at)
+        assert match is not None
+        if not match[0]:
+            raise _Odd("a value is missing", self.at)
+        self.at = match.end() - (match[0].endswith(b")") and match[0].count(b"(") == 0)
+        return None
+
+    def _close(self) -> None:
+        if self.skip() != b")":
+            raise _Odd("parenthesis is not closed", self.at)
+        self.at += 1
+
+    def name(self) -> bool:
+        """Take a word with a name, if one stands here."""
+        match = _IDENTIFIER.match(self.text, self.at)
+        if not match:
+            return False
+        self.at = match.end()
+        name, begin = match[0].decode().upper(), self.at
+        if self.dialect.one_command:
+            self.at = len(self.text)  # all that follows belongs to the command
+        elif self.skip() == b"(":
+            self._arguments()
+        elif self.text[self.at : self.at + 1] == b"=":
+            self.at += 1
+            self.skip()
+            if name == "CR":  # the radius of an arc
+                value = self._value()
+                text = self.text[match.start() : self.at]
+                self.words.append(Word("R", value, match.start(), self.at, text))
+                return True
+            self._value()
+        elif self.text[self.at : self.at + 1] == b":":
+            self.at += 1
+            self.names.append(Name("", match[0]))  # a label: a place that jumps may lead to
+            return True
+        else:
+            self.at = begin
+        self.names.append(Name(name, self.text[begin : self.at]))
+        return True
+
+    def _arguments(self) -> None:
+        """Pass over ``( ... )``, quoted text in it included."""
+        depth, quoted, begin = 0, False, self.at
+        for at in range(begin, len(self.text)):
+            byte = self.text[at]
+            if byte == 0x22:
+                quoted = not quoted
+            elif not quoted:
+                depth += (byte == 0x28) - (byte == 0x29)
+                if depth == 0:
+                    self.at = at + 1
+                    return
+        raise _Odd("parenthesis is not closed", begin)
+
+    def keyword(self) -> bool:
+        """Take a keyword of program flow and all that follows it, if one stands here."""
+        pattern = _keywords(self.rules.keywords)
+        match = pattern.match(self.text, self.at) if pattern else None
+        if not match:
+            return False
+        self.names.append(Name(match[1].decode().upper(), self.text[match.end() :]))
+        self.at = len(self.text)
+        return True
+
+    def delete_mark(self) -> bool:
+        """Pass over a ``/`` and its level, if it stands where the dialect has it."""
+        where = self.rules.delete
+        if where == "ignored":
+            self.at += 1
+            return True
+        behind = any(word.letter != "N" for word in self.words) or self.names or self.comments
+        if where == "none" or behind or self.delete or (where == "first" and self.words):
+            return False
+        self.at += 1
+        self.delete = True
+        level = self.text[self.at : self.at + 1]
+        if where == "numbered" and level.isdigit():
+            self.at += 1
+        return True
+
+    def percent_mark(self) -> None:
+        """Take a ``%``, with a name where the dialect gives it one."""
+        rules, text = self.rules, self.text
+        if rules.percent == "error":
+            raise _Odd("'%' has no meaning here", self.at)
+        if rules.percent == "lone":
+            if text.strip(b" \t") != b"%":
+                raise _Odd("text on the line of %", self.at + 1)
+            self.at = len(text)
+        elif any(word.letter != "N" for word in self.words):
+            raise _Odd("% behind other words", self.at)
+        else:
+            self.at = _TO_BLANK.match(text, self.at).end()  # type: ignore[union-attr]
+        self.percent = True
+
+    def rest(self) -> None:
+        """Take what stands here, until nothing is left."""
+        rules, text = self.rules, self.text
+        byte = text[self.at : self.at + 1]
+        if byte.isalpha() or (byte == b"_" and rules.names):
+            leads = all(word.letter == "N" for word in self.words) and not self.names
+            if byte in b"Oo" and leads and rules.o_word != "error":
+                self.flow()
+            elif not (rules.keywords and self.keyword()) and not (rules.names and self.name()):
+                self.word()
+        elif (
+            (byte == b"(" and rules.parentheses != "code")
+            or (byte == b";" and rules.semicolon == "comment")
+            or (rules.slashes and text.startswith(b"//", self.at))
+        ):
+            self.comment()
+        elif byte == b";" and rules.semicolon == "end":
+            self.at += 1
+            if self.skip():
+                raise _Odd("text behind the end of the block", self.at)
+        elif byte == b"#" and rules.variables == "#":
+            self.assignment()
+        elif byte == b"/" and self.delete_mark():
+            pass
+        elif byte == b"%":
+            self.percent_mark()
+        elif byte == b":" and rules.o_word == "program" and not self.words:
+            self.flow()
+        elif rules.checksum and _CHECKSUM.fullmatch(text, self.at):
+            self.at = len(text)
+        elif rules.end and text.startswith(rules.end, self.at):
+            self.at += len(rules.end)
+            if self.skip() not in (b"", b";"):
+                raise _Odd("text behind the end of the block", self.at)
+        else:
+            raise _Odd(f"'{byte.decode('latin-1')}' has no meaning here", self.at)
+
+
+@lru_cache(maxsize=16)
+def _keywords(words: tuple[str, ...]) -> re.Pattern[bytes] | None:
+    """Any of these words, not followed by another letter."""
+    if not words:
+        return None
+    every = b"|".join(word.encode() for word in sorted(words, key=len, reverse=True))
+    return re.compile(rb"(" + every + rb")(?![A-Za-z_])", re.IGNORECASE)
 
 
 def parse_line(text: bytes, dialect: Dialect) -> Block:
@@ -213,43 +418,28 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     Block
         With a `problem` where the controller would refuse the line.
     """
-    line = _Line(text)
-    delete = False
+    line = _Line(text, dialect)
     problem, column, rest, mark = None, None, b"", 0
+    limit = dialect.text.line_limit
     try:
-        if line.skip() == b"%":
-            if text.strip(b" \t") != b"%":
-                raise _Odd("text on the line of %", line.at + 1)
-            return Block(percent=True)
-        if len(text) > dialect.line_limit:
-            raise _Odd(f"line is longer than {dialect.line_limit} bytes", dialect.line_limit)
-        if text[line.at : line.at + 1] == b"/":
-            delete = True
-            line.at += 1
-        while byte := line.skip():
+        if len(text) > limit and text.strip(b" \t") != b"%":
+            line.skip()
+            raise _Odd(f"line is longer than {limit} bytes", limit)
+        while line.skip():
             mark = line.at
-            if byte.isalpha():
-                if byte in b"Oo" and all(word.letter == "N" for word in line.words):
-                    line.flow()
-                else:
-                    line.word()
-            elif byte in b"(;":
-                line.comment()
-            elif byte == b"#":
-                line.assignment()
-            else:
-                raise _Odd(f"'{byte.decode('latin-1')}' has no meaning here", line.at)
+            line.rest()
     except _Odd as odd:
         problem, column, rest = odd.problem, odd.at + 1, text[mark:]
     return Block(
         tuple(line.words),
         tuple(line.comments),
-        delete,
+        line.delete,
         line.o_word,
         line.o_name,
-        False,
+        line.percent,
         tuple(line.assigns),
         rest,
         problem,
         column,
+        tuple(line.names),
     )

@@ -13,9 +13,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import Program, Start
+from gcodejerk.nc import Program, Start, find_dialect
+from gcodejerk.nc.chunks import read_chunks
 from gcodejerk.nc.modal import MODES
-from gcodejerk.nc.program import Reader, find_dialect, follow
+from gcodejerk.nc.program import Reader, follow
 
 Draw = st.DrawFn
 
@@ -43,7 +44,7 @@ def differences(data: bytes, start: Start | None = None, dialect: str = "linuxcn
     for fast in (True, False):
         try:
             reader = Reader("<program>", find_dialect(dialect), start)
-            readings.append(follow(io.BytesIO(data), reader, None, fast))
+            readings.append(follow(read_chunks(io.BytesIO(data), reader.name), reader, None, fast))
             ends.append(reader.state)
         except ProgramError as error:
             readings.append(str(error))

@@ -23,7 +23,7 @@ from typing import BinaryIO
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Dialect, Program, Start, read_program
+from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
 from gcodejerk.start import program_start
 from gcodejerk.verification.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.findings import Findings, Kind, Verification, Violation, require
@@ -156,7 +156,7 @@ def verify_files(
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
     walk = Walk(Window(original), Window(processed), program, found)
-    reader = Reader(program.rapids, machine, found)
+    reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
     stride = stride_of(machine)
     for streams in _batches(_checked(walk, reader)):
         _judge(reader.paths(streams), program, machine, stride, found)

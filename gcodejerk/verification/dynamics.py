@@ -53,9 +53,10 @@ def limits_of(machine: Machine) -> Array:
     return out
 
 
-def conventional_counts(displacement: Array, machine: Machine) -> tuple[Index, Index]:
+def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
-    total = _move_time(rapid_limits(displacement, machine), displacement, machine)
+    displacement = paths.displacement
+    total = _move_time(rapid_limits(paths, machine), displacement, machine)
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
     longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
     if machine.design.profile == "shortest":
@@ -109,7 +110,7 @@ class Clock:
 
 def check_dynamics(paths: Paths, machine: Machine, stride: int, found: Findings) -> None:
     """Duration, limits and feeds of streams; feeds only where the streams have them."""
-    usual, most = conventional_counts(paths.displacement, machine)
+    usual, most = conventional_counts(paths, machine)
     blocks = paths.count
     fewest = np.where(blocks > 1, blocks * stride, 1)
     for k in np.flatnonzero(fewest > most).tolist():
@@ -164,7 +165,7 @@ def _judge(paths: Paths, machine: Machine, clock: Clock) -> list[Complaint | Non
             k = int(owner[at])
             if out[k] is None:
                 out[k] = Complaint(kind, int(bad[at] - paths.begin[k]) - 1, problem)
-    own = rapid_limits(paths.displacement, machine)
+    own = rapid_limits(paths, machine)
     excess = leaves_more(paths, machine, clock.moment, own)
     for k, left, allowed in zip(*excess.columns(), strict=True):
         if out[k] is None:
@@ -192,6 +193,7 @@ def _take(paths: Paths, streams: Index) -> Paths:
         start=paths.start[streams],
         displacement=paths.displacement[streams],
         unit=paths.unit[streams],
+        speed=paths.speed[streams],
     )
 
 

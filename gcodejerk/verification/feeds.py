@@ -22,7 +22,7 @@ from gcodejerk.nc import AXES
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.conventional import peak_velocity, rapid_speed, rapid_time
 from gcodejerk.verification.findings import Kind
-from gcodejerk.verification.points import Array, Paths, feed_speed, resolutions
+from gcodejerk.verification.points import LINEAR, Array, Paths, feed_speed, resolutions
 from gcodejerk.verification.speeds import RELATIVE, Blocks, Speeds
 
 FEED_STEP = 1e-3
@@ -72,14 +72,17 @@ def judge_feeds(paths: Paths, machine: Machine, t: Array, limits: Array) -> Verd
     return out
 
 
-def rapid_limits(displacement: Array, machine: Machine) -> Array:
+def rapid_limits(paths: Paths, machine: Machine) -> Array:
     """Limits of the controller's own rapid over the displacement, shape (3, moves, 9)."""
     rapid = np.full((3, len(AXES)), np.inf)
     for axis in machine.axes:
         own = axis.rapid
         rapid[:, AXES.index(axis.name)] = own.velocity, own.acceleration, own.jerk
     with np.errstate(divide="ignore"):
-        out: Array = rapid[:, np.newaxis, :] / np.abs(displacement)
+        out: Array = rapid[:, np.newaxis, :] / np.abs(paths.displacement)
+        # A rapid that runs at F does so along its path, in which all axes share.
+        length = np.sqrt((paths.displacement[:, LINEAR] ** 2).sum(axis=1))
+        out[0] = np.fmin(out[0], (paths.speed / length)[:, np.newaxis])
     return out
 
 
@@ -202,7 +205,7 @@ class _Judge:
 
     def conventional(self) -> tuple[Kind, Rows, str]:
         """Hold what is nearly the controller's own rapid to it."""
-        V, A, J = rapid_limits(self.paths.displacement, self.machine).min(axis=2)
+        V, A, J = rapid_limits(self.paths, self.machine).min(axis=2)
         law = np.isfinite(J)
         J = np.where(law, J, 1.0)
         total, peak = rapid_time(V, A, J), peak_velocity(V, A, J)

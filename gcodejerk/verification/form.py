@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from decimal import Context, Decimal
 from functools import lru_cache
 
-from gcodejerk.nc import AXES, Block, Rapids, parse_block
+from gcodejerk.nc import AXES, Block, Dialect, Rapids, parse_block
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.source import PIECE, Window
 
@@ -33,7 +33,7 @@ _NUMBER = rb"[-+]?+(?:[0-9]{1,9}+(?:\.[0-9]{0,250}+)?+|\.[0-9]{1,250}+)(?![0-9.]
 _WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
 _WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
 _IS_POINT = re.compile(rb"[ \t]*G0?1(?![0-9.])")
-_COMMENT = re.compile(rb"\(gcodejerk: ([ -')-~*]*)\)")
+_COMMENT = re.compile(rb"(?:\(gcodejerk: ([ -'*-~]*)\)|; gcodejerk: ([ -'*-~]*))")
 _EXACT = Context(prec=200)
 
 
@@ -63,41 +63,47 @@ class Modes:
             float(rapids.path_q[i]),
         )
 
-    def apply(self, words: list[tuple[str, Decimal]]) -> str | None:
+    def apply(self, words: list[tuple[str, Decimal]], dialect: Dialect) -> str | None:
         """Execute a line without motion; what is wrong with it."""
+        writing = dialect.writing
+        if writing is not None and words == read_words(writing.standstill):
+            return None
         seen = [letter + str(value) if letter == "G" else letter for letter, value in words]
         if len(set(seen)) < len(seen):
             return "a word stands twice"
-        codes = {float(value) for letter, value in words if letter == "G"}
+        codes = {int(value * 10) for letter, value in words if letter == "G" and not value * 10 % 1}
+        if len(codes) < sum(letter == "G" for letter, _ in words):
+            return "a code that is none"
         values = {letter: value for letter, value in words if letter != "G"}
         if not set(values) <= {"F", "P", "Q"}:
             return f"word {min(set(values) - {'F', 'P', 'Q'})} has no place here"
-        for group in ({90.0, 91.0}, {93.0, 94.0, 95.0}, {61.0, 61.1, 64.0}, {0.0, 4.0}):
-            if len(codes & group) > 1:
-                return "two codes of one modal group"
-        known = {0.0, 4.0, 61.0, 61.1, 64.0, 90.0, 91.0, 93.0, 94.0, 95.0}
+        groups = [dialect.groups.get(code) for code in codes]
+        if len(set(groups)) < len(groups):
+            return "two codes of one modal group"
+        known = {0, *dialect.feed_modes, *dialect.paths}
+        known |= {code for code in (900, 910) if dialect.groups.get(code) == "distance"}
         if not codes <= known:
-            return f"G{min(codes - known):g} has no place here"
-        if 4.0 in codes and (len(codes) > 1 or values != {"P": 0}):
-            return "only G4 P0 may stand here"
-        if ("P" in values or "Q" in values) and not codes & {4.0, 64.0}:
+            return f"G{min(codes - known) / 10:g} has no place here"
+        if ("P" in values or "Q" in values) and 640 not in codes:
             return "P or Q without G64"
-        self._set(codes, values)
+        self._set(codes, values, dialect)
         return None
 
-    def _set(self, codes: set[float], values: dict[str, Decimal]) -> None:
+    def _set(self, codes: set[int], values: dict[str, Decimal], dialect: Dialect) -> None:
         """Change what the words say, the feed mode before the feed."""
         for code in codes:
-            if code == 0.0:
+            if code == 0:
                 self.motion = 0
-            elif code in (90.0, 91.0):
-                self.distance = int(code)
-            elif code in (93.0, 94.0, 95.0) and int(code) != self.feed_mode:
-                self.feed_mode, self.feed = int(code), None
-            elif code in (61.0, 61.1, 64.0):
-                self.path = 62 if code == 61.1 else int(code)
-                self.p = float(values.get("P", math.nan)) if code == 64.0 else math.nan
-                self.q = float(values.get("Q", math.nan)) if code == 64.0 else math.nan
+            elif code in dialect.feed_modes:
+                mode = dialect.feed_modes[code]
+                if mode != self.feed_mode:
+                    self.feed_mode, self.feed = mode, None
+            elif code in (900, 910):
+                self.distance = code // 10
+            else:
+                self.path = dialect.paths[code]
+                self.p = float(values.get("P", math.nan)) if code == 640 else math.nan
+                self.q = float(values.get("Q", math.nan)) if code == 640 else math.nan
         if "F" in values:
             self.feed = values["F"]
 
@@ -149,9 +155,9 @@ def read_words(line: bytes) -> list[tuple[str, Decimal]] | None:
     return [(letter.decode(), Decimal(text.decode())) for letter, text in _WORD.findall(line)]
 
 
-def head_of(block: Block, text: bytes) -> tuple[bytes, bool]:
+def head_of(block: Block, text: bytes, axes: str) -> tuple[bytes, bool]:
     """Take axis words and stops out of a block; what is left, and whether it says anything."""
-    out = [w for w in block.words if w.letter in AXES or _is_stop(w.letter, w.value)]
+    out = [w for w in block.words if w.letter in axes or _is_stop(w.letter, w.value)]
     kept, at = [], 0
     for word in sorted(out, key=lambda w: w.begin):
         kept.append(text[at : word.begin])
@@ -178,14 +184,22 @@ class StreamReader:
     """Reads one replacement; what is wrong with its form goes to the findings."""
 
     def __init__(
-        self, window: Window, rapids: Rapids, i: int, text: bytes, newline: bytes, found: Findings
+        self,
+        window: Window,
+        rapids: Rapids,
+        i: int,
+        text: bytes,
+        newline: bytes,
+        found: Findings,
+        dialect: Dialect,
     ) -> None:
+        self.dialect = dialect
         self.window, self.rapids, self.i, self.text, self.found = window, rapids, i, text, found
         self.original_line = int(rapids.line[i])
         last = LINE_ENDS[int(rapids.terminator[i])]
         self.last_end = last
         self.line_end = last if last.endswith(b"\n") else newline
-        self.block = parse_block(text)
+        self.block = parse_block(text, dialect)
         self.modes = Modes.after(rapids, i)
 
     def complain(self, kind: Kind, problem: str, line: int | None = None) -> None:
@@ -228,22 +242,26 @@ class StreamReader:
 
     def _comment(self) -> None:
         line = self.peek()
-        if not line.startswith(b"(gcodejerk:"):
+        if not line.startswith((b"(gcodejerk:", b"; gcodejerk:")):
             return
         match = _COMMENT.fullmatch(line)
         words = b"".join(b"".join(w.text.split()) for w in self.block.words)
         named = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
-        if match is None or len(line) > COMMENT_LENGTH:
+        writing = self.dialect.writing
+        spelled = writing is not None and line.startswith(writing.comment[0] + b"gcodejerk:")
+        if match is None or len(line) > COMMENT_LENGTH or not spelled:
             self.complain(Kind.COMMENT, "comment is not one of ours, or too long")
         else:
-            body = match[1].replace(b" ", b"")
+            shown = match[1] or match[2] or b""
+            body = shown.replace(b" ", b"")
             cut = body.endswith(b"...") and len(body) > 3
             if not (named.startswith(body[:-3]) if cut else named == body):
-                self.complain(Kind.COMMENT, f"comment names {match[1]!r}, not the replaced block")
+                self.complain(Kind.COMMENT, f"comment names {shown!r}, not the replaced block")
         self.next()
 
     def _head(self) -> bool:
-        head, needed = head_of(self.block, self.text)
+        axes = AXES + "".join(self.dialect.increments)
+        head, needed = head_of(self.block, self.text, axes)
         line = self.peek()
         if line in (head, head.rstrip(b" \t")) and line.strip():
             self.next()
@@ -255,6 +273,10 @@ class StreamReader:
             )
         return not needed
 
+    def _apply(self, words: list[tuple[str, Decimal]]) -> str | None:
+        """Execute a line of modal words; what is wrong with it."""
+        return self.modes.apply(words, self.dialect)
+
     def _setup(self) -> bool:
         """Pass the lines in front of the points."""
         for _ in range(4):
@@ -262,7 +284,7 @@ class StreamReader:
             if _IS_POINT.match(line):
                 break
             words = read_words(line)
-            problem = "this is no line of a stream" if words is None else self.modes.apply(words)
+            problem = "this is no line of a stream" if words is None else self._apply(words)
             if problem:
                 shown = line[:60].decode("latin-1")
                 self.complain(Kind.FORM, f"{problem}: '{shown}'")
@@ -324,7 +346,7 @@ class StreamReader:
         stops = [(w.letter, w.value) for w in self.block.words if _is_stop(w.letter, w.value)]
         line = self.window.peek_line().rstrip(b"\r\n")
         words = read_words(line)
-        problem = "the modes are not restored" if words is None else self.modes.apply(words)
+        problem = "the modes are not restored" if words is None else self._apply(words)
         if problem:
             self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
             return False

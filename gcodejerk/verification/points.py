@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.machine import Machine
-from gcodejerk.nc import AXES, Rapids, parse_block
+from gcodejerk.nc import AXES, Dialect, Rapids, parse_block
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.form import Stream
@@ -56,6 +56,8 @@ class Paths:
     """Shape (k, 9); 0 for an axis that does not move."""
     unit: Array
     """mm per unit of length."""
+    speed: Array
+    """What the controller's own rapid keeps to; NaN where only the axes limit it. [mm/s]"""
 
     @property
     def count(self) -> Index:
@@ -71,17 +73,14 @@ class Paths:
 class Reader:
     """Turns streams into paths, and says which do not end where they must."""
 
-    def __init__(self, rapids: Rapids, machine: Machine, found: Findings) -> None:
+    def __init__(self, rapids: Rapids, machine: Machine, found: Findings, dialect: Dialect) -> None:
         self.rapids, self.machine, self.found = rapids, machine, found
+        self.dialect = dialect
         self.known = sum(1 << AXES.index(name) for name in machine.axis_names)
 
     def check_end(self, stream: Stream, block: bytes) -> bool:
         """Compare axes and end with the words of the block, exactly; whether the axes are right."""
-        wanted = {
-            w.letter: Decimal(b"".join(w.text[1:].split()).decode())
-            for w in parse_block(block).words
-            if w.letter in AXES
-        }
+        wanted = self._wanted(stream.rapid, block)
         line = stream.line + stream.text.count(b"\n") + len(stream.rest) - 1
         used = set(stream.letters).union(*stream.rest) - {"F"}
         if not used <= set(wanted):
@@ -103,6 +102,31 @@ class Reader:
                 problem = f"{what} {reached.get(axis, 'nothing')}, the block says {number}"
                 self._complain(Kind.END, stream, line, problem)
         return True
+
+    def _wanted(self, i: int, block: bytes) -> dict[str, Decimal]:
+        """What the words of the block say of each axis, as written."""
+        wanted = {}
+        for word in parse_block(block, self.dialect).words:
+            axis = self.dialect.increments.get(word.letter)
+            scaled = word.whole and word.value and self.dialect.whole_numbers == "machine"
+            if axis is not None:
+                wanted[axis] = self._programmed(i, axis, incremental=False)
+            elif word.letter in AXES and scaled:
+                increments = bool(self.rapids.incremental[i])
+                wanted[word.letter] = self._programmed(i, word.letter, increments)
+            elif word.letter in AXES:
+                wanted[word.letter] = Decimal(b"".join(word.text[1:].split()).decode())
+        return wanted
+
+    def _programmed(self, i: int, axis: str, incremental: bool) -> Decimal:
+        """Where an axis ends, or how far it goes, in the program's unit, to six decimals."""
+        k = AXES.index(axis)
+        value = self.rapids.target[i, k] - (self.rapids.start[i, k] if incremental else 0.0)
+        if self.rapids.inch[i] and LINEAR[k]:
+            value /= MM_PER_INCH
+        if self.rapids.diameter[i] and axis == "X":
+            value *= 2.0
+        return Decimal(repr(round(float(value), 6)))
 
     def _stands(self, i: int, axis: str) -> bool:
         k = AXES.index(axis)
@@ -154,6 +178,7 @@ class Reader:
             start=start,
             displacement=displacement,
             unit=unit,
+            speed=rapids.speed[index],
         )
 
 

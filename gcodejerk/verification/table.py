@@ -161,4 +161,5 @@ class TableReader:
             start=start,
             displacement=displacement,
             unit=np.ones(len(index)),
+            speed=self.rapids.speed[index],
         )

@@ -11,13 +11,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gcodejerk.nc import CERTAIN, REASONS, Program
+from gcodejerk.nc import CERTAIN, REASONS, Program, find_dialect
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.form import LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.source import Window, skip_common
 
-_STAMP = b"(gcodejerk stamp"
-_TRACES = (b"(gcodejerk: ", b"G1 ", b"G4 P0")
+_STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
+_TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400")
 """How a stream may begin."""
 
 
@@ -35,6 +35,7 @@ class Walk:
         self.rewritten = 0
         self.block = b""
         """Text of the block whose stream was found last."""
+        self.dialect = find_dialect(program.dialect)
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 
@@ -53,7 +54,13 @@ class Walk:
             else:
                 text = block[: end - begin]
                 reader = StreamReader(
-                    self.processed, rapids, i, text, self.program.newline, self.found
+                    self.processed,
+                    rapids,
+                    i,
+                    text,
+                    self.program.newline,
+                    self.found,
+                    self.dialect,
                 )
                 if not self._is_stream(reader, block, i):
                     return
@@ -110,11 +117,14 @@ class Walk:
     def _stamp(self) -> None:
         """Pass a stamp, which the original does not have here."""
         line = self.processed.peek_line()
-        if not line.startswith(_STAMP) or line == self.original.peek(len(line)):
+        if not line.startswith(_STAMPS) or line == self.original.peek(len(line)):
             return
         body = line.rstrip(b"\r\n")
         self._stamp_line = self.processed.line
-        proper = body.endswith(b")") and body.count(b"(") == body.count(b")") == 1
+        writing = self.dialect.writing
+        opens, closes = (b"", b"") if writing is None else writing.comment
+        proper = body.startswith(opens + b"gcodejerk") and body.endswith(closes)
+        proper = proper and not set(b"()") & set(body[len(opens) : len(body) - len(closes)])
         if not proper or not all(32 <= byte < 127 for byte in body):
             self._complain(Kind.STAMP, "stamp is not one comment of plain characters")
         if line[len(body) :] != self.program.newline:

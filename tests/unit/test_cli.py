@@ -178,7 +178,7 @@ def test_wrong_usage_is_status_2(run, folder, arguments, words):
         (["process", "part.nc", "-m", "vmc", "--controller", "linuxnc"], "did you mean 'linuxcnc'"),
         (["process", "part.nc", "-m", "vmc", "--profile", "best"], "there is no profile 'best'"),
         (["process", "part.nc", "-m", "vmc", "--profile", "zv"], "adds time to every rapid"),
-        (["process", "part.nc", "-m", "vmc", "--dialect", "fanuc"], "dialect"),
+        (["process", "part.nc", "-m", "vmc", "--dialect", "fanucc"], "did you mean fanuc?"),
         (["process", "part.nc", "-m", "vmc", "-o", "no/where.nc"], "cannot be written"),
         (["plan", "-m", "vmc", "Q=1"], "has no axis 'Q'"),
         (["plan", "-m", "vmc", "Z=1", "--time", "0.02"], "allow at least 0.03 s"),

@@ -1,0 +1,395 @@
+"""Streams as G1 blocks in the place of the rapid's block, spelled in the program's own dialect.
+
+The form is the one that was measured to follow a profile best (LinuxCNC 2.9, servo period 1 ms):
+blocks of 2 ms per-minute feed and continuous path, each with F = the larger of the profile's speeds
+at the block's two ends, since LinuxCNC reaches F at the end of a servo period, and ends a block
+with the smaller of its own F and the next one's. Blocks of 1 ms would be stretched by 2 %
+(TP_MIN_SEGMENT_CYCLES). How other controls follow such blocks was not measured: their emitters say
+so (`controls`).
+
+A replaced block becomes, each line only where it is needed, here in LinuxCNC's words::
+
+    (gcodejerk: G0 X10. Y5.)     names the original
+    N120 G0 M8 (go)              what else the block says, byte for byte
+    G4 P0                        the feed before ends here: a stream begins at rest
+    G94 G64                      modes of the stream that are not in force, or not stated
+    G1 X0.0012 Y0.0006 F38.4     the points, the last with the words of the block itself
+    G0 F600. G61                 the modal values that the program relies on
+    M0                           what takes effect after motion
+
+Rule: the last point repeats the block's own words, so the end is exactly the programmed one,
+whatever was rounded before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.emit.base import Form, Options, axis_steps, step_sizes
+from gcodejerk.emit.digits import Column, format_lines
+from gcodejerk.errors import EmitError
+from gcodejerk.machine import AXES, Machine
+from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
+from gcodejerk.nc.dialect import Writing, code_name
+from gcodejerk.plans import Plans
+from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
+from gcodejerk.units import MM_PER_INCH, per_minute
+
+BLOCK_TIME = 0.002
+"""Duration of a block, measured as the best; whole intervals, at least one [s]."""
+FEED_DECIMALS = 4
+"""Of F in units per minute."""
+COMMENT_LENGTH = 69
+"""Controllers and senders with short lines choke on longer comments."""
+STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)
+"""M words that take effect after the block's motion."""
+FEED_GROUPS = ("XYZ", "UVW", "ABC")
+"""F is the speed along the first of these groups that moves (LinuxCNC, G94)."""
+LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
+"""By `Rapids.terminator`."""
+
+
+class GcodeController:
+    """Writes G1 blocks of 2 ms with end-point speeds; a control adds its name and its facts."""
+
+    name = ""
+    api = 1
+    in_place = True
+    suffix = ""
+    forms: tuple[Form, ...] = ()
+
+    def stride(self, interval: float) -> int:
+        """About 2 ms."""
+        return max(1, round(BLOCK_TIME / interval))
+
+    def spelling(self, rapids: Rapids, machine: Machine) -> Spelling:
+        """Steps in the program's own unit; increments are counted from the start."""
+        mm, inch = step_sizes(machine, inch=False), step_sizes(machine, inch=True)
+        step = np.where(rapids.inch[:, np.newaxis], inch, mm)
+        origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
+        return Spelling(rapids.start, step, origin)
+
+    def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
+        """What a user of these streams has to know."""
+        return [
+            f"streams in this form were not measured on {self.name}: {form.note}"
+            for form in self.forms
+            if form.confidence == "unverified" and plans.planned.any()
+        ]
+
+    def header(self, machine: Machine) -> bytes:
+        """Nothing: the streams stand in the program."""
+        return b""
+
+    def render(
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        blocks: Sequence[bytes],
+        newline: bytes,
+        options: Options,
+    ) -> list[bytes]:
+        """Text of each move."""
+        moves = batch.moves
+        last_ends = [LINE_ENDS[t] for t in rapids.terminator[moves]]
+        # A lone CR ends no line for LinuxCNC; it can stand at the end of the file.
+        line_ends = [newline if end in (b"", b"\r") else end for end in last_ends]
+        dialect = options.dialect
+        parsed = [parse_block(block, dialect) for block in blocks]
+        feed = _feed(_path_speed(batch, rapids), batch, rapids)
+        points = self._points(batch, rapids, line_ends, feed)
+        out = []
+        for row, move in enumerate(moves):
+            frame = _Frame(rapids, int(move), parsed[row], blocks[row], dialect)
+            last = frame.last_point(points[row].before_end, int(feed[row, -1]))
+            follows = _follows_stream(batch.plans, rapids, int(move))
+            lines = [
+                *frame.head(options.comments),
+                *frame.setup(follows),
+                points[row].text,
+                last,
+                *frame.tail(),
+            ]
+            out.append(line_ends[row].join(line for line in lines if line) + last_ends[row])
+        return out
+
+    def _points(
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        line_ends: Sequence[bytes],
+        feed: NDArray[np.int64],
+    ) -> list[_Points]:
+        """The points of every move but its last, formatted for all moves of one kind together."""
+        moving = batch.plans.displacement[batch.moves] != 0.0
+        kinds: dict[_Kind, list[int]] = {}
+        for row, move in enumerate(batch.moves):
+            kind = _Kind(
+                axes=tuple(np.nonzero(moving[row])[0].tolist()),
+                fine=tuple(np.nonzero(batch.fine[row])[0].tolist()),
+                inch=bool(rapids.inch[move]),
+                incremental=bool(rapids.incremental[move]),
+                diameter=bool(rapids.diameter[move]),
+                line_end=line_ends[row],
+            )
+            kinds.setdefault(kind, []).append(row)
+        out: list[_Points] = [_Points(b"", {})] * len(batch)
+        for kind, rows in kinds.items():
+            for row, points in zip(
+                rows, _format_kind(batch, np.array(rows), kind, feed), strict=True
+            ):
+                out[row] = points
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """What moves have in common whose points can be formatted together."""
+
+    axes: tuple[int, ...]
+    fine: tuple[int, ...]
+    inch: bool
+    incremental: bool
+    diameter: bool
+    line_end: bytes
+
+
+def _format_kind(
+    batch: Batch, rows: NDArray[np.int64], kind: _Kind, feed: NDArray[np.int64]
+) -> list[_Points]:
+    """Points of rows of one kind; the last point of each is left to its block's own words."""
+    whole_step, decimals = axis_steps(batch.plans.machine, kind.inch)
+    knots = batch.grid.knots[rows]
+    inner = (knots > 0) & (knots < batch.grid.counts[rows, np.newaxis])
+    counts = np.count_nonzero(inner, axis=1)
+    columns: list[Column] = []
+    reached: dict[int, tuple[NDArray[np.int64], int]] = {}
+    for axis in kind.axes:
+        scale = int(whole_step[axis]) * (2 if kind.diameter and AXES[axis] == "X" else 1)
+        places = int(decimals[axis]) + (FINE_DECIMALS if axis in kind.fine else 0)
+        if not places:  # a decimal point, always: X100 is 0.1 mm for some controls
+            scale, places = scale * 10, 1
+        values = batch.whole[axis][rows] * scale
+        reached[axis] = (values[:, -2], places)
+        if kind.incremental:
+            values = np.diff(np.where(knots > 0, values, 0), axis=1, prepend=0)
+        prefix = b" " if columns else b"G1 "
+        columns.append(Column(prefix + AXES[axis].encode(), values[inner], places))
+    columns.append(Column(b" F", feed[rows][inner], FEED_DECIMALS))
+    text, ends = format_lines(columns, kind.line_end)
+    at = np.concatenate([[0], ends])[np.concatenate([[0], np.cumsum(counts)])]
+    return [
+        _Points(
+            text[at[k] : at[k + 1]].removesuffix(kind.line_end),
+            {
+                axis: Decimal(int(value[k])).scaleb(-places) if counts[k] else Decimal(0)
+                for axis, (value, places) in reached.items()
+            },
+        )
+        for k in range(len(rows))
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Points:
+    """The text of a move's points but the last, and how far each axis is then from the origin."""
+
+    text: bytes
+    before_end: dict[int, Decimal]
+
+
+class _Frame:
+    """The lines around a move's points: what its block says besides, and what it relies on."""
+
+    def __init__(
+        self, rapids: Rapids, move: int, block: Block, text: bytes, dialect: Dialect
+    ) -> None:
+        self.rapids, self.move, self.block, self.text = rapids, move, block, text
+        self.dialect, self.writing = dialect, writing_of(dialect)
+        self.axis_words = [w for w in block.words if w.letter in AXES or w.letter in self.turned]
+        self.stops = [w for w in block.words if w.letter == "M" and w.value in STOPS]
+
+    @property
+    def turned(self) -> Mapping[str, str]:
+        """Addresses of increments, with their axes."""
+        return self.dialect.increments
+
+    def head(self, comments: bool) -> list[bytes]:
+        """A comment that names the block, and the block without its axis words."""
+        out = [self._comment()] if comments else []
+        rest, at = [], 0
+        for word in sorted([*self.axis_words, *self.stops], key=lambda w: w.begin):
+            rest.append(self.text[at : word.begin])
+            at = word.end
+        rest.append(self.text[at:])
+        others = [w for w in self.block.words if w not in self.axis_words and w not in self.stops]
+        if self.block.comments or any(not (w.letter == "G" and w.value == 0.0) for w in others):
+            out.append(b"".join(rest).rstrip(b" \t"))
+        return out
+
+    def _comment(self) -> bytes:
+        """`(gcodejerk: ...)` with the words of the block, in at most COMMENT_LENGTH characters."""
+        opens, closes = self.writing.comment
+        words = b" ".join(b"".join(w.text.split()) for w in self.block.words)
+        plain = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
+        room = COMMENT_LENGTH - len(opens + b"gcodejerk: " + closes)
+        if len(plain) > room:
+            plain = plain[: room - 3] + b"..."
+        return opens + b"gcodejerk: " + plain + closes
+
+    def setup(self, follows: bool) -> list[bytes]:
+        """An exact stop, unless the machine rests already, and the modes of the stream."""
+        rapids, move, dialect = self.rapids, self.move, self.dialect
+        stands = follows or rapids.path[move] in (61, 62)
+        codes: list[int | None] = []
+        if not rapids.distance_stated[move] and dialect.groups.get(900) == "distance":
+            codes.append(900)
+        if rapids.feed_mode[move] != 94 or not rapids.feed_mode_stated[move]:
+            codes.append(dialect.feed_code(94))
+        if rapids.path[move] in (61, 62):
+            codes.append(dialect.path_code(64))
+        words = b" ".join(code_name(code) for code in codes if code is not None)
+        return ([] if stands else [self.writing.standstill]) + ([words] if words else [])
+
+    def last_point(self, before_end: dict[int, Decimal], feed: int) -> bytes:
+        """The last point: the block's own words, or what is left of its increments."""
+        words = [self._last_word(word, before_end) for word in self.axis_words]
+        words.append(b"F" + _plain(Decimal(feed).scaleb(-FEED_DECIMALS)))
+        return b" ".join([b"G1", *words])
+
+    def _last_word(self, word: Word, before_end: dict[int, Decimal]) -> bytes:
+        axis = self.turned.get(word.letter)
+        if axis is not None:
+            # The points are absolute: so is the end of an increment.
+            return axis.encode() + _plain(programmed_end(self.rapids, self.move, axis, False))
+        incremental = bool(self.rapids.incremental[self.move])
+        number = Decimal(b"".join(word.text[1:].split()).decode())
+        if word.whole and number and self.dialect.whole_numbers == "machine":
+            number = programmed_end(self.rapids, self.move, word.letter, incremental)
+            if not incremental:
+                return word.letter.encode() + _plain(number)
+        if not incremental:
+            return b"".join(word.text.split()).upper()
+        left = number - before_end.get(AXES.index(word.letter), Decimal(0))
+        return word.letter.encode() + _plain(left)
+
+    def tail(self) -> list[bytes]:
+        """Restore the modal values, then stop where the block stops."""
+        rapids, move, dialect = self.rapids, self.move, self.dialect
+        words = [b"G0"]
+        mode, path = int(rapids.feed_mode[move]), int(rapids.path[move])
+        code = dialect.feed_code(mode)
+        if mode != 94 and code is not None:
+            words.append(code_name(code))
+        if mode != 93 and not np.isnan(rapids.feed[move]):
+            feed = _plain(Decimal(repr(float(rapids.feed[move]))))
+            words.append(b"F" + (feed.rstrip(b"0").rstrip(b".") if self._whole() else feed))
+        code = dialect.path_code(path)
+        if path in (61, 62) and code is not None:
+            words.append(code_name(code))
+        stops = [b" ".join(b"".join(w.text.split()) for w in self.stops)] if self.stops else []
+        return [b" ".join(words), *stops]
+
+    def _whole(self) -> bool:
+        """Whether F has to go without a decimal point, as it was written."""
+        return bool(self.rapids.feed_whole[self.move])
+
+
+def writing_of(dialect: Dialect) -> Writing:
+    """How streams are spelled in a dialect.
+
+    Raises
+    ------
+    EmitError
+        No form is known.
+    """
+    if dialect.writing is None:
+        raise EmitError(
+            f"no form of a stream is known for the dialect {dialect.name}",
+            "use --controller csv, which writes the streams as a table",
+        )
+    return dialect.writing
+
+
+def programmed_end(rapids: Rapids, move: int, axis: str, incremental: bool) -> Decimal:
+    """Where an axis ends, or how far it goes, as it is programmed, to six decimals.
+
+    Parameters
+    ----------
+    rapids : Rapids
+        The program's.
+    move : int
+        Which of them.
+    axis : str
+        Its letter.
+    incremental : bool
+        How far, instead of where.
+
+    Returns
+    -------
+    Decimal
+        In the program's unit; a diameter where the program has diameters.
+    """
+    k = AXES.index(axis)
+    end = float(rapids.target[move, k]) - (float(rapids.start[move, k]) if incremental else 0.0)
+    if rapids.inch[move] and axis not in "ABC":
+        end /= MM_PER_INCH
+    if rapids.diameter[move] and axis == "X":
+        end *= 2.0
+    return Decimal(repr(round(end, 6)))
+
+
+def _plain(number: Decimal) -> bytes:
+    """A number without exponent, with a decimal point, and never minus zero."""
+    text = format(number if number else abs(number), "f")
+    return (text if "." in text else text + ".").encode()
+
+
+def _follows_stream(plans: Plans, rapids: Rapids, move: int) -> bool:
+    """Whether the block directly before is a stream too: the machine then rests."""
+    before = move - 1
+    return bool(
+        before >= 0 and plans.planned[before] and rapids.line[before] + 1 == rapids.line[move]
+    )
+
+
+def _path_speed(batch: Batch, rapids: Rapids) -> NDArray[np.float64]:
+    """Speed at every knot as F means it, in the program's own unit per second."""
+    out = np.zeros(batch.grid.knots.shape)
+    moving = batch.plans.displacement[batch.moves] != 0.0
+    inch = rapids.inch[batch.moves]
+    left = np.ones(len(batch), dtype=bool)
+    for group in FEED_GROUPS:
+        axes = [AXES.index(a) for a in group]
+        chosen = left & moving[:, axes].any(axis=1)
+        square = np.zeros(out.shape)
+        for axis in axes:
+            if axis in batch.velocity:
+                square += batch.velocity[axis] ** 2
+        unit = np.where(inch & (group != "ABC"), MM_PER_INCH, 1.0)[:, np.newaxis]
+        out = np.where(chosen[:, np.newaxis], np.sqrt(square) / unit, out)
+        left &= ~chosen
+    return out
+
+
+def _feed(speed: NDArray[np.float64], batch: Batch, rapids: Rapids) -> NDArray[np.int64]:
+    """F of the block that ends at each knot, in whole units of its last decimal."""
+    ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
+    # A stream of one block is at rest at both ends: only its mean speed is left.
+    single = batch.grid.blocks == 1
+    if single.any():
+        moves = batch.moves[single]
+        linear = (batch.plans.displacement[moves][:, :3] != 0.0).any(axis=1)
+        unit = np.where(rapids.inch[moves] & linear, MM_PER_INCH, 1.0)
+        time = batch.grid.counts[single] * batch.grid.interval
+        ends[single, -1] = batch.plans.length[moves] / time / unit
+    # F0 is an error in LinuxCNC; a block that hardly moves still has its smallest F.
+    feed: NDArray[np.int64] = np.maximum(
+        np.rint(per_minute(1.0) * 10.0**FEED_DECIMALS * ends), 1.0
+    ).astype(np.int64)
+    return feed

@@ -1,0 +1,155 @@
+"""Which dialect a program is written in, from its text (``dialect: auto``).
+
+Rule 1: evidence is what only one dialect has, or what a program says of itself: the name of a
+post-processor in a comment counts most. What several dialects share is no evidence.
+
+Rule 2: when the evidence is not for one dialect alone, or there is none, nothing is chosen. A wrong
+dialect moves the tool elsewhere: ``X100`` is 100 mm here and 0.1 mm there.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from gcodejerk.errors import Place, ProgramError
+from gcodejerk.nc.dialect import Dialect
+from gcodejerk.nc.dialects import AUTO, DIALECTS
+
+HEAD = 64 * 1024
+"""Bytes at the top of a program that are looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Text that speaks for a dialect, and why."""
+
+    dialect: str
+    pattern: re.Pattern[bytes]
+    why: str
+    sure: bool = True
+    """It settles the matter unless another dialect's evidence does too; else it only hints."""
+
+
+def _code(dialect: str, pattern: bytes, why: str, sure: bool = True) -> Evidence:
+    """Evidence in code, comments left out."""
+    return Evidence(dialect, re.compile(pattern, re.IGNORECASE | re.MULTILINE), why, sure)
+
+
+_IN_COMMENTS = (
+    ("linuxcnc", rb"\blinuxcnc|\bemc2\b|\baxis\.ngc"),
+    ("fanuc", rb"\bfanuc"),
+    ("haas", rb"\bhaas\b"),
+    ("siemens", rb"\bsinumerik|\bsiemens\b|\b840d|\b828d"),
+    ("grbl", rb"\bgrbl"),
+    ("mach", rb"\bmach ?[34]|\buccnc\b|\buc-cnc\b|\bcentroid_post\b"),
+    ("marlin", rb"\bmarlin"),
+    ("klipper", rb"\bklipper\b"),
+)
+COMMENTS = tuple(
+    Evidence(name, re.compile(pattern, re.IGNORECASE), f"a comment names {name}")
+    for name, pattern in _IN_COMMENTS
+)
+CODE = (
+    _code("siemens", rb"^%_N_", "a program name %_N_"),
+    _code("siemens", rb"\b(MSG|MCALL|CYCLE\d+|HOLES[12]|POCKET\d)\b", "a Siemens cycle or MSG"),
+    _code("siemens", rb"\b(DIAMON|DIAMOF|DIAM90|TRANS|ATRANS|AROT|GOTOF|GOTOB|SUPA|LIMS)\b",
+          "a Siemens word"),
+    _code("siemens", rb"^\s*DEF\s+(REAL|INT|BOOL|STRING)", "a Siemens declaration"),
+    _code("siemens", rb"\bG(64[1-5]|50[5-9]|5[1-9]\d)\b", "a Siemens G code"),
+    _code("heidenhain-iso", rb"^\s*%\S+\s+G7[01]\s*\*", "a program head %NAME G71 *"),
+    _code("heidenhain-iso", rb"^\s*N?\d*\s*G[0-9].*\*\s*$", "blocks that end with *", sure=False),
+    _code("linuxcnc", rb"^\s*(N\d+\s*)?o\s*(<[^>]+>|\d+|\[[^\]]*\])\s*"
+          rb"(sub|endsub|call|if|else|endif|while|endwhile|do|repeat|endrepeat|return)\b",
+          "O-words of LinuxCNC"),
+    _code("linuxcnc", rb"#<[^>]+>", "a variable with a name"),
+    _code("linuxcnc", rb"\bG(5\.2|5\.3|33\.1|38\.[2-5]|43\.2|92\.3)(?!\d)", "a LinuxCNC G code"),
+    _code("linuxcnc", rb"\bM6[2-8]\b", "M62 to M68"),
+    _code("fanuc", rb"\bG(5\.1|54\.1|68\.2|43\.4|43\.5|10\.6)(?!\d)", "a Fanuc G code"),
+    _code("fanuc", rb"\b(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)", "Fanuc macro flow", sure=False),
+    _code("haas", rb"\bG(187|103|150|154)(?!\d)", "a Haas G code"),
+    _code("haas", rb"\bM97\b", "M97"),
+    _code("fanuc-lathe-a", rb"\bG28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
+    _code("fanuc-lathe-a", rb"\bG7[0-6]\s*(P\d+\s*Q|U)", "a turning cycle"),
+    _code("fanuc-lathe-a", rb"\bG50\s*S\d", "G50 S of lathes"),
+    _code("grbl", rb"^\s*\$(\$|#|G|I|N|X|H|C|J=|\d+=)", "a $ command of grbl"),
+    _code("marlin", rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False),
+    _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
+          rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
+)  # fmt: skip
+_O_PROGRAM = re.compile(rb"^\s*[O:]\d+", re.MULTILINE)
+_KLARTEXT = re.compile(rb"^\s*\d+\s+BEGIN\s+PGM\b", re.MULTILINE)
+_COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
+
+
+def detect_dialect(head: bytes, name: str) -> tuple[Dialect, str]:
+    r"""Find the dialect of a program.
+
+    Parameters
+    ----------
+    head : bytes
+        The beginning of the program.
+    name : str
+        For messages.
+
+    Returns
+    -------
+    dialect : Dialect
+        The only one that the text speaks for.
+    why : str
+        What was found.
+
+    Raises
+    ------
+    ProgramError
+        Nothing speaks for one dialect, or several do.
+
+    Examples
+    --------
+    >>> detect_dialect(b"o100 sub\nG0 X1\no100 endsub\n", "part.ngc")[0].name
+    'linuxcnc'
+    """
+    head = head[:HEAD]
+    if _KLARTEXT.search(head):
+        raise ProgramError(
+            "this is Heidenhain Klartext, which is not read",
+            "post the program as DIN/ISO (dialect heidenhain-iso)",
+            Place(name, 1),
+        )
+    comments = b"\n".join(_COMMENT.findall(head))
+    code = _COMMENT.sub(b" ", head)
+    found: dict[str, str] = {}
+    hints: dict[str, str] = {}
+    for evidence in (*COMMENTS, *CODE):
+        match = evidence.pattern.search(comments if evidence in COMMENTS else code)
+        if match:
+            line = head.count(b"\n", 0, max(head.find(match[0]), 0)) + 1
+            into = found if evidence.sure else hints
+            into.setdefault(evidence.dialect, f"{evidence.why} (line {line})")
+    _prefer(found, code)
+    chosen = found or hints
+    if len(chosen) == 1:
+        ((dialect, why),) = chosen.items()
+        return DIALECTS[dialect], why
+    if not chosen:
+        raise ProgramError(
+            f"the dialect cannot be told from the program (dialect: {AUTO})",
+            f"state it: --dialect, or the machine file's dialect; one of {', '.join(DIALECTS)}",
+            Place(name),
+        )
+    seen = "; ".join(f"{dialect}: {why}" for dialect, why in sorted(chosen.items()))
+    raise ProgramError(
+        f"the program could be of several dialects ({seen})",
+        "state it: --dialect, or the machine file's dialect",
+        Place(name),
+    )
+
+
+def _prefer(found: dict[str, str], code: bytes) -> None:
+    """Take out what the evidence of a more special dialect explains as well."""
+    if "haas" in found or "fanuc-lathe-a" in found:
+        found.pop("fanuc", None)  # they speak Fanuc's language with words of their own
+    if "fanuc" in found and re.search(rb"\bG50\s*S\d|\bG28\s*U", code):
+        found["fanuc-lathe-a"] = found.pop("fanuc")
+    if "linuxcnc" in found and "mach" in found and _O_PROGRAM.search(code):
+        found.pop("mach")

@@ -1,0 +1,235 @@
+"""Fanuc 0i, 16i, 30i: mills, and lathes with the G-code systems A and B.
+
+Sources: the modal groups of the 30i list at cncschool.pl; B-63944EN/02 p. 48 (path of G0); the
+sample programs of NC-PB/gEdit (comments that do not close, ``N120/G0``). What a parameter decides
+is unknown until the machine file says it: whether ``X100`` is 100 mm (3401), the modes after
+power-on that 3402 chooses (G0 or G1, plane, G90 or G91), and the path of G0 (1401, `positioning`).
+A machine builder adds M codes of his own, which may be macros that move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gcodejerk.nc.dialect import Dialect, Drilling, Effect, Text, Writing, grouped
+
+CYCLES = frozenset({730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890})
+SYSTEMS = (540, 550, 560, 570, 580, 590)
+_JUMPS = ("GOTO", "IF", "THEN", "WHILE", "DO", "END", "SETVN", "POPEN", "PCLOS", "DPRNT", "BPRNT")
+
+_EFFECTS: dict[int, Effect] = {
+    40: "words",  # G4 X1.5 is a dwell of 1.5 s
+    **dict.fromkeys((270, 280, 300), "return"),
+    290: "home",
+    310: "home",  # skip: ends where a probe answers
+    600: "home",  # single-direction positioning overshoots
+    **dict.fromkeys(SYSTEMS, "system"),
+    541: "numbered system",
+    **dict.fromkeys((430, 440, 490), "length"),
+    **dict.fromkeys((434, 435), "frames"),
+    100: "frames",
+    520: "frames",
+    530: "machine",
+    920: "set",
+    921: "frames",
+    650: "flow",
+    **dict.fromkeys((660, 661), "modal cycle"),
+}
+
+FANUC = Dialect(
+    name="fanuc",
+    title="Fanuc 0i, 16i, 30i mills",
+    sources=(
+        "30i G-code list, cncschool.pl",
+        "B-63944EN/02 p. 48",
+        "sample programs, github.com/NC-PB/gEdit",
+    ),
+    text=Text(
+        parentheses="open comment",
+        semicolon="end",
+        delete="numbered",
+        o_word="program",
+        percent="lone",
+        variables="#",
+        keywords=_JUMPS,
+        blanks="between",
+        line_limit=512,
+    ),
+    groups=grouped(
+        {
+            "motion": (0, 10, 20, 30, 330),
+            "plane": (170, 180, 190),
+            "distance": (900, 910),
+            "feed mode": (930, 940, 950),
+            "units": (200, 210),
+            "compensation": (400, 410, 420),
+            "tool length": (430, 434, 435, 440, 490),
+            "cycle": (800, *sorted(CYCLES)),
+            "retract": (980, 990),
+            "system": (*SYSTEMS, 541),
+            "path": (610, 620, 630, 640),
+            "spindle mode": (960, 970),
+            "stroke limit": (220, 230),
+            "scaling": (500, 510),
+            "mirror": (501, 511),
+            "rotation": (680, 682, 690),
+            "polar": (150, 160),
+            "polar interpolation": (121, 131),
+            "cylinder": (71,),
+            "look-ahead": (51, 80),
+            "modal macro": (660, 661, 670),
+            "non-modal": (
+                *(40, 50, 90, 100, 110, 270, 280, 290, 300, 310, 520, 530, 600, 650),
+                *(920, 921),
+            ),
+        }
+    ),
+    m_groups=grouped(
+        {
+            "stop": (0, 1, 2, 30, 98, 99),
+            "tool": (6,),
+            "spindle": (3, 4, 5, 19, 29),
+            "coolant": (7, 8, 9),
+        }
+    ),
+    # Marked as the state after power-on in the list of G codes; what 3402 chooses is not here.
+    defaults={
+        "feed mode": 940,
+        "compensation": 400,
+        "retract": 980,
+        "system": 540,
+        "path": 640,
+    },
+    effects=_EFFECTS,
+    letters="FSTXYZABCUVWDEHIJKLPQR",
+    paths={610: 61, 640: 64},
+    transforms={
+        **dict.fromkeys((680, 682), ("rotation", True)),
+        690: ("rotation", False),
+        **{510: ("scaling", True), 500: ("scaling", False)},
+        **{511: ("mirror", True), 501: ("mirror", False)},
+        **{160: ("polar", True), 150: ("polar", False)},
+        **{121: ("polar interpolation", True), 131: ("polar interpolation", False)},
+        71: ("cylinder", True),
+        **dict.fromkeys((434, 435), ("tool centre point", True)),
+        490: ("tool centre point", False),
+        670: ("modal macro", False),
+    },
+    whole_numbers="machine",
+    other_m="positions",
+    drilling=Drilling(CYCLES, own_group=True, repeats="KL", missing="unknown"),
+    harmless=frozenset(
+        {0, 90, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 930, 940, 950, 960, 970}
+        | {980, 990, 800, 150, 500, 501, 690, 131, 670, 220, 230, 51, 80}
+    ),
+    quick=True,
+    writing=Writing((b"(", b")"), b"G4 P1"),
+)
+
+# A lathe: X is a diameter (`diameter: true` on the axis). T selects offsets, so it changes the
+# frame. G71 to G73 run the blocks from N(P) to N(Q) by themselves. An A word is an angle of direct
+# drawing there, from which the control computes the end: not a letter here.
+_LATHE_CYCLES = (700, 710, 720, 730, 740, 750, 760)
+_LATHE_EFFECTS: dict[int, Effect] = {
+    40: "words",
+    **dict.fromkeys((270, 280, 300), "return"),
+    **dict.fromkeys((290, 310), "home"),
+    **dict.fromkeys(SYSTEMS, "system"),
+    **dict.fromkeys((100, 520), "frames"),
+    530: "machine",
+    650: "flow",
+    660: "modal cycle",
+    **dict.fromkeys(_LATHE_CYCLES, "cycle"),
+    **dict.fromkeys((830, 840, 850, 870, 880, 890), "cycle"),
+    **dict.fromkeys((680, 681), "transform"),
+}
+_LATHE_GROUPS = {
+    "plane": (170, 180, 190),
+    "units": (200, 210),
+    "compensation": (400, 410, 420),
+    "system": SYSTEMS,
+    "spindle mode": (960, 970),
+    "stroke limit": (220, 230),
+    "path": (610, 640),
+    "polar interpolation": (121, 131, 1120, 1130),
+    "cylinder": (71,),
+    "balance": (680, 681, 690),
+    "modal macro": (660, 670),
+    "speed check": (250, 260),
+    "drilling": (800, 830, 840, 850, 870, 880, 890),
+}
+_LATHE = replace(
+    FANUC,
+    effects=_LATHE_EFFECTS,
+    letters="FSTXYZCDEHIJKLPQRUVW",
+    transforms={
+        **dict.fromkeys((121, 1120), ("polar interpolation", True)),
+        **dict.fromkeys((131, 1130), ("polar interpolation", False)),
+        71: ("cylinder", True),
+        670: ("modal macro", False),
+    },
+    tool_frame=frozenset("T"),
+    contours=frozenset({710, 720, 730}),
+    drilling=Drilling(),
+    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9}),
+)
+
+FANUC_LATHE_A = replace(
+    _LATHE,
+    name="fanuc-lathe-a",
+    title="Fanuc lathes, G-code system A",
+    # U, V, W and H are increments; G90, G92 and G94 are turning cycles, G98 and G99 feed modes.
+    groups=grouped(
+        {
+            **_LATHE_GROUPS,
+            "motion": (0, 10, 20, 30, 320, 340, 900, 920, 940),
+            "feed mode": (980, 990),
+            "non-modal": (
+                *(40, 100, 110, 270, 280, 290, 300, 310, 500, 520, 530, 650),
+                *_LATHE_CYCLES,
+            ),
+        }
+    ),
+    effects={**_LATHE_EFFECTS, 500: "set"},
+    defaults={
+        "plane": 180,
+        "distance": 900,
+        "compensation": 400,
+        "system": 540,
+        "path": 640,
+    },
+    feed_modes={980: 94, 990: 95},
+    increments={"U": "X", "V": "Y", "W": "Z", "H": "C"},
+    redrawn=frozenset({320, 340, 900, 920, 940}),
+    harmless=frozenset(
+        {0, 180, 200, 210, 400, 610, 640, 960, 970, 980, 990, 131, 1130, 670, 220, 230, 250, 260}
+    ),
+)
+
+FANUC_LATHE_B = replace(
+    _LATHE,
+    name="fanuc-lathe-b",
+    title="Fanuc lathes, G-code system B",
+    groups=grouped(
+        {
+            **_LATHE_GROUPS,
+            "motion": (0, 10, 20, 30, 330, 340, 770, 780, 790),
+            "distance": (900, 910),
+            "feed mode": (940, 950),
+            "retract": (980, 990),
+            "non-modal": (
+                *(40, 100, 110, 270, 280, 290, 300, 310, 520, 530, 650, 920),
+                *_LATHE_CYCLES,
+            ),
+        }
+    ),
+    effects={**_LATHE_EFFECTS, 920: "set"},
+    defaults={"plane": 180, "compensation": 400, "system": 540, "path": 640},
+    feed_modes={940: 94, 950: 95},
+    letters="FSTXYZCDEHIJKLPQR",
+    redrawn=frozenset({330, 340, 770, 780, 790}),
+    harmless=frozenset(
+        {0, 180, 200, 210, 400, 610, 640, 900, 910, 940, 950, 960, 970, 980, 990}
+        | {131, 1130, 670, 220, 230, 250, 260}
+    ),
+)

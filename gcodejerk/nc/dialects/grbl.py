@@ -1,0 +1,87 @@
+"""grbl 1.1, and what follows its language (grblHAL, FluidNC).
+
+Source: gnea/grbl, grbl/gcode.c and grbl/protocol.c. Blanks and control characters are thrown away,
+so is ``/`` (the block runs), a parenthesis that does not close ends with its line, and ``%``, O and
+M6 are errors. M2 leaves G1, power-on G0: which of the two is in force at the start is not known.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialect import Dialect, Text, Writing, code_names, grouped
+
+SYSTEMS = (540, 550, 560, 570, 580, 590)
+
+GRBL = Dialect(
+    name="grbl",
+    title="grbl 1.1, grblHAL, FluidNC",
+    sources=("gnea/grbl: grbl/gcode.c, grbl/protocol.c",),
+    text=Text(
+        parentheses="open comment",
+        semicolon="comment",
+        delete="ignored",
+        o_word="error",
+        percent="error",
+        variables="none",
+        blanks="anywhere",
+        # 80 characters count, comments and blanks not among them
+        line_limit=256,
+    ),
+    groups=grouped(
+        {
+            "motion": (0, 10, 20, 30, 382, 383, 384, 385, 800),
+            "plane": (170, 180, 190),
+            "distance": (900, 910),
+            "arc distance": (911,),
+            "feed mode": (930, 940),
+            "units": (200, 210),
+            "compensation": (400,),
+            "tool length": (431, 490),
+            "system": SYSTEMS,
+            "path": (610,),
+            "non-modal": (40, 100, 280, 281, 300, 301, 530, 920, 921),
+        }
+    ),
+    m_groups=grouped(
+        {
+            "stop": (0, 1, 2, 30),
+            "spindle": (3, 4, 5),
+            "coolant": (7, 8, 9),
+            "override": (56,),
+        }
+    ),
+    defaults={
+        "plane": 170,
+        "distance": 900,
+        "arc distance": 911,
+        "feed mode": 940,
+        "compensation": 400,
+        "system": 540,
+        # G61 is the only path mode, and is no exact stop: blocks blend as far as $11 allows.
+        "path": 610,
+    },
+    effects={
+        **dict.fromkeys((280, 300), "return"),
+        **dict.fromkeys((281, 301), "store"),
+        **dict.fromkeys(SYSTEMS, "system"),
+        **dict.fromkeys((431, 490), "length"),
+        100: "table",
+        530: "machine",
+        920: "set",
+        921: "clear",
+    },
+    letters="FSTXYZABCIJKLPR",
+    uses={
+        "I": code_names("G2", "G3"),
+        "J": code_names("G2", "G3"),
+        "K": code_names("G2", "G3"),
+        "L": code_names("G10"),
+        "P": code_names("G4", "G10"),
+        "R": code_names("G2", "G3"),
+    },
+    strict=True,
+    paths={610: 64},
+    redrawn=frozenset({382, 383, 384, 385}),
+    harmless=frozenset({0, 40, 170, 180, 190, 200, 210, 400, 610, 900, 910, 911, 930, 940}),
+    quick=True,
+    writing=Writing((b"(", b")"), b"G4 P0"),
+)

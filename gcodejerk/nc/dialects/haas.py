@@ -1,0 +1,57 @@
+"""Haas mills (NGC and before): Fanuc's language with Haas's own codes and exceptions.
+
+Sources: Haas, "Help with the decimal points" (setting 162; ``X5`` is 0.0005 inch without it);
+gcodes.net, G28 (without axes it moves all of them; it cancels the tool length); VF 96-8000 p. 182
+(positions between holes are rapids). Whether G0 goes straight is a setting: `positioning`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gcodejerk.nc.dialect import grouped
+from gcodejerk.nc.dialects.fanuc import FANUC
+
+_EXTRA_SYSTEMS = tuple(range(1100, 1300, 10))
+_PATTERNS = (120, 130, 470, 700, 710, 720, 1500)
+"""Pockets, engraving, bolt circles: they move, and end where the manual of the version says."""
+
+HAAS = replace(
+    FANUC,
+    name="haas",
+    title="Haas mills",
+    sources=(
+        "Haas: Help with the decimal points",
+        "gcodes.net: Haas G28",
+        "Haas VF operator's manual 96-8000 p. 182",
+    ),
+    groups={
+        **{code: group for code, group in FANUC.groups.items() if code not in (120, 130)},
+        **grouped(
+            {
+                "non-modal patterns": _PATTERNS,
+                "system": (*_EXTRA_SYSTEMS, 1540),
+                "cylinder": (1070,),
+                "probe": (310, 350, 360, 370, 1360),
+                "smoothness": (1030, 1870),
+                "tool length": (1410, 1430, 2340),
+            }
+        ),
+    },
+    effects={
+        **FANUC.effects,
+        **dict.fromkeys(_PATTERNS, "cycle"),
+        **dict.fromkeys(_EXTRA_SYSTEMS, "system"),
+        1540: "numbered system",
+        **dict.fromkeys((310, 350, 360, 370, 1360), "home"),
+        **dict.fromkeys((1410, 1430, 2340), "frames"),
+    },
+    transforms={
+        **FANUC.transforms,
+        1070: ("cylinder", True),
+        **dict.fromkeys((1410, 1430, 2340), ("tool centre point", True)),
+    },
+    m_groups={**FANUC.m_groups, 97: "stop", 96: "stop"},
+    tool_cancelled_by_return=True,
+    harmless=FANUC.harmless | {1030, 1870},
+)

@@ -1,0 +1,72 @@
+"""Heidenhain iTNC 530, DIN/ISO (files ``.I``); Klartext is another language and is not read.
+
+Source: iTNC 530 ISO manual p. 211. Much of the table is general knowledge that no source here
+confirmed; it is used to leave rapids alone, not to rewrite them: cycles, datum shifts, polar moves
+and machine coordinates make everything behind them unknown. In the program's head G71 means mm.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialect import Dialect, Text, grouped
+
+_CYCLES = (
+    *(740, 750, 760, 770, 780, 830, 840, 850, 860, 1200, 1210, 1220, 1230, 1240, 1250, 1270),
+    *range(2000, 2200, 10),
+    *(2300, 2310, 2320, 2400, 2500, 2510, 2520, 2530, 2560, 2570, 2620, 2640, 2650, 2670),
+)
+_FRAMES = (70, 280, 360, 530, 540, 720, 730, 800, 2470)
+
+HEIDENHAIN_ISO = Dialect(
+    name="heidenhain-iso",
+    title="Heidenhain iTNC 530, DIN/ISO",
+    sources=("iTNC 530 ISO manual p. 211",),
+    text=Text(
+        parentheses="code",
+        semicolon="comment",
+        delete="first",
+        o_word="error",
+        percent="named",
+        names=False,
+        equals=True,
+        variables="Q",
+        blanks="between",
+        end=b"*",
+    ),
+    groups=grouped(
+        {
+            "motion": (0, 10, 20, 30, 50, 60, 70, 100, 110, 120, 130, 150, 160),
+            "plane": (170, 180, 190, 200),
+            "distance": (900, 910),
+            "units": (700, 710),
+            "compensation": (400, 410, 420, 430, 440),
+            "non-modal": (40, 90, 290, 300, 310, 380, 790, 980, 990, *_CYCLES),
+            "frame": tuple(code for code in _FRAMES if code != 70),
+        }
+    ),
+    m_groups=grouped(
+        {
+            "stop": (0, 1, 2, 30),
+            "tool": (6,),
+            "spindle": (3, 4, 5, 13, 14),
+            "coolant": (8, 9),
+        }
+    ),
+    defaults={"feed mode": 940, "path": 640},
+    effects={
+        **dict.fromkeys((40, 300, 310, 990), "words"),
+        **dict.fromkeys(_CYCLES, "words"),
+        790: "cycle",
+        980: "flow",
+        **dict.fromkeys((90, 290, 380), "none"),
+        **dict.fromkeys((code for code in _FRAMES if code != 70), "transform"),
+    },
+    letters="FSTXYZABCUVWHIJKLPQR",
+    units={700: True, 710: False},
+    feed_modes={},
+    paths={640: 64},
+    redrawn=frozenset({50, 60, 70, 100, 110, 120, 130, 150, 160}),
+    tool_frame=frozenset("T"),
+    other_m="positions",
+    harmless=frozenset({0, 170, 180, 190, 400, 900, 910}),
+    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 8, 9, 13, 14}),
+)

@@ -1,0 +1,42 @@
+"""Klipper.
+
+Sources: Klipper's docs, G-Codes.md; Klipper3d/klipper issue 3911 (``( )`` is no comment). Macros
+have names and may do anything; what they leave behind is unknown. F is one for all moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gcodejerk.nc.dialect import Text
+from gcodejerk.nc.dialects.marlin import MARLIN
+
+KLIPPER = replace(
+    MARLIN,
+    name="klipper",
+    title="Klipper",
+    sources=("Klipper3d/klipper: docs/G-Codes.md", "Klipper3d/klipper issue 3911"),
+    text=Text(
+        parentheses="code",
+        semicolon="comment",
+        delete="none",
+        o_word="error",
+        percent="error",
+        names=True,
+        variables="none",
+        blanks="between",
+        checksum=True,
+        line_limit=1024,
+    ),
+    names={
+        **dict.fromkeys(
+            (
+                *("SET_VELOCITY_LIMIT", "SET_PRESSURE_ADVANCE", "SET_INPUT_SHAPER", "M117"),
+                *("SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_FAN_SPEED", "SET_PIN"),
+                *("SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT", "RESPOND", "EXCLUDE_OBJECT"),
+                *("EXCLUDE_OBJECT_START", "EXCLUDE_OBJECT_END", "EXCLUDE_OBJECT_DEFINE"),
+            ),
+            "none",
+        )
+    },
+)

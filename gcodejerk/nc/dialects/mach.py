@@ -1,0 +1,90 @@
+"""Mach3 and Mach4, and what follows their language (UCCNC, Centroid's mill posts).
+
+Sources: NIST RS274NGC (Smithy manual p. 7), from which the language comes; programs that the posts
+of FreeCAD for Mach3/4, UCCNC and Centroid write. Mach accepts more than RS274/NGC does: G53 without
+axes, ``;`` comments. What its cycles, scalings and subprograms do in detail was not verified, so
+nothing is taken as known behind them.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialect import Dialect, Drilling, Text, Writing, grouped
+
+SYSTEMS = (540, 550, 560, 570, 580, 590)
+CYCLES = frozenset({730, *range(810, 900, 10)})
+
+MACH = Dialect(
+    name="mach",
+    title="Mach3, Mach4, UCCNC",
+    sources=("NIST RS274NGC", "FreeCAD's posts mach3_mach4, uccnc, centroid"),
+    text=Text(
+        parentheses="open comment",
+        semicolon="comment",
+        slashes=True,
+        delete="first",
+        o_word="program",
+        percent="named",
+        variables="#",
+        blanks="anywhere",
+        line_limit=256,
+    ),
+    groups=grouped(
+        {
+            "motion": (0, 10, 20, 30, 310, 320, 330, 760, 800, *sorted(CYCLES)),
+            "plane": (170, 180, 190),
+            "distance": (900, 910),
+            "arc distance": (901, 911),
+            "feed mode": (930, 940, 950),
+            "units": (200, 210),
+            "compensation": (400, 410, 420),
+            "tool length": (430, 490),
+            "retract": (980, 990),
+            "system": SYSTEMS,
+            "path": (610, 640),
+            "spindle mode": (960, 970),
+            "scaling": (500, 510),
+            "rotation": (680, 690),
+            "polar": (150, 160),
+            "pocket": (120, 130),
+            "non-modal": (40, 100, 280, 281, 300, 520, 530, 920, 921, 922, 923),
+        }
+    ),
+    m_groups=grouped(
+        {
+            "stop": (0, 1, 2, 30, 47, 98, 99),
+            "tool": (6,),
+            "spindle": (3, 4, 5),
+            "coolant": (7, 8, 9),
+            "override": (48, 49),
+        }
+    ),
+    # Mach's start-up state is a configuration: G90 or G91, constant velocity or exact stop.
+    defaults={"plane": 170, "feed mode": 940, "compensation": 400, "system": 540},
+    effects={
+        **dict.fromkeys((280, 300), "return"),
+        281: "home",
+        **dict.fromkeys(SYSTEMS, "system"),
+        **dict.fromkeys((430, 490), "length"),
+        **dict.fromkeys((100, 520), "frames"),
+        530: "machine",
+        920: "set",
+        **dict.fromkeys((921, 922, 923), "frames"),
+        **dict.fromkeys((120, 130), "cycle"),
+    },
+    letters="FSTXYZABCUVWDEHIJKLPQR",
+    transforms={
+        **{510: ("scaling", True), 500: ("scaling", False)},
+        **{680: ("rotation", True), 690: ("rotation", False)},
+        **{160: ("polar", True), 150: ("polar", False)},
+    },
+    redrawn=frozenset({310, 320, 330, 760}),
+    other_m="positions",
+    drilling=Drilling(CYCLES, own_group=False, repeats="L", missing="unknown"),
+    harmless=frozenset(
+        {0, 40, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 901, 911, 930, 940, 950}
+        | {980, 990, 500, 690, 150}
+    ),
+    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9, 48, 49}),
+    quick=True,
+    writing=Writing((b"(", b")"), b"G4 P0"),
+)

@@ -1,0 +1,73 @@
+"""Marlin, also as mills use it.
+
+Sources: the Marlin documentation (gcode pages); MarlinFirmware/Marlin issues 7165 (no code is
+modal: every line states its own) and 24625 (``G0Y0X10`` is read as a hexadecimal number). F is one
+for all moves: G0 runs at it like G1.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialect import Dialect, Effect, Text, Writing, grouped
+
+SYSTEMS = (540, 550, 560, 570, 580, 590)
+SILENT = (
+    *(3, 4, 5, 7, 8, 9, 17, 20, 21, 22, 23, 24, 25, 26, 27, 31, 42, 73, 75, 76, 77, 78),
+    *(82, 83, 85, 92, 104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 114, 115, 117, 118),
+    *(119, 140, 141, 145, 149, 150, 155, 190, 191, 201, 203, 204, 205, 220, 221, 226, 250),
+    *(256, 280, 300, 301, 302, 303, 304, 305, 355, 400, 500, 501, 502, 503, 504, 572, 593, 900),
+    *(906, 907, 908, 909, 910, 911, 912, 913, 914),
+)
+"""M codes that move nothing and change no frame."""
+EFFECTS: dict[int, Effect] = {
+    40: "words",
+    100: "words",  # firmware retract: E, and Z where it hops, which G11 takes back
+    110: "words",
+    **dict.fromkeys((120, 270, 280, 290, 300, 330, 340, 350, 380, 420, 600, 610, 760), "home"),
+    **dict.fromkeys((382, 383, 384, 385), "home"),
+    **dict.fromkeys(SYSTEMS, "frames"),
+    530: "machine",
+    920: "set",
+}
+
+MARLIN = Dialect(
+    name="marlin",
+    title="Marlin 2",
+    sources=("marlinfw.org: gcode pages", "MarlinFirmware/Marlin issues 7165, 24625"),
+    text=Text(
+        parentheses="comment",
+        semicolon="comment",
+        delete="none",
+        o_word="error",
+        percent="error",
+        variables="none",
+        blanks="between",
+        checksum=True,
+        line_limit=96,
+    ),
+    groups=grouped(
+        {
+            "motion": (0, 10, 20, 30, 50),
+            "plane": (170, 180, 190),
+            "distance": (900, 910),
+            "units": (200, 210),
+            "system": SYSTEMS,
+            "non-modal": tuple(sorted(set(EFFECTS) - set(SYSTEMS) | {800})),
+        }
+    ),
+    m_groups=grouped({"stop": (0, 1, 2, 30), "silent": SILENT}),
+    # No code changes these.
+    defaults={"plane": 170, "feed mode": 940, "compensation": 400, "path": 640},
+    effects=EFFECTS,
+    letters="FSTXYZABCUVWDEHIJKLPQR",
+    feed_modes={},
+    paths={640: 64},
+    modal_motion=False,
+    one_command=True,
+    feed_on_rapids=True,
+    tool_frame=frozenset("T"),
+    other_m="positions",
+    redrawn=frozenset({50}),
+    harmless=frozenset({0}),
+    harmless_m=frozenset(),
+    writing=Writing((b"; ", b""), b"M400"),
+)

@@ -1,0 +1,125 @@
+"""Siemens 840D sl, 828D and SINUMERIK ONE, mills and lathes.
+
+Sources: SINUMERIK ONE NC programming 12/2019, pp. 43, 52, 170, 181; 802D sl / 840D ISO Milling
+p. 3-42 (G53, G153 and SUPA suppress frames for one block). Comments begin with ``;`` alone, since
+parentheses hold arguments. What a name does that is not listed here is not known; a user's own
+subprogram is such a name.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialect import Dialect, Effect, Text, Writing, grouped
+
+SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
+
+_SILENT = (
+    *("MSG", "LIMS", "SETMS", "STOPRE", "SOFT", "BRISK", "DRIVE", "FFWON", "FFWOF", "DEF"),
+    *("COMPON", "COMPOF", "COMPCAD", "COMPCURV", "CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
+    *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "SPOS", "SPOSA", "FGROUP", "RTLION", "ADIS", "ADISPOS"),
+    *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
+    *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "ID", "WORKPIECE", "SAVE", "ACC"),
+)
+_TURNED = (
+    *("ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CRPL", "SUPA"),
+    *("TRANSMIT", "TRACYL", "TRAANG", "TRAORI", "TRACON", "TOFRAME", "TOROT", "PAROT", "RTLIOF"),
+    *("CYCLE800", "AP", "RP", "POLF", "GEOAX"),
+)
+_CYCLES = (
+    *(f"CYCLE{n}" for n in (*range(60, 100), 801, 802, 899, *range(930, 960))),
+    *("HOLES1", "HOLES2", "POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2"),
+    *("LONGHOLE", "CYCLE61", "CYCLE976", "CYCLE977", "CYCLE978"),
+)
+_FLOW = (
+    *("IF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "FOR", "ENDFOR", "LOOP", "ENDLOOP", "REPEAT"),
+    *("REPEATB", "UNTIL", "GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS", "CASE", "CALL", "PCALL"),
+    *("EXTCALL", "ISOCALL", "PROC", "RET", "ENDPROC", "SETINT", "INIT", "START", "WAITE"),
+)
+NAMES: dict[str, Effect] = {
+    **dict.fromkeys(_SILENT, "none"),
+    **dict.fromkeys(("TRANS", "ATRANS", "TRAFOOF"), "frames"),
+    **dict.fromkeys(_TURNED, "transform"),
+    **dict.fromkeys(_CYCLES, "cycle"),
+    **dict.fromkeys(_FLOW, "flow"),
+    "MCALL": "modal cycle",
+    "DIAMON": "diameter",
+    "DIAMOF": "radius",
+    "DIAM90": "either",
+}
+
+SIEMENS = Dialect(
+    name="siemens",
+    title="Siemens 840D sl, 828D, SINUMERIK ONE",
+    sources=(
+        "SINUMERIK ONE NC programming 12/2019 pp. 43, 52, 170, 181",
+        "SINUMERIK 802D sl / 840D ISO Milling p. 3-42",
+    ),
+    text=Text(
+        parentheses="code",
+        semicolon="comment",
+        delete="numbered",
+        o_word="error",
+        percent="named",
+        names=True,
+        equals=True,
+        variables="R",
+        blanks="between",
+        line_limit=512,
+    ),
+    groups=grouped(
+        {
+            "motion": (0, 10, 20, 30, 330, 340, 350, 630, 3310, 3320),
+            "plane": (170, 180, 190),
+            "distance": (900, 910),
+            "units": (700, 710, 7000, 7100),
+            # G96 and G97 bring a feed per revolution with them, and G94 would end them.
+            "feed mode": (930, 940, 950, 960, 961, 962, 970, 971, 972, 973),
+            "compensation": (400, 410, 420),
+            "system": (5000, *SYSTEMS),
+            "path": (600, 640, 6410, 6420, 6430, 6440, 6450),
+            "exact stop": (6010, 6020, 6030),
+            "corner": (4500, 4510),
+            "non-modal": (40, 90, 250, 260, 530, 580, 590, 740, 750, 1530),
+            "pole": (1100, 1110, 1120),
+            "approach": (1470, 1480, 2470, 2480, 3470, 3480, 1400, 1410, 1420, 1430),
+        }
+    ),
+    m_groups=grouped(
+        {
+            "stop": (0, 1, 2, 17, 30),
+            "tool": (6,),
+            "spindle": (3, 4, 5, 19, 70),
+            "coolant": (7, 8, 9),
+            "gear": (40, 41, 42, 43, 44, 45),
+        }
+    ),
+    # Which code of a group holds after power-on is machine data (20150): not here.
+    defaults={"compensation": 400},
+    effects={
+        40: "words",
+        **dict.fromkeys(SYSTEMS, "system"),
+        5000: "frames",
+        **dict.fromkeys((530, 1530), "machine"),
+        **dict.fromkeys((580, 590), "frames"),
+        **dict.fromkeys((740, 750), "home"),
+        **dict.fromkeys((250, 260), "words"),
+        **dict.fromkeys((1100, 1110, 1120), "words"),
+        **dict.fromkeys((1470, 1480, 2470, 2480, 3470, 3480), "home"),
+    },
+    names=NAMES,
+    letters="FSTXYZABCUVWDHIJK",
+    calls="L",
+    units={700: True, 710: False, 7000: True, 7100: False},
+    feed_modes={930: 93, 940: 94, 950: 95},
+    paths={600: 61, 640: 64, 6410: 64, 6420: 64, 6430: 64, 6440: 64, 6450: 64},
+    increment_functions=True,
+    diameter_codes=True,
+    tool_frame=frozenset("TD"),
+    other_m="positions",
+    redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
+    harmless=frozenset(
+        {0, 90, 170, 180, 190, 400, 700, 710, 7000, 7100, 900, 910, 930, 940, 950, 600, 640}
+        | {6410, 6420, 6430, 6440, 6450, 6010, 6020, 6030}
+    ),
+    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9}),
+    writing=Writing((b"; ", b""), b"G4 F0.001"),
+)
