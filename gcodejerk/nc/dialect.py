@@ -81,6 +81,9 @@ class Text:
     """``o100 while [..]``; ``O1234`` names a program (and so does ``:1234``); neither."""
     percent: Literal["lone", "named", "error"] = "lone"
     """A ``%`` stands alone; a name may follow it; it is an error."""
+    leader: bool = False
+    """What stands in front of the first ``%`` is not read, and the first line may be the name of
+    the file."""
     names: bool = False
     """Words may have names, and arguments in parentheses: ``CYCLE81(..)``."""
     equals: bool = False

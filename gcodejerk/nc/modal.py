@@ -53,6 +53,7 @@ class State:
         "feed",
         "feed_mode_stated",
         "feed_whole",
+        "fixed",
         "g5x",
         "g92",
         "offsets",
@@ -97,6 +98,8 @@ class State:
         self.feed_mode_stated = False
         self.unit_stated = False
         self.ended = False
+        self.fixed: frozenset[str] = frozenset()
+        """Modes that no code of the dialect changes, so that nothing makes them unknown."""
         self.transforms: dict[str, bool | None] = {}
         """Name of a rotation, a scaling... -> in force, None where that is unknown; a name that
         the program never used is not in force."""
@@ -141,7 +144,7 @@ class State:
         """Forget every modal group."""
         for name in MODES:
             # Nothing but G7 makes X a diameter: in a program without it, radius is certain.
-            if name != "diameter" or self.turns:
+            if (name != "diameter" or self.turns) and name not in self.fixed:
                 self.put(name, None)
         for name in ("feed", "path_p", "path_q", "cycle_level"):
             self.put(name, NAN)

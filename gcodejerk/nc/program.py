@@ -43,6 +43,7 @@ from gcodejerk.units import SECONDS_PER_MINUTE
 STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""
 _STAMP = re.compile(rb"[(;][ \t]*gcodejerk stamp", re.IGNORECASE)
+_FILE_NAME = re.compile(rb"[ \t]*[A-Za-z_][\w-]*\.[A-Za-z]{1,5}[ \t]*(?:\([^()]*\)[ \t]*)?")
 SHORT_RUN = 24
 """Fewer plain lines than this between odd ones go the careful way; arrays would not pay."""
 _SHOWN = 20
@@ -133,6 +134,8 @@ class Reader:
             return
         first = not self.blocks
         self.started = True
+        if block.problem is not None and self._is_name(text):
+            return
         line_end = begin + len(text) + (terminator and (terminator % 2 or 2))
         if first and block.o_word == "" and terminator:
             self.insert_at = line_end  # the number of a program goes first
@@ -143,6 +146,11 @@ class Reader:
             self._o_word(block, first)
             return
         self._run(block, text, begin, number, terminator)
+
+    def _is_name(self, text: bytes) -> bool:
+        """Whether the first line is the name of the file."""
+        leader = self.dialect.text.leader and not self.blocks
+        return leader and _FILE_NAME.fullmatch(text) is not None
 
     def can_run(self) -> bool:
         """Whether the lines that follow may be taken as a run."""
@@ -215,7 +223,7 @@ class Reader:
 
     def _percent(self, number: int, end: int) -> None:
         """Take a lone %: the first one opens the program, the second one ends it."""
-        if not self.started:
+        if not self.started or (self.dialect.text.leader and not self.blocks):
             self.started = True
             self.percent = number
             self.insert_at = end

@@ -53,6 +53,12 @@ def initial_state(dialect: Dialect, start: Start) -> State:
     state.feed_mode = None if mode is None else dialect.feed_modes.get(mode, mode // 10)
     path = dialect.defaults.get("path")
     state.path = None if path is None else dialect.paths[path]
+    written = set(dialect.groups.values())
+    state.fixed = frozenset(
+        GROUP_FIELDS.get(group, group.replace(" ", "_"))
+        for group in dialect.defaults
+        if group not in written
+    )
     state.unit = MM_PER_INCH if start.inch else 1.0
     state.diameter = state.turns = start.diameter
     for system, offsets in start.offsets.items():

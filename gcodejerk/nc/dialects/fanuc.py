@@ -4,7 +4,8 @@ Sources: the modal groups of the 30i list at cncschool.pl; B-63944EN/02 p. 48 (p
 sample programs of NC-PB/gEdit (comments that do not close, ``N120/G0``). What a parameter decides
 is unknown until the machine file says it: whether ``X100`` is 100 mm (3401), the modes after
 power-on that 3402 chooses (G0 or G1, plane, G90 or G91), and the path of G0 (1401, `positioning`).
-A machine builder adds M codes of his own, which may be macros that move.
+A machine builder adds M codes of his own, which may be macros that move. FreeCAD's post writes the
+name of the file as the first line.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ FANUC = Dialect(
         semicolon="end",
         delete="numbered",
         o_word="program",
+        leader=True,
         percent="lone",
         variables="#",
         keywords=_JUMPS,

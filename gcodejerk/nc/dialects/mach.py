@@ -23,6 +23,7 @@ MACH = Dialect(
         slashes=True,
         delete="first",
         o_word="program",
+        leader=True,
         percent="named",
         variables="#",
         blanks="anywhere",
