@@ -90,20 +90,22 @@ class Task:
         progress : callable, optional
             See `Progress`.
         speed : ndarray, shape (n,), optional
-            Speed of unit laws that the controller's own rapid keeps to, NaN for none. [1/s]
+            Speed of unit laws that the program states, which no law exceeds; NaN for none. [1/s]
 
         Returns
         -------
         Task
         """
-        V, A, J = unit_limits(machine, share, "rapid")
-        conventional = conventional_laws(V if speed is None else np.fmin(V, speed), A, J)
+        rapid, limits = (unit_limits(machine, share, which) for which in ("rapid", "limit"))
+        if speed is not None:
+            rapid, limits = ((np.fmin(V, speed), A, J) for V, A, J in (rapid, limits))
+        conventional = conventional_laws(*rapid)
         if counts is None:
             counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
         weights = np.abs(share @ modes.participation.T)
         return cls(
             counts=counts,
-            limits=unit_limits(machine, share, "limit"),
+            limits=limits,
             conventional=conventional,
             objective=Objective(modes.poles, weights, modes.group),
             interval=machine.interval,

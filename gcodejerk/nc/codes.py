@@ -12,8 +12,8 @@ from gcodejerk.nc.block import Block, Name
 from gcodejerk.nc.dialect import AXES, Dialect
 from gcodejerk.nc.modal import NAN
 
-_LENGTHS = frozenset("XYZABCUVWIJKR")
-"""Addresses whose numbers may need a decimal point."""
+_LENGTHS = frozenset("XYZABCUVWR")
+"""Addresses whose numbers say where a block ends, and may need a decimal point."""
 _INCREMENT = 0.001
 """Least input increment of the IS-B system: 0.001 mm, 0.001 deg, or 0.0001 inch."""
 _GROUPED_M = frozenset({"stop", "spindle", "coolant", "tool"})

@@ -192,7 +192,7 @@ class Dialect:
     drilling: Drilling = field(default_factory=Drilling)
     rapid: int = 0
     arcs: frozenset[int] = frozenset({20, 30})
-    harmless: frozenset[int] = field(default_factory=frozenset)
+    harmless: frozenset[int] = frozenset({0})
     """G codes whose effect does not depend on when, within its block, a rapid runs."""
     harmless_m: frozenset[int] = frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9})
     quick: bool = False

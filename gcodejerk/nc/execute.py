@@ -18,6 +18,7 @@ from gcodejerk.nc.judge import Step, judge, looks_rapid
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.rules import arc_words, is_complete, takes_axes
+from gcodejerk.nc.tokenizer import CHECKSUM
 from gcodejerk.units import MM_PER_INCH
 
 _TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
@@ -67,13 +68,21 @@ class Executor:
         else:
             self._act(codes, step)
         contour = self._contour is not None
-        if contour and any(w.letter == "N" and w.value == self._contour for w in block.words):
-            self._contour = None
+        if contour:
+            self._leave_contour(block)
         if step.fault or codes.unknown:
             step.rapid = step.rapid or looks_rapid(block, codes, step, before, self.dialect)
         if step.rapid:
             step.reason = judge(block, codes, step, state, self.dialect, ended, contour)
         return step
+
+    def _leave_contour(self, block: Block) -> None:
+        """Forget what a block of a contour said: it did not run here."""
+        self.state.forget_positions()
+        self.state.put("motion", None)
+        self.state.put("feed", NAN)
+        if any(word.letter == "N" and word.value == self._contour for word in block.words):
+            self._contour = None
 
     def _doubt(self, block: Block, codes: Codes, step: Step) -> None:
         """Forget what a block that is not understood may have changed."""
@@ -137,10 +146,15 @@ class Executor:
             self._units(MM_PER_INCH if dialect.units[g["units"]] else 1.0)
         for code in g.values():
             self._effect(dialect.effect(code), code, values, step)
-        for named in codes.names:
-            effect = self._named(named)
-            self._effect(effect, 0, values, step, named.arguments)
-            words_taken |= effect in _TAKES_WORDS or effect in ("frames", "transform")
+        effects = [self._named(name) for name in codes.names]
+        if "modal cycle" in effects:
+            # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
+            self._modal_cycle(begins=len(effects) > 1)
+            words_taken = True
+        else:
+            for effect in effects:
+                self._effect(effect, 0, values, step)
+                words_taken |= effect in _TAKES_WORDS or effect in ("frames", "transform")
         if "path" in g:
             code = g["path"]
             continuous = code == 640
@@ -163,6 +177,8 @@ class Executor:
 
     def _named(self, name: Name) -> Effect:
         """What a named word does; one that is not known may do anything."""
+        if name.name == CHECKSUM:
+            return "none"
         if name.name in self.dialect.text.keywords:
             return "flow"
         return self.dialect.names.get(name.name, "flow")
@@ -184,14 +200,7 @@ class Executor:
         if on or name in state.transforms:
             state.put("transforms", {**state.transforms, name: on})
 
-    def _effect(
-        self,
-        effect: Effect,
-        code: int,
-        values: dict[str, float],
-        step: Step,
-        arguments: bytes = b"",
-    ) -> None:
+    def _effect(self, effect: Effect, code: int, values: dict[str, float], step: Step) -> None:
         """Do what a code outside the non-modal group, or a name, does besides."""
         state = self.state
         if effect in ("diameter", "radius"):
@@ -213,10 +222,7 @@ class Executor:
         elif effect == "transform":
             self._transform("frame", on=True)
         elif effect == "modal cycle":
-            # MCALL without a cycle ends it; G66 ends with G67, which the table of transforms holds.
-            begins = bool(code or arguments.strip())
-            state.put("transforms", {**state.transforms, "modal macro": begins})
-            state.forget_positions()
+            self._modal_cycle(begins=True)  # G67, which ends it, is among the transforms
         elif effect == "cycle":
             step.feed_event = USES_FEED
             state.forget_positions()
@@ -227,6 +233,12 @@ class Executor:
         elif effect == "flow":
             state.forget()
             step.feed_event = USES_FEED
+
+    def _modal_cycle(self, begins: bool) -> None:
+        """Begin or end a cycle or macro that runs at every position."""
+        state = self.state
+        state.put("transforms", {**state.transforms, "modal macro": begins})
+        state.forget_positions()
 
     def _miscellaneous(self, m: int, step: Step) -> None:
         """Execute an M code, the end of the program excepted."""

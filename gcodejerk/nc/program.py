@@ -218,7 +218,8 @@ class Reader:
         """Note the first certain rapid that rests on an assumed unit or distance mode."""
         if not self.state.unit_stated and self.asked_unit is None:
             self.asked_unit = number
-        if not self.state.distance_stated and self.asked_distance is None:
+        fixed = "distance" in self.state.fixed
+        if not (fixed or self.state.distance_stated) and self.asked_distance is None:
             self.asked_distance = number
 
     def _percent(self, number: int, end: int) -> None:

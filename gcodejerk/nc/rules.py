@@ -42,7 +42,8 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
         if dialect.effect(g.get("non-modal")) == "machine" and axes and motion not in (0, 10):
             return False
     drawn = dialect.strict or axes or arc_words(values, state)
-    if motion in dialect.arcs and drawn and not _arc_complete(values, g.get("plane", state.plane)):
+    plane = g.get("plane", state.plane) if dialect.strict else None
+    if motion in dialect.arcs and drawn and not _arc_complete(values, plane):
         return False
     inverse = (
         dialect.feed_modes.get(g["feed mode"]) == 93 if "feed mode" in g else state.feed_mode == 93
@@ -103,7 +104,7 @@ def arc_words(values: dict[str, float], state: State) -> bool:
 
 
 def _arc_complete(values: dict[str, float], plane: int | None) -> bool:
-    """Whether an arc has a centre or a radius, and no word of another plane."""
+    """Whether an arc has a centre or a radius, and no word of another plane, if that is given."""
     centres = [letter for letter in "IJK" if letter in values]
     if "R" in values:
         return not centres and (plane is None or any(axis in values for axis in PLANES[plane][:2]))

@@ -72,6 +72,7 @@ def initial_state(dialect: Dialect, start: Start) -> State:
         state.g5x = list(state.offsets.get(state.system, state.g5x))
     if start.startup:
         block = parse_line(start.startup.encode("latin-1", "replace"), dialect)
+        each = [Block(words=(word,)) for word in block.words]
         if block.problem is not None:
             raise ProgramError(
                 f"startup codes: {block.problem}",
@@ -79,10 +80,11 @@ def initial_state(dialect: Dialect, start: Start) -> State:
                 Place("startup", 1, block.column, start.startup),
             )
         executor = Executor(dialect, state, dict(start.tool_lengths), start.decimal_point)
-        if executor.run(block).fault:
+        steps = [executor.run(line) for line in (each if dialect.one_command else [block])]
+        if any(step.fault or step.unknown for step in steps):
             raise ProgramError(
                 f"startup codes: the dialect {dialect.name} refuses {start.startup!r}",
-                "give codes that may stand together",
+                "give codes that it has, and that may stand together",
                 Place("startup", 1, None, start.startup),
             )
         if "tool length" in _groups_of(block, dialect):

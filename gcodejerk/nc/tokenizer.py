@@ -19,6 +19,8 @@ from gcodejerk.nc.dialect import Dialect
 LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
 
+CHECKSUM = "*"
+"""Name of a checksum among the names of a block."""
 _BLANKS = re.compile(rb"[ \t]*")
 _WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[0-9.]+)[ \t]*(?![-+0-9. \t#\[=])")
 _NUMBER = re.compile(rb"[-+]?[0-9. \t]*")
@@ -385,6 +387,7 @@ class _Line:
         elif byte == b":" and rules.o_word == "program" and not self.words:
             self.flow()
         elif rules.checksum and _CHECKSUM.fullmatch(text, self.at):
+            self.names.append(Name(CHECKSUM, text[self.at :]))
             self.at = len(text)
         elif rules.end and text.startswith(rules.end, self.at):
             self.at += len(rules.end)

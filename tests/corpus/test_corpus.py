@@ -1,0 +1,110 @@
+"""Every real program at hand: processed in its dialect, verified, and what became of it in a table.
+
+`table.md` beside this file is that table; `pytest --update-golden` writes it anew, and its
+difference is reviewed like code. The programs are those of ../shared, which are not ours to copy.
+"""
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gcodejerk import Machine, process, verify
+from gcodejerk.reasons import CERTAIN, REASONS
+
+SHARED = Path(__file__).resolve().parents[2].parent / "shared"
+TABLE = Path(__file__).with_name("table.md")
+POSTS = {
+    **{name: name for name in ("linuxcnc", "fanuc", "grbl", "marlin")},
+    **dict.fromkeys(("mach3_mach4", "uccnc", "centroid"), "mach"),
+}
+"""Post-processor of FreeCAD -> dialect."""
+CORPUS = {
+    "easy_gcode_plot__TEST_TURN.NC": "fanuc-lathe-a",
+    "easy_gcode_plot__": "fanuc",
+    "gEdit__f": "fanuc",
+    "gEdit__l01": "fanuc-lathe-a",
+    "gEdit__s04": "siemens",
+    "gEdit__h01": "heidenhain-iso",
+    "gcode-rs__mach3": "mach",
+    "gcode-rs__reprap": "marlin",
+    "cncjs__": "grbl",
+}
+"""Beginning of a file's name -> dialect; the first that fits."""
+STARTUP = {
+    "fanuc": "G90 G17 G21",
+    "fanuc-lathe-a": "G99 G21",
+    "siemens": "G90 G71",
+    "heidenhain-iso": "",
+    "marlin": "",
+}
+"""Codes in force when a program starts, as the machine of such a shop would be set up."""
+MACHINE = """
+interval: 0.001
+positioning: linear
+axes:
+  X:
+    diameter: {diameter}
+    rapid: {{velocity: 500, acceleration: 3000, jerk: 100000}}
+    modes: [{{name: bed, frequency: 30, damping: 0.02, participation: 1.0}}]
+  Y:
+    rapid: {{velocity: 500, acceleration: 3000, jerk: 100000}}
+    modes: [{{name: column, frequency: 40, damping: 0.02, participation: 1.0}}]
+  Z:
+    rapid: {{velocity: 400, acceleration: 3000, jerk: 100000}}
+    modes: [{{name: head, frequency: 45, damping: 0.03, participation: 1.0}}]
+  B: {{rapid: {{velocity: 90, acceleration: 300, jerk: 10000}}}}
+program: {{decimal_point: calculator, startup: "{startup}"}}
+"""
+
+
+def programs():
+    """Files of ../shared and their dialects."""
+    found = []
+    for folder in (SHARED / "corpus", SHARED / "hosts" / "nc"):
+        for path in sorted(folder.glob("*")) if folder.exists() else []:
+            if path.suffix == ".md":
+                continue
+            if folder.name == "nc":
+                dialect = POSTS[path.stem.split("__")[1]]
+            else:
+                dialect = next(d for start, d in CORPUS.items() if path.name.startswith(start))
+            found.append((path, dialect))
+    return found
+
+
+def machine_for(dialect):
+    """A machine of the kind that reads a dialect."""
+    turns = "lathe" in dialect or dialect == "siemens"
+    startup = STARTUP.get(dialect, "G90 G17 G21")
+    described = Machine.loads(MACHINE.format(diameter=str(turns).lower(), startup=startup))
+    controller = "csv" if dialect == "heidenhain-iso" else dialect.split("-")[0]
+    return replace(described, controller=controller, dialect=dialect)
+
+
+def row_of(path, dialect):
+    """Process, verify what came out by the files alone, and sum up."""
+    machine, data = machine_for(dialect), path.read_bytes()
+    result = process(data, machine, name=path.name)
+    if machine.controller != "csv":
+        proof = verify(data, result.output, machine)
+        assert proof.ok, (path.name, proof.violations[:3])
+        assert proof.rewritten == result.planned
+    if not result.planned and machine.controller != "csv":
+        assert result.output == data
+    reasons = result.plans.reason
+    left = Counter(str(REASONS[r]) for r in reasons if r != CERTAIN)
+    why = ", ".join(f"{reason} {count}" for reason, count in sorted(left.items()))
+    return f"| {path.name} | {dialect} | {len(reasons)} | {result.planned} | {why} |"
+
+
+@pytest.mark.skipif(not programs(), reason="../shared is not here: no real programs to read")
+def test_every_real_program_is_processed_and_verified(request):
+    rows = [row_of(path, dialect) for path, dialect in programs()]
+    table = "\n".join(
+        ["| file | dialect | rapids | rewritten | left alone |", "|---|---|---|---|---|", *rows, ""]
+    )
+    if request.config.getoption("--update-golden"):
+        TABLE.write_text(table)
+    assert table.splitlines() == TABLE.read_text().splitlines()

@@ -1,0 +1,366 @@
+"""What differs between dialects, each difference on a program of a few lines."""
+
+import io
+import math
+
+import pytest
+
+from gcodejerk import ProgramError
+from gcodejerk.nc import AXES, DIALECTS, Dialect, Start, find_dialect, parse_block, read_program
+from gcodejerk.nc import trace as follow
+from gcodejerk.nc.dialects import GROUP
+from gcodejerk.reasons import CERTAIN, REASONS
+
+KNOWN = Start(positions={"X": 0.0, "Y": 0.0, "Z": 0.0}, startup="G17 G90 G94")
+PRINTER = Start(positions=KNOWN.positions, startup="G90 G21")
+NOWHERE = math.nan
+
+
+def end(program, dialect, start=KNOWN):
+    """X, Y and Z after a program."""
+    *_, last = follow(io.BytesIO(program), dialect=dialect, start=start)
+    return last[1][:3]
+
+
+def reasons(program, dialect, start=KNOWN):
+    """What each rapid is left alone for; None where it is certain."""
+    found = read_program(io.BytesIO(program), dialect=dialect, start=start).rapids.reason
+    return [None if r == CERTAIN else str(REASONS[r]) for r in found.tolist()]
+
+
+def same(a, b):
+    return all(x == pytest.approx(y, nan_ok=True) for x, y in zip(a, b, strict=True))
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_a_dialect_names_its_sources_and_knows_what_its_tables_refer_to(name):
+    dialect = DIALECTS[name]
+    assert dialect.name == name
+    assert dialect.sources
+    assert dialect.title
+    listed = {
+        *dialect.effects, *dialect.harmless, *dialect.drilling.codes, *dialect.transforms,
+        *dialect.redrawn, *dialect.contours,
+    }  # fmt: skip
+    assert listed <= set(dialect.groups), sorted(listed - set(dialect.groups))
+    assert set(dialect.feed_modes) <= {c for c, g in dialect.groups.items() if g == "feed mode"} | {
+        930, 940, 950,
+    }  # fmt: skip
+    assert 0 in dialect.groups
+    assert dialect.groups[0] == "motion"
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_every_dialect_moves_where_absolute_words_say(name):
+    line_end = b"*\n" if name == "heidenhain-iso" else b"\n"
+    start = Start(positions=KNOWN.positions)
+    states = b"G40" if name == "heidenhain-iso" else b""
+    states += line_end if name == "fanuc-lathe-a" else b" G90" + line_end
+    axes = b"X10. Z-3." if "lathe" in name else b"X10. Y5. Z-3."
+    expected = (10.0, 0.0 if "lathe" in name else 5.0, -3.0)
+    assert same(end(states + b"G0 " + axes + line_end, name, start), expected)
+
+
+@pytest.mark.parametrize(
+    ("dialect", "line", "problem"),
+    [
+        ("linuxcnc", b"G0 X1 (open", "comment is not closed"),
+        ("fanuc", b"G0 X1. (open", None),
+        ("fanuc", b"(PLUNGE (NESTED?) )", "')' has no meaning here"),
+        ("grbl", b"(a (b)", None),
+        ("linuxcnc", b"(a (b)", "comment within a comment"),
+        ("siemens", b"G0 X1 (5)", "'(' has no meaning here"),
+        ("siemens", b"G0 X1 ; (5", None),
+        ("fanuc", b"G0 X1. ;", None),
+        ("fanuc", b"G0 X1. ; G1", "text behind the end of the block"),
+        ("mach", b"G0 X1 // go", None),
+        ("linuxcnc", b"G0 X1 // go", "'/' has no meaning here"),
+        ("linuxcnc", b"g0x +0. 12 34y 7", None),
+        ("grbl", b"G0X 1 2", None),
+        ("fanuc", b"G0 X1 2", "'2' has no meaning here"),
+        ("siemens", b"G0 X1 2", "'2' has no meaning here"),
+        ("marlin", b"N10 G1 X5*71", None),
+        ("linuxcnc", b"N10 G1 X5*71", "'*' has no meaning here"),
+        ("heidenhain-iso", b"N10 G00 X+5 Y-3*", None),
+        ("grbl", b"%", "'%' has no meaning here"),
+        ("grbl", b"$H", "'$' has no meaning here"),
+        ("mach", b"%prog1", None),
+        ("fanuc", b"%prog1", "text on the line of %"),
+        ("siemens", b"%_N_PART_MPF", None),
+        ("fanuc", b":1234(NAME)", None),
+        ("siemens", b"MSG(\"T1 (ROUGH)\")", None),
+        ("siemens", b"CYCLE81(10,0,2,-5)", None),
+        ("siemens", b"CYCLE81(10,0", "parenthesis is not closed"),
+        ("siemens", b"X1=5", "axis with a number: not known here"),
+        ("klipper", b"SET_VELOCITY_LIMIT ACCEL=3000", None),
+        ("klipper", b"G1 X1 (go)", "'(' has no meaning here"),
+        ("fanuc", b"IF[#1GT10.]GOTO100", None),
+    ],
+)  # fmt: skip
+def test_a_line_is_read_as_the_dialect_writes_it(dialect, line, problem):
+    assert parse_block(line, dialect).problem == problem
+
+
+@pytest.mark.parametrize(
+    ("dialect", "line", "deleted"),
+    [
+        ("linuxcnc", b"/G0 X1", True),
+        ("fanuc", b"N120/G0X1.", True),
+        ("fanuc", b"/2 G0X1.", True),
+        ("siemens", b"/1 N70 G0 X1", True),
+        ("grbl", b"/G0X1", False),
+        ("fanuc", b"G0X1.", False),
+    ],
+)
+def test_block_delete_stands_where_the_dialect_has_it(dialect, line, deleted):
+    block = parse_block(line, dialect)
+    assert block.problem is None
+    assert block.block_delete is deleted
+    assert [word.text for word in block.words if word.letter == "X"] != []
+
+
+def test_a_slash_behind_n_is_no_block_delete_for_linuxcnc():
+    assert parse_block(b"N120/G0X1", "linuxcnc").problem == "'/' has no meaning here"
+
+
+@pytest.mark.parametrize(
+    ("meaning", "end_of_x"), [(None, NOWHERE), ("calculator", 100.0), ("standard", 0.1)]
+)
+def test_what_x100_is_only_the_machine_knows(meaning, end_of_x):
+    start = Start(positions={"X": 0.0}, startup="G90 G21", decimal_point=meaning)
+    program = b"G0 X100\n"
+    assert same(end(program, "fanuc", start)[:1], (end_of_x,))
+    why = "number without a decimal point"
+    assert reasons(program, "fanuc", start) == [None if meaning else why]
+    assert reasons(b"G0 X100.\n", "fanuc", start) == [None]
+    assert same(end(program, "linuxcnc", start)[:1], (100.0,))
+
+
+def test_a_whole_number_in_inches_is_a_ten_thousandth():
+    start = Start(positions={"X": 0.0}, startup="G90", decimal_point="standard")
+    assert same(end(b"G20 G0 X5\n", "haas", start)[:1], (0.0005 * 25.4,))
+
+
+def test_zero_needs_no_decimal_point():
+    assert reasons(b"G0 X5.\nX0\n", "fanuc") == [None, None]
+
+
+def test_only_codes_that_a_dialect_states_are_assumed_at_the_start():
+    unstated = Start(positions={"X": 0.0})
+    program = b"G0 X5.\n"
+    assert reasons(program, "linuxcnc", unstated) == [None]
+    assert reasons(program, "grbl", unstated) == [None]
+    assert reasons(program, "fanuc", unstated) == ["distance mode unknown"]
+    assert reasons(program, "mach", unstated) == ["distance mode unknown"]
+    assert reasons(program, "fanuc-lathe-a", unstated)[0] in (None, "feed to restore unknown")
+
+
+def test_after_a_cycle_of_its_own_group_g0_is_active_again():
+    program = b"G0 X5. Z10.\nG98 G81 X10. Y5. Z-5. R2. F100.\nX20.\nG80\nX30. Y0\n"
+    assert reasons(program, "fanuc") == [
+        None, "rapid inside a canned cycle", "rapid inside a canned cycle", None,
+    ]  # fmt: skip
+    assert same(end(program, "fanuc"), (30.0, 0.0, 10.0))
+    # For LinuxCNC axis words behind G80 are an error.
+    assert end(b"G0 X5.\nG80\nX30.\n", "linuxcnc")[0] != 30.0
+
+
+def test_g0_ends_a_cycle_that_g80_did_not():
+    program = b"G0 Z10.\nG99 G81 X10. Y5. Z-5. R2. F100.\nG0 X30.\nX40.\n"
+    assert reasons(program, "haas")[2:] == [None, None]
+    assert same(end(program, "haas"), (40.0, 5.0, 2.0))
+
+
+def test_the_number_of_repeats_has_the_letter_of_the_dialect():
+    program = b"G0 Z10.\nG91 G99 G81 X10. Z-5. R-2. %c3 F100.\n"
+    assert end(program % b"K", "fanuc")[0] == 30.0
+    assert end(program % b"L", "linuxcnc")[0] == 30.0
+
+
+def test_g28_leaves_only_the_named_axes_unknown():
+    program = b"G0 X5. Y5. Z5.\nG91 G28 Z0.\nG90 X7. Y7.\n"
+    for dialect in ("fanuc", "haas", "mach", "grbl"):
+        at = end(program, dialect)
+        assert at[:2] == ((7.0, 7.0) if dialect != "haas" else at[:2])
+        assert math.isnan(at[2]), dialect
+
+
+def test_g28_on_the_line_of_g0_is_fanucs_and_no_linuxcncs():
+    line = b"G0G91G28Z0\n"
+    assert reasons(line, "fanuc") == ["coordinate frame changes in the block"]
+    assert reasons(line, "linuxcnc") == ["block not understood"]
+
+
+def test_u_and_w_are_increments_on_a_lathe_with_system_a():
+    start = Start(positions={"X": 10.0, "Z": 5.0}, diameter=True, startup="G99")
+    at = end(b"G00 X40. Z2.\nU-4. W-1.\n", "fanuc-lathe-a", start)
+    assert same((at[0], at[2]), (18.0, 1.0))  # radius, from a diameter of 36
+    assert reasons(b"G00 X40. Z2.\nU-4. W-1.\n", "fanuc-lathe-a", start) == [None, None]
+
+
+def test_g90_is_a_turning_cycle_on_a_lathe_with_system_a():
+    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G99")
+    at = end(b"G00 X44. Z2.\nG90 X40. Z-20. F0.2\n", "fanuc-lathe-a", start)
+    assert math.isnan(at[0])
+    at = end(b"G90 G00 X44. Z2.\n", "fanuc-lathe-b", start)
+    assert same((at[0], at[2]), (22.0, 2.0))
+
+
+def test_blocks_of_a_contour_do_not_run_where_they_stand():
+    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G99 F0.1")
+    program = (
+        b"G00 X40. Z3.\nG71 U2. R0.5\nG71 P10 Q20 U0.4 W0.1 F0.25\n"
+        b"N10 G00 X16.\nG00 Z1.\nN20 X44.\nG00 X60. Z5.\nX62.\n"
+    )
+    assert reasons(program, "fanuc-lathe-a", start) == [
+        None, *["rapid inside a canned cycle"] * 2, "start unknown", None,
+    ]  # fmt: skip
+
+
+def test_a_tool_word_changes_the_frame_of_a_lathe_only():
+    program = b"G0 X5. Z5.\nT0101\nX7. Z7.\nX8.\n"
+    turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G99")
+    assert reasons(program, "fanuc-lathe-a", turned) == [None, "start unknown", None]
+    assert reasons(program, "fanuc") == [None, None, None]
+
+
+@pytest.mark.parametrize(
+    ("dialect", "on", "off"),
+    [
+        ("fanuc", b"G68 X0 Y0 R30.", b"G69"),
+        ("fanuc", b"G16", b"G15"),
+        ("fanuc", b"G51.1 X0", b"G50.1 X0"),
+        ("mach", b"G51 X2", b"G50"),
+        ("haas", b"G107 A0 R5.", None),
+    ],
+)
+def test_nothing_is_rewritten_in_a_frame_that_turns_scales_or_mirrors(dialect, on, off):
+    program = b"G0 X1. Y1.\n%s\nX2. Y2.\nX3.\n" % on
+    assert set(reasons(program, dialect)[1:]) == {"rotation, scaling, mirroring or polar active"}
+    if off is not None:
+        program += b"%s\nG0 X4. Y4.\nX5.\n" % off
+        assert reasons(program, dialect)[-2:] == ["start unknown", None]
+
+
+def test_a_builders_m_code_may_move_but_changes_no_mode():
+    program = b"G0 X5. Y5.\nM10\nX6. Y6.\nX7.\n"
+    assert reasons(program, "fanuc") == [None, "start unknown", None]
+    assert reasons(program, "linuxcnc")[1:] != ["start unknown", None]
+
+
+def test_every_line_of_marlin_states_its_own_motion():
+    program = b"G90\nG0 X5 F6000\nX6\nG0 X7\nG0 X8\n"
+    assert reasons(program, "marlin", PRINTER) == [None, "start unknown", None]
+
+
+def test_rapids_of_marlin_and_klipper_run_at_f():
+    for dialect in ("marlin", "klipper"):
+        program = b"G90\nG0 X5\nG1 X6 F600\nG0 X7\nG0 X8 F1200\n"
+        rapids = read_program(io.BytesIO(program), dialect=dialect, start=PRINTER).rapids
+        assert reasons(program, dialect, PRINTER)[0] == "feed to restore unknown"
+        assert rapids.speed.tolist()[1:] == [10.0, 20.0]
+    rapids = read_program(io.BytesIO(b"G0 X5 F600\n"), dialect="linuxcnc", start=KNOWN).rapids
+    assert math.isnan(rapids.speed[0])
+
+
+def test_a_rapid_that_feeds_plastic_is_left_alone():
+    assert reasons(b"G90\nG0 X5 F600 E1\n", "marlin", PRINTER) == [
+        "other words of the block cannot keep their order"
+    ]
+
+
+def test_a_checksum_forbids_inserting_lines():
+    assert reasons(b"N1 G90*20\nN2 G0 X5 F600*30\n", "marlin", PRINTER) == [
+        "other words of the block cannot keep their order"
+    ]
+
+
+def test_axis_letters_of_other_commands_move_nothing():
+    program = b"G90\nG0 X5 Y5 F600\nM204 X500 Y500\nM92 X80\nG0 X6 F600\n"
+    assert reasons(program, "marlin", PRINTER) == [None, None]
+
+
+def test_siemens_words_with_names():
+    at = end(b"G90\nG0 X10 Y5 Z3\nG0 X=IC(5) Y=AC(7)\n", "siemens")
+    assert same(at, (15.0, 7.0, 3.0))
+    assert math.isnan(end(b"G90\nG0 X10\nTRANS X5\n", "siemens")[0])
+    assert math.isnan(end(b"G90\nG0 X10\nMYSUB(3)\n", "siemens")[0])
+    assert end(b'G90\nG0 X10\nMSG("G0 X5")\n', "siemens")[0] == 10.0
+    turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G90")
+    assert end(b"DIAMON\nG0 X10\n", "siemens", turned)[0] == 5.0
+    assert end(b"DIAMOF\nG0 X10\n", "siemens", turned)[0] == 10.0
+
+
+def test_positions_behind_mcall_are_holes():
+    program = b"G90\nG0 X1 Z5\nMCALL CYCLE81(10,0,2,-5)\nX5\nX6\nMCALL\nG0 X7 Z9\nX8\n"
+    assert reasons(program, "siemens") == [
+        None, *["rapid inside a canned cycle"] * 2, "start unknown", None,
+    ]  # fmt: skip
+
+
+def test_a_program_is_not_started_by_what_stands_in_front_of_it():
+    program = b"(LEADER)\n%\nO1000(PART)\nG0 X5.\n"
+    read = read_program(io.BytesIO(program), dialect="fanuc", start=KNOWN)
+    assert reasons(program, "fanuc") == [None]
+    assert program[: read.insert_at].endswith(b"O1000(PART)\n")
+    named = b"%\npart-1.nc (from CAM)\nG0 X5.\n"
+    assert reasons(named, "fanuc") == [None]
+
+
+def test_offsets_make_g53_known():
+    start = Start(
+        positions={"X": 0.0, "Y": 0.0, "Z": 0.0},
+        offsets={"G54": {"X": -100.0, "Y": -50.0, "Z": -200.0}, "G54.1 P3": {"X": 10.0}},
+        startup="G90",
+    )
+    assert same(end(b"G54 G0 X1. Y1. Z1.\nG53 G0 Z0.\n", "fanuc", start), (1.0, 1.0, 200.0))
+    assert same(end(b"G54 G0 X1.\nG54.1 P3\n", "fanuc", start)[:1], (-109.0,))
+    assert math.isnan(end(b"G54 G0 X1.\nG54.1 P4\n", "fanuc", start)[0])
+
+
+def test_linear_and_rotary_axes_together_need_a_known_feed():
+    start = Start(positions=dict.fromkeys(AXES, 0.0), startup="G90")
+    assert reasons(b"G0 X5. B90.\n", "fanuc", start) == ["linear and rotary axes move together"]
+    assert reasons(b"G0 X5. B90.\n", "linuxcnc", start) == [None]
+    assert reasons(b"G0 B90.\n", "fanuc", start) == [None]
+
+
+class Entry:
+    """An installed package's entry point."""
+
+    name, value = "mine", "mine.dialect:MINE"
+
+    def __init__(self, made):
+        self.made = made
+
+    def load(self):
+        if isinstance(self.made, Exception):
+            raise self.made
+        return self.made
+
+
+def test_a_package_adds_a_dialect(monkeypatch):
+    grbl = DIALECTS["grbl"]
+    mine = Dialect(
+        "mine", "Mine", ("me",), grbl.text, grbl.groups, grbl.m_groups, defaults=grbl.defaults
+    )
+    monkeypatch.setattr(
+        "gcodejerk.nc.dialects.entry_points", lambda group: [Entry(mine)] if group == GROUP else []
+    )
+    assert find_dialect("mine") is mine
+    assert reasons(b"G0 X5\n", "mine") == [None]
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [(ValueError("broken"), "cannot be loaded: broken"), (5, "is no gcodejerk.nc.Dialect")],
+)
+def test_a_broken_dialect_of_a_package_is_named(monkeypatch, made, words):
+    monkeypatch.setattr("gcodejerk.nc.dialects.entry_points", lambda group: [Entry(made)])
+    with pytest.raises(ProgramError, match=words):
+        find_dialect("mine")
+
+
+def test_an_unknown_dialect_is_refused_with_the_nearest_one():
+    with pytest.raises(ProgramError, match="did you mean fanuc"):
+        find_dialect("fanuk")
