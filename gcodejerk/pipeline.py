@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk import __version__
+from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.errors import EmitError, Place, ProgramError
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
@@ -69,6 +70,8 @@ class Result:
         Displacement envelopes of every rapid and mode, NaN where not planned. [mm]
     kept : ndarray of bool, shape (n,)
         The stream is the conventional law: nothing better was found.
+    deviation : ndarray, shape (n,)
+        Under independent positioning, how far the path leaves the control's own, at most. [mm]
     verification : Verification or None
         None where it was switched off, or where nothing was written.
     edits : ndarray of int, shape (k, 3)
@@ -88,6 +91,7 @@ class Result:
     residual: Array
     conventional_residual: Array
     kept: NDArray[np.bool_]
+    deviation: Array
     verification: Verification | None
     edits: NDArray[np.int64]
     notes: tuple[str, ...]
@@ -254,6 +258,7 @@ def process_file(
             f"the program is read as {program.dialect}, controller {emitter.name} reads {home}: "
             "how the program's control follows its streams was not measured"
         )
+    notes += dogleg_notes(plans, collected.deviation)
     return Result(
         program=program,
         plans=plans,
@@ -263,6 +268,7 @@ def process_file(
         residual=collected.residual,
         conventional_residual=collected.conventional,
         kept=collected.kept,
+        deviation=collected.deviation,
         verification=verification,
         edits=np.array(writer.edits, dtype=np.int64).reshape(-1, 3),
         notes=(*notes, *emitter.notes(program.rapids, plans)),
@@ -312,12 +318,14 @@ class _Residuals:
         self.residual = np.full(shape, np.nan)
         self.conventional = np.full(shape, np.nan)
         self.kept = np.zeros(len(plans), dtype=bool)
+        self.deviation = np.zeros(len(plans))
 
     def add(self, batch: Batch) -> None:
         """Note one batch."""
         self.residual[batch.moves] = batch.residual
         self.conventional[batch.moves] = batch.conventional_residual
         self.kept[batch.moves] = batch.kept
+        self.deviation[batch.moves] = path_deviation(batch)
 
 
 class _Writer:

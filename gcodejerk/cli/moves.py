@@ -72,6 +72,8 @@ def plan(
             screen.print(table)
         if limit := move_limit(record):
             print(limit)
+        for note in record["notes"]:
+            print(note)
 
 
 def map_amplitudes(

@@ -92,6 +92,8 @@ def compare_notes(comparison: Comparison) -> list[str]:
         "profiles themselves, before sampling",
         _shapers(comparison),
     ]
+    if comparison.machine.positioning != "linear":
+        lines.append("positioning: independent: each axis moves and arrives on its own")
     broken = [
         f"{c.name} ({', '.join(f'{name} {_times(use)}' for name, use in c.broken)})"
         for c in comparison.contenders

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gcodejerk import __version__
 from gcodejerk.designs import known_limits
+from gcodejerk.dogleg import arrivals, dogleg_notes, path_deviation
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.laws import Array
@@ -40,8 +41,10 @@ class Records:
         residual: Array,
         conventional: Array,
         limit: Array | None = None,
+        deviation: Array | None = None,
     ) -> None:
         self.plans, self.kept = plans, kept
+        self.deviation = np.zeros(len(plans)) if deviation is None else deviation
         self.limit = np.full(len(plans), np.nan) if limit is None else limit
         modes = plans.modes
         self.residual, self.conventional = modes.grouped(residual), modes.grouped(conventional)
@@ -101,6 +104,11 @@ class Records:
                 "residual": self._residual(row),
                 "limit": self._limit(row),
             }
+        if planned and plans.machine.positioning != "linear":
+            each = arrivals(plans, row)
+            record["arrival"] = {axis: number(time) for axis, (time, _) in each.items()}
+            record["conventional_arrival"] = {axis: number(t) for axis, (_, t) in each.items()}
+            record["path_deviation"] = number(float(self.deviation[row]))
         return record
 
     def _limit(self, row: int) -> float | None:
@@ -191,7 +199,9 @@ def process_record(
         Section 4 of the contract.
     """
     plans = result.plans
-    records = Records(plans, result.kept, result.residual, result.conventional_residual, limit)
+    records = Records(
+        plans, result.kept, result.residual, result.conventional_residual, limit, result.deviation
+    )
     rapids = result.program.rapids
     rows = [
         {
@@ -217,7 +227,10 @@ def process_record(
 def move_record(plan: Plan) -> Record:
     """The report on one planned move, in the same form."""
     limit = known_limits(plan.plans)
-    records = Records(plan.plans, plan.kept, plan.residual, plan.conventional_residual, limit)
+    deviation = path_deviation(plan.batch)
+    records = Records(
+        plan.plans, plan.kept, plan.residual, plan.conventional_residual, limit, deviation
+    )
     end = {axis: number(length) for axis, length in plan.displacement.items()}
     row: Record = {
         "line": None,
@@ -233,7 +246,7 @@ def move_record(plan: Plan) -> Record:
         "output": None,
         "dialect": None,
         "summary": {"blocks": 0} | records.summary(),
-        "notes": [],
+        "notes": dogleg_notes(plan.plans, deviation),
         "verified": None,
         "rapids": [row],
     }

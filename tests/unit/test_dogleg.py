@@ -1,0 +1,88 @@
+"""Independent positioning: arrivals of each axis, and how far the path leaves the control's own."""
+
+import numpy as np
+import pytest
+
+from gcodejerk import Machine, plan_move, process
+from gcodejerk.dogleg import arrivals, path_deviation
+from gcodejerk.report.records import move_record
+
+TEXT = """
+interval: 0.001
+positioning: {positioning}
+axes:
+  X:
+    rapid: {{velocity: 500, acceleration: 3000, jerk: 60000}}
+    modes: [{{frequency: 11, damping: 0.02, participation: 1.0}}]
+  Y: {{rapid: {{velocity: 300, acceleration: 4000, jerk: 100000}}}}
+program: {{start: {{X: 0, Y: 0}}, startup: "G64"}}
+"""
+DOGLEG = Machine.loads(TEXT.format(positioning="independent"))
+STRAIGHT = Machine.loads(TEXT.format(positioning="linear"))
+
+
+def control_path(length, velocity, acceleration, jerk, t):
+    """Position of the controller's own rapid at moments t, by integrating its jerk."""
+    v = min(velocity, np.sqrt(length * acceleration), (length**2 * jerk / 4.0) ** (1 / 3))
+    low, high = 0.0, velocity
+    for _ in range(80):
+        v = 0.5 * (low + high)
+        ramp = v / acceleration + acceleration / jerk
+        ramp = ramp if v * jerk >= acceleration**2 else 2.0 * np.sqrt(v / jerk)
+        low, high = (v, high) if v * ramp <= length else (low, v)
+    ramp = v / acceleration + acceleration / jerk
+    ramp = ramp if v * jerk >= acceleration**2 else 2.0 * np.sqrt(v / jerk)
+    rise = min(acceleration, np.sqrt(v * jerk)) / jerk
+    cruise = max(length - v * ramp, 0.0) / v
+    edges = np.cumsum([rise, ramp - 2 * rise, rise, cruise, rise, ramp - 2 * rise, rise])
+    signs = np.array([1, 0, -1, 0, -1, 0, 1, 0])
+    fine = np.linspace(0.0, t[-1], 200_001)
+    q = signs[np.searchsorted(edges, fine, side="right")] * jerk
+    for _ in range(3):
+        steps = 0.5 * (q[1:] + q[:-1]) * np.diff(fine)
+        q = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.interp(t, fine, q)
+
+
+def test_the_deviation_bounds_the_distance_from_the_path_of_an_integrated_dogleg():
+    plan = plan_move({"X": 200.0, "Y": 60.0}, DOGLEG)
+    t = np.linspace(0.0, plan.time + 0.05, 20_001)
+    own = np.stack(
+        [control_path(200.0, 500, 3000, 60000, t), control_path(60.0, 300, 4000, 100000, t)], axis=1
+    )
+    points = np.stack([plan.positions["X"], plan.positions["Y"]], axis=1)
+    true = max(np.linalg.norm(own - point, axis=1).min() for point in points)
+    (bound,) = path_deviation(plan.batch)
+    assert true > 0.05  # the paths do differ
+    assert true <= bound + 0.02
+    assert bound <= 1.1 * true + 0.02
+
+
+def test_axes_arrive_when_their_own_laws_end():
+    plan = plan_move({"X": 200.0, "Y": 60.0}, DOGLEG)
+    times = arrivals(plan.plans, 0)
+    assert set(times) == {"X", "Y"}
+    assert max(planned for planned, _ in times.values()) == pytest.approx(plan.time)
+    for axis, (planned, own) in times.items():
+        done = np.abs(plan.positions[axis] - plan.positions[axis][-1]) < 1e-9
+        assert plan.t[np.argmax(done)] <= planned + 1e-9
+        assert own <= planned + 1e-12 < own + 0.0011
+
+
+def test_a_straight_rapid_leaves_no_path():
+    plan = plan_move({"X": 200.0, "Y": 60.0}, STRAIGHT)
+    assert path_deviation(plan.batch).tolist() == [0.0]
+    assert "arrival" not in move_record(plan)["rapids"][0]
+    assert path_deviation(plan_move({"X": 200.0}, DOGLEG).batch).tolist() == [0.0]
+
+
+def test_every_report_says_so():
+    record = move_record(plan_move({"X": 200.0, "Y": 60.0}, DOGLEG))
+    (row,) = record["rapids"]
+    assert set(row["arrival"]) == set(row["conventional_arrival"]) == {"X", "Y"}
+    assert row["path_deviation"] > 0.05
+    assert "independent" in record["notes"][0]
+    result = process(b"G21 G90\nG0 X200. Y60.\nM2\n", DOGLEG)
+    assert result.deviation[0] == pytest.approx(row["path_deviation"], rel=0.05)
+    assert any("each axis moves and arrives on its own" in note for note in result.notes)
+    assert not any("independent" in note for note in process(b"G0 X200.\nM2\n", STRAIGHT).notes)
