@@ -21,17 +21,24 @@ from numpy.typing import NDArray
 from gcodejerk import __version__
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.errors import EmitError, Place, ProgramError
+from gcodejerk.expanded import (
+    TERMINATOR_LENGTH,
+    hunks,
+    in_original,
+    prove_expansion,
+    require_lines,
+    spool,
+)
 from gcodejerk.machine import Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, read_program
+from gcodejerk.nc.expansion import Expansion, expand
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
 from gcodejerk.start import program_start
 from gcodejerk.stream import Batch, make_streams
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
 
-TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
-"""Bytes of a line end, by `Rapids.terminator`."""
 Progress = Callable[[str, int, int], None]
 """Called with a step's name, how much of it is done, and of how much."""
 COPY_SIZE = 1 << 20
@@ -51,6 +58,8 @@ class Settings:
     verify: bool = True
     force: bool = False
     """Process a file that carries our stamp."""
+    expand_cycles: bool = False
+    """Write drilling cycles out as explicit moves first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +69,8 @@ class Result:
     Attributes
     ----------
     program : Program
-        As it was read, with its rapids.
+        As it was read, with its rapids. Those of cycles that were written out carry the line and
+        the place of the cycle's block; several of them share one.
     plans : Plans
         Row i is rapid i.
     controller : str
@@ -72,8 +82,13 @@ class Result:
     verification : Verification or None
         None where it was switched off, or where nothing was written.
     edits : ndarray of int, shape (k, 3)
-        Begin and end in the output of everything that is not the source's, and the rapid that it
-        replaces; -1 for the stamp. Empty where the output is a file of its own. [bytes]
+        Begin and end in the output of every stream, and the rapid that it replaces; -1 for the
+        stamp. Empty where the output is a file of its own. [bytes]
+    hunks : ndarray of int, shape (n, 5)
+        Begin and end in the output of everything that is not the source's [bytes], cycles that were
+        written out included, and the line and the place of what it replaces [bytes].
+    expansion : Expansion or None
+        What became of the cycles; None where they were not to be written out.
     notes : tuple of str
         What the user has to know: of the program, and of the controller.
     output : bytes or None
@@ -90,6 +105,8 @@ class Result:
     kept: NDArray[np.bool_]
     verification: Verification | None
     edits: NDArray[np.int64]
+    hunks: NDArray[np.int64]
+    expansion: Expansion | None
     notes: tuple[str, ...]
     output: bytes | None = field(default=None, repr=False)
 
@@ -114,6 +131,7 @@ def process(
     comments: bool = True,
     verify: bool = True,
     force: bool = False,
+    expand_cycles: bool = False,
     name: str = "<program>",
 ) -> Result:
     r"""Rewrite every rapid of a program that is certain.
@@ -132,6 +150,8 @@ def process(
         Read the output back and prove it.
     force : bool
         Accept a program that carries our stamp.
+    expand_cycles : bool
+        Write drilling cycles out as explicit moves, whose rapids can then be rewritten.
     name : str
         What messages call the program.
 
@@ -157,7 +177,9 @@ def process(
     >>> result.planned, result.left
     (1, 1)
     """
-    settings = Settings(controller, "stream", profile, dialect, comments, verify, force)
+    settings = Settings(
+        controller, "stream", profile, dialect, comments, verify, force, expand_cycles
+    )
     target = io.BytesIO()
     result = process_file(io.BytesIO(data), target, machine, settings, name)
     return _with_output(result, target.getvalue())
@@ -195,7 +217,48 @@ def process_file(
     """
     emitter = load_controller(settings.controller or machine.controller)
     _check_form(emitter, settings.form)
-    report = progress or silent
+    source.seek(0)
+    if not settings.expand_cycles:
+        return _process(source, target, machine, settings, name, emitter, progress or silent, None)
+    if target is not None and not emitter.in_place:
+        raise EmitError(
+            f"--expand-cycles needs streams within the program, those of controller {emitter.name} "
+            "are a file of their own",
+            "choose another --controller, or leave --expand-cycles out",
+        )
+    with spool() as between:
+        expansion = expand(
+            source,
+            between,
+            name=name,
+            dialect=settings.dialect or machine.dialect,
+            start=program_start(machine),
+            comments=settings.comments,
+        )
+        if expansion.written and target is not None and settings.verify:
+            names = (name, f"the output for {name}")
+            require(
+                prove_expansion(source, between, machine, names=names, dialect=settings.dialect)
+            )
+        used = between if expansion.written else source
+        used.seek(0)
+        return _process(
+            used, target, machine, settings, name, emitter, progress or silent, expansion
+        )
+
+
+def _process(
+    source: BinaryIO,
+    target: BinaryIO | None,
+    machine: Machine,
+    settings: Settings,
+    name: str,
+    emitter: Controller,
+    report: Progress,
+    expansion: Expansion | None,
+) -> Result:
+    """Process a program; the source is that with its cycles written out, if they are."""
+    lines = None if expansion is None else expansion.map
     source.seek(0, io.SEEK_END)
     size = source.tell()
     source.seek(0)
@@ -210,7 +273,7 @@ def process_file(
         raise ProgramError(
             "this program has been processed by gcodejerk before",
             "process the original, or add --force to process its remaining rapids",
-            Place(name, program.stamp),
+            Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
         )
     plans = plan_rapids(
         program.rapids,
@@ -245,9 +308,13 @@ def process_file(
             dialect=settings.dialect,
             start=program_start(machine),
         )
-        require(verification)
+        require(require_lines(verification, lines))
         report("verifying", 1, 1)
-    notes = [_finding(finding.line, finding.message) for finding in program.findings]
+    edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
+    differences = hunks(edits, program.rapids, program.insert_at, lines)
+    program = in_original(program, expansion)
+    findings = (*program.findings, *(() if expansion is None else expansion.findings))
+    notes = [_finding(finding.line, finding.message) for finding in findings]
     return Result(
         program=program,
         plans=plans,
@@ -258,14 +325,17 @@ def process_file(
         conventional_residual=collected.conventional,
         kept=collected.kept,
         verification=verification,
-        edits=np.array(writer.edits, dtype=np.int64).reshape(-1, 3),
+        edits=edits,
+        hunks=differences,
+        expansion=expansion,
         notes=(*notes, *emitter.notes(program.rapids, plans)),
     )
 
 
 def stamp_comment(machine: Machine, settings: Settings, emitter: Controller) -> bytes:
     """The comment at the top of an output: version, machine and a hash of the settings."""
-    chosen = (emitter.name, settings.form, settings.profile or machine.design.profile)
+    chosen = [emitter.name, settings.form, settings.profile or machine.design.profile]
+    chosen += ["expand-cycles"] if settings.expand_cycles else []
     text = " ".join((machine.settings_hash, *chosen)).encode()
     digest = hashlib.blake2b(text, digest_size=4).hexdigest()
     plain = "".join(

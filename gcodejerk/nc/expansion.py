@@ -113,9 +113,11 @@ class Expansion:
     """What was written out, and what was not."""
 
     blocks: int
-    """Blocks of cycles in the original."""
+    """Of the original."""
+    holes: int
+    """Those of them that call a cycle."""
     written: int
-    """Those of them that were written out."""
+    """Those of these that were written out."""
     findings: tuple[Finding, ...]
     """One for each series that was left to the controller, up to a number."""
     map: LineMap
@@ -189,7 +191,6 @@ def expand(
     begin = source.tell()
     judging = _Walker(name, chosen, start, comments, None, None)
     digest = judging.walk(source)
-    blocks = judging.blocks_of_cycles
     if any(verdict.reason is None for verdict in judging.verdicts):
         source.seek(begin)
         writing = _Walker(name, chosen, start, comments, target, judging.verdicts)
@@ -203,7 +204,7 @@ def expand(
         places = []
     columns = np.array(places, dtype=np.int64).reshape(-1, 8).T
     findings = _findings(judging.verdicts)
-    return Expansion(blocks, len(places), findings, LineMap(*columns))
+    return Expansion(judging.blocks, judging.holes, len(places), findings, LineMap(*columns))
 
 
 def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
@@ -240,7 +241,7 @@ class _Walker(Reader):
         self.verdicts: list[_Verdict] = []
         self.series: Series | None = None
         self.reason_at = 0
-        self.blocks_of_cycles = 0
+        self.holes = 0
         self.places: list[tuple[int, ...]] = []
         self.spindle: int | None = None
         self.path: PathWords | None = None
@@ -322,7 +323,7 @@ class _Walker(Reader):
                 self._leave(series, str(Reason.OTHER_WORDS), place[2])
             self._close(series)
         elif drills(block, state, cycles, self.dialect.groups):
-            self.blocks_of_cycles += 1
+            self.holes += 1
             self._drill(series, block, text, moment, place)
         elif state.motion not in cycles:
             own = any(self.dialect.groups.get(code) == "motion" for code in g_codes(block))

@@ -5,11 +5,14 @@ at all. This module owns that judgement, and the text of one block that is writt
 
     (gcodejerk: N120 G98 G81 X10. Y5. Z-6. R2. M8)   names the original
     N120 G98 M8                                      what else the block says, byte for byte
-    G61                                              cycles run in exact path mode
+    G61                                              LinuxCNC runs cycles in exact path mode
     G0 X10. Y5.                                      the moves
     ...
     G64 P0.05                                        the path mode that the program has
     M0                                               what takes effect after motion
+
+Where the program's path mode is not known, so that nothing could return to it, `G4 P0` follows
+every move instead: the tool comes to rest where exact path mode would not have rounded the corner.
 
 Rule 1: whatever might make a block something else than it seems makes the series uncertain: flow,
 expressions, block delete, changes of frame, words that are not known to keep their order.
@@ -176,7 +179,6 @@ def judge(series: Series, moment: Moment, block: Block, rules: DrillingRules) ->
         (series.level is None, str(Reason.START_UNKNOWN)),
         (state.feed_mode not in (94, 95) or not state.feed > 0.0, str(Reason.FEED_UNKNOWN)),
         (_on_diameter(state), "the drilling axis is programmed as a diameter"),
-        (not _restorable(moment), "path mode unknown: state G61 or G64 before the cycles"),
     ]
     for applies, reason in reasons:
         if applies:
@@ -202,12 +204,9 @@ def _on_diameter(state: State) -> bool:
     return state.diameter is not False and state.plane == 190
 
 
-def _restorable(moment: Moment) -> bool:
-    """Whether the path mode is known well enough to be stated again."""
-    state, path = moment.state, moment.path
-    if state.path in _EXACT:
-        return True
-    return state.path == 64 and path is not None and (not path.words or path.unit is not None)
+def _stops(moment: Moment) -> bool:
+    """Whether the path mode is not known well enough to be stated again."""
+    return moment.state.path not in _EXACT and (moment.state.path != 64 or moment.path is None)
 
 
 def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) -> Call | str:
@@ -321,10 +320,13 @@ def write_block(
     lines = [_comment(block)] if comments else []
     if kept or block.comments:
         lines.append(b"".join(rest).strip(b" \t"))
-    lines += [] if state.path in _EXACT else [b"G61"]
-    lines += _moves(block, call, moment)
-    if state.path not in _EXACT and moment.path is not None:
-        lines.append(moment.path.text(state.unit))
+    moves = _moves(block, call, moment)
+    if _stops(moment):
+        lines += _with_stops(moves)
+    elif state.path in _EXACT or moment.path is None:
+        lines += moves
+    else:
+        lines += [b"G61", *moves, moment.path.text(state.unit)]
     return lines + ([b" ".join(stops)] if stops else [])
 
 
@@ -358,6 +360,16 @@ def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
                 going = going and incremental  # absolute repeats stay where they are
         at = move.to
     return lines
+
+
+def _with_stops(moves: list[bytes]) -> list[bytes]:
+    """The moves, with a rest behind each that has none."""
+    out = []
+    for line, following in zip(moves, [*moves[1:], b""], strict=True):
+        out.append(line)
+        if line.startswith((b"G0", b"G1")) and not following.startswith(b"G4"):
+            out.append(b"G4 P0")
+    return out
 
 
 def _comment(block: Block) -> bytes:

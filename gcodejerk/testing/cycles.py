@@ -97,7 +97,7 @@ def cycle_programs(draw: Draw) -> bytes:
     >>> isinstance(cycle_programs(), st.SearchStrategy)
     True
     """
-    path = draw(st.sampled_from(["G64", "G64 P0.05", "G64 P.1 Q0.02", "G61", "G61.1"]))
+    path = draw(st.sampled_from(["G64", "G64 P0.05", "G64 P.1 Q0.02", "G61", "G61.1", "G8"]))
     unit = draw(st.sampled_from(["G21", "G21", "G20"]))
     lines = [f"{unit} G40 {path}", f"M3 S800 F{draw(st.integers(50, 900))}"]
     for _ in range(draw(st.integers(1, 3))):

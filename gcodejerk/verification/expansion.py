@@ -10,6 +10,7 @@ Rule: a series is written out whole or not at all; everything else is kept byte 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import BinaryIO
 
@@ -206,8 +207,6 @@ class _Walk:
             return self._complain(Kind.CHANGED, number, problem)
         self.holes += 1
         doubt = series.doubt or doubt_of(series, state)
-        if state.path not in (61, 62) and (state.path != 64 or self.path is None):
-            doubt = doubt or "the path mode is not known"
         if series.written is False:
             doubt = "an earlier hole of the series is not written out"
         if doubt is not None:
@@ -233,7 +232,11 @@ class _Walk:
             return self._complain(Kind.HEAD, number, f"expected '{head.decode('latin-1')}'")
         if head:
             lines.next()
-        exact = state.path in (61, 62)
+        # Where the path mode is not known, a rest behind every move does what G61 would.
+        stops_between = state.path != 64 or self.path is None
+        exact = state.path in (61, 62) or stops_between
+        if stops_between and state.path not in (61, 62):
+            wanted = [[*_with_rests(events)] for events in wanted]
         if not exact and lines.next() != b"G61":
             return self._complain(Kind.MODE, number, "cycles run in exact path mode: no G61")
         if not self._compare(series, wanted, lines, number, plane):
@@ -349,6 +352,14 @@ class _Lines:
     def well_ended(self, end: bytes, last: bytes) -> bool:
         """Whether every line taken ends in one way, and the last one as the block did."""
         return self.ends[-1:] == [last] and all(got == end for got in self.ends[:-1])
+
+
+def _with_rests(events: list[Event]) -> Iterator[Event]:
+    """The events with a rest behind every move that no dwell follows."""
+    for k, event in enumerate(events):
+        yield event
+        if event[0] in ("rapid", "feed") and [e[0] for e in events[k + 1 : k + 2]] != ["dwell"]:
+            yield "dwell", Fraction(0)
 
 
 def _stays(after: dict[str, Height], before: dict[str, Height]) -> bool:
