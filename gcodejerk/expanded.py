@@ -10,8 +10,9 @@ original by means of its own, and the processed program with it.
 
 from __future__ import annotations
 
-import shutil
+import contextlib
 import tempfile
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import BinaryIO, cast
 
@@ -22,7 +23,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
 from gcodejerk.nc.expansion import Expansion, LineMap, expand
 from gcodejerk.start import program_start
-from gcodejerk.verification import Verification, Violation, verify_files
+from gcodejerk.verification import Verification, Violation, require, verify_files
 from gcodejerk.verification.expansion import check_expansion
 
 SPOOL = 8 << 20
@@ -32,9 +33,62 @@ TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
 _COMMENT = b"(gcodejerk: "
 
 
-def spool() -> BinaryIO:
-    """A place for an expanded program."""
-    return cast(BinaryIO, tempfile.SpooledTemporaryFile(max_size=SPOOL))
+@contextlib.contextmanager
+def written_out(
+    source: BinaryIO,
+    machine: Machine,
+    *,
+    name: str,
+    dialect: str | None,
+    comments: bool,
+    prove: bool,
+) -> Iterator[tuple[BinaryIO, Expansion]]:
+    """A program with its cycles written out, for as long as the block lasts.
+
+    Parameters
+    ----------
+    source : BinaryIO
+        The program, seekable; read from its beginning.
+    machine : Machine
+        What it runs on.
+    name : str
+        What messages call it.
+    dialect : str or None
+        The machine's by default.
+    comments : bool
+        Name each block that is written out in a comment.
+    prove : bool
+        Compare the result with the program.
+
+    Yields
+    ------
+    used : BinaryIO
+        At its beginning; the source itself where no cycle can be written out.
+    expansion : Expansion
+        What was written out, and what was not.
+
+    Raises
+    ------
+    VerifyError
+        What was written is not right.
+    """
+    with tempfile.SpooledTemporaryFile(max_size=SPOOL) as file:
+        between = cast(BinaryIO, file)
+        source.seek(0)
+        expansion = expand(
+            source,
+            between,
+            name=name,
+            dialect=dialect or machine.dialect,
+            start=program_start(machine),
+            comments=comments,
+        )
+        used = between if expansion.written else source
+        if expansion.written and prove:
+            names = (name, f"the output for {name}")
+            require(prove_expansion(source, between, machine, names=names, dialect=dialect))
+        used.seek(0)
+        yield used, expansion
 
 
 def prove_expansion(
@@ -118,22 +172,17 @@ def verify_expanded(
     """
     comments = any(line.startswith(_COMMENT) for line in processed)
     processed.seek(0)
-    with spool() as between:
-        expansion = expand(
-            original,
-            between,
-            name=names[0],
-            dialect=dialect or machine.dialect,
-            start=program_start(machine),
-            comments=comments,
-        )
-        original.seek(0)
-        if not expansion.written:
-            shutil.copyfileobj(original, between)
-        first = prove_expansion(original, between, machine, names=names, dialect=dialect, most=most)
+    with written_out(
+        original, machine, name=names[0], dialect=dialect, comments=comments, prove=False
+    ) as (between, expansion):
+        first: tuple[Violation, ...] = ()
+        if expansion.written:
+            first = prove_expansion(
+                original, between, machine, names=names, dialect=dialect, most=most
+            ).violations
         found = verify_files(between, processed, machine, names=names, dialect=dialect, most=most)
     later = (_in_original(violation, expansion.map) for violation in found.violations)
-    violations = (*first.violations, *later)[:most]
+    violations = (*first, *later)[:most]
     return replace(found, violations=violations), expansion.written
 
 
@@ -142,7 +191,7 @@ def _in_original(violation: Violation, lines: LineMap) -> Violation:
     return replace(violation, original_line=lines.line_of(violation.original_line))
 
 
-def require_lines(verification: Verification, lines: LineMap | None) -> Verification:
+def lines_in_original(verification: Verification, lines: LineMap | None) -> Verification:
     """A verification with the lines of the original, where there is a map to them."""
     if lines is None:
         return verification

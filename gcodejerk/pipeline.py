@@ -25,18 +25,17 @@ from gcodejerk.expanded import (
     TERMINATOR_LENGTH,
     hunks,
     in_original,
-    prove_expansion,
-    require_lines,
-    spool,
+    lines_in_original,
+    written_out,
 )
 from gcodejerk.machine import Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, read_program
-from gcodejerk.nc.expansion import Expansion, expand
+from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
 from gcodejerk.start import program_start
-from gcodejerk.stream import Batch, make_streams
+from gcodejerk.stream import Batch, Residuals, make_streams
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
 
 Progress = Callable[[str, int, int], None]
@@ -85,8 +84,7 @@ class Result:
         Begin and end in the output of every stream, and the rapid that it replaces; -1 for the
         stamp. Empty where the output is a file of its own. [bytes]
     hunks : ndarray of int, shape (n, 5)
-        Begin and end in the output of everything that is not the source's [bytes], cycles that were
-        written out included, and the line and the place of what it replaces [bytes].
+        All that is not the source's, cycles included: see `expanded.hunks`.
     expansion : Expansion or None
         What became of the cycles; None where they were not to be written out.
     notes : tuple of str
@@ -217,7 +215,6 @@ def process_file(
     """
     emitter = load_controller(settings.controller or machine.controller)
     _check_form(emitter, settings.form)
-    source.seek(0)
     if not settings.expand_cycles:
         return _process(source, target, machine, settings, name, emitter, progress or silent, None)
     if target is not None and not emitter.in_place:
@@ -226,22 +223,14 @@ def process_file(
             "are a file of their own",
             "choose another --controller, or leave --expand-cycles out",
         )
-    with spool() as between:
-        expansion = expand(
-            source,
-            between,
-            name=name,
-            dialect=settings.dialect or machine.dialect,
-            start=program_start(machine),
-            comments=settings.comments,
-        )
-        if expansion.written and target is not None and settings.verify:
-            names = (name, f"the output for {name}")
-            require(
-                prove_expansion(source, between, machine, names=names, dialect=settings.dialect)
-            )
-        used = between if expansion.written else source
-        used.seek(0)
+    with written_out(
+        source,
+        machine,
+        name=name,
+        dialect=settings.dialect,
+        comments=settings.comments,
+        prove=target is not None and settings.verify,
+    ) as (used, expansion):
         return _process(
             used, target, machine, settings, name, emitter, progress or silent, expansion
         )
@@ -281,7 +270,7 @@ def _process(
         settings.profile,
         lambda done, total: report("planning", done, total),
     )
-    collected = _Residuals(plans)
+    collected = Residuals(plans)
     writer = _Writer(source, target, program, machine, emitter, settings)
     done = 0
     for window in make_streams(
@@ -308,7 +297,7 @@ def _process(
             dialect=settings.dialect,
             start=program_start(machine),
         )
-        require(require_lines(verification, lines))
+        require(lines_in_original(verification, lines))
         report("verifying", 1, 1)
     edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
     differences = hunks(edits, program.rapids, program.insert_at, lines)
@@ -366,22 +355,6 @@ def _check_form(emitter: Controller, form: str) -> None:
             f"controller {emitter.name} cannot write --as {form} in this version",
             f"it can write: {', '.join(names)}",
         )
-
-
-class _Residuals:
-    """Collects from batches what a report needs."""
-
-    def __init__(self, plans: Plans) -> None:
-        shape = (len(plans), len(plans.modes.poles))
-        self.residual = np.full(shape, np.nan)
-        self.conventional = np.full(shape, np.nan)
-        self.kept = np.zeros(len(plans), dtype=bool)
-
-    def add(self, batch: Batch) -> None:
-        """Note one batch."""
-        self.residual[batch.moves] = batch.residual
-        self.conventional[batch.moves] = batch.conventional_residual
-        self.kept[batch.moves] = batch.kept
 
 
 class _Writer:
