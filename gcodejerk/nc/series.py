@@ -4,7 +4,7 @@ While a cycle is in force every bare `X..` drills, so a series can be written ou
 at all. This module owns that judgement, and the text of one block that is written out::
 
     (gcodejerk: N120 G98 G81 X10. Y5. Z-6. R2. M8)   names the original
-    N120 G98 M8                                      what else the block says, byte for byte
+    N120 G98 M8                                      what else the block says
     G61                                              LinuxCNC runs cycles in exact path mode
     G0 X10. Y5.                                      the moves
     ...
@@ -312,14 +312,14 @@ def write_block(
         if not (stop or cycle or word.letter not in _HARMLESS_LETTERS | {"G", "M"}):
             kept.append(word)
             continue
-        rest.append(text[begin : word.begin])
+        rest.append(text[begin : word.begin].strip(b" \t"))
         begin = word.end
         if stop:
             stops.append(b"".join(word.text.split()))
-    rest.append(text[begin:])
+    rest.append(text[begin:].strip(b" \t"))
     lines = [_comment(block)] if comments else []
     if kept or block.comments:
-        lines.append(b"".join(rest).strip(b" \t"))
+        lines.append(b" ".join(part for part in rest if part))
     moves = _moves(block, call, moment)
     if _stops(moment):
         lines += _with_stops(moves)

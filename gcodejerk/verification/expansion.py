@@ -168,6 +168,8 @@ class _Walk:
             series.written = False
         elif not sure:
             series.doubt = series.doubt or f"line {number} is not certain"
+            if series.written:
+                return self._complain(Kind.SERIES, number, "it may make a hole, or end the series")
         elif not self._quiet(block) and in_cycle:
             series.doubt = series.doubt or f"line {number} stands between its holes"
         if not in_cycle or state.ended:
@@ -176,7 +178,7 @@ class _Walk:
                 self.dialect.groups.get(round((code or 0.0) * 10)) == "motion" for code in codes
             )
             self.series = None
-            if series.written and not (sure and closes):
+            if series.written and not closes:
                 return self._complain(Kind.SERIES, number, "its end is not certain")
         return True
 
