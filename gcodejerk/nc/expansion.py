@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import BinaryIO
@@ -201,10 +202,10 @@ def expand(
             )
         places = writing.places
     else:
-        places = []
+        places = array("q")
     columns = np.array(places, dtype=np.int64).reshape(-1, 8).T
     findings = _findings(judging.verdicts)
-    return Expansion(judging.blocks, judging.holes, len(places), findings, LineMap(*columns))
+    return Expansion(judging.blocks, judging.holes, columns.shape[1], findings, LineMap(*columns))
 
 
 def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
@@ -242,7 +243,8 @@ class _Walker(Reader):
         self.series: Series | None = None
         self.reason_at = 0
         self.holes = 0
-        self.places: list[tuple[int, ...]] = []
+        self.places = array("q")
+        """The columns of the map, row by row."""
         self.spindle: int | None = None
         self.path: PathWords | None = None
         if start.startup:
@@ -361,12 +363,8 @@ class _Walker(Reader):
         lines = write_block(text, block, call, moment, self.comments)
         new = line_end.join(lines) + last
         kind = (0, 1, 3, 2)[2 * returns + terminator]
-        self.places.append(
-            (
-                *(number + self._added, len(lines), self._out, self._out + len(new)),
-                *(number, begin, end, kind),
-            )
-        )
+        self.places.extend((number + self._added, len(lines), self._out, self._out + len(new)))
+        self.places.extend((number, begin, end, kind))
         self._put(new)
         self._added += len(lines) - 1
         self._at = end + len(last)
