@@ -251,10 +251,12 @@ def same(one: Event, other: Event) -> bool:
     """Whether two events are the same."""
     if one[0] != other[0]:
         return False
+    if one[1] == other[1]:
+        return True
     if isinstance(one[1], tuple) and isinstance(other[1], tuple):
         pairs = zip(one[1], other[1], strict=True)
-        return all(a[0] == b[0] and abs(a[1] - b[1]) < CLOSE for a, b in pairs)
-    return one[1] == other[1]
+        return all(a == b or (a[0] == b[0] and abs(a[1] - b[1]) < CLOSE) for a, b in pairs)
+    return False
 
 
 def _moving(
