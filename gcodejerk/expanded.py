@@ -170,8 +170,7 @@ def verify_expanded(
     written : int
         Blocks of cycles that are written out.
     """
-    comments = any(line.startswith(_COMMENT) for line in processed)
-    processed.seek(0)
+    comments = _names_blocks(processed)
     with written_out(
         original, machine, name=names[0], dialect=dialect, comments=comments, prove=False
     ) as (between, expansion):
@@ -184,6 +183,16 @@ def verify_expanded(
     later = (_in_original(violation, expansion.map) for violation in found.violations)
     violations = (*first, *later)[:most]
     return replace(found, violations=violations), expansion.written
+
+
+def _names_blocks(processed: BinaryIO) -> bool:
+    """Whether blocks that were replaced are named in comments; back at the beginning."""
+    found, tail = False, b"\n"
+    while not found and (piece := processed.read(SPOOL)):
+        data = tail + piece
+        found, tail = b"\n" + _COMMENT in data, data[-len(_COMMENT) :]
+    processed.seek(0)
+    return found
 
 
 def _in_original(violation: Violation, lines: LineMap) -> Violation:
@@ -256,7 +265,7 @@ def hunks(
     back = TERMINATOR_LENGTH[lines.original_terminator]
     blocks = [*out, lines.original_line, lines.original_begin, lines.original_end + back]
     k = np.searchsorted(lines.begin, begin, side="right") - 1
-    alone = (k < 0) | (begin >= lines.end[k])
+    alone = stamp | (k < 0) | (begin >= lines.end[k])
     mapped = lines.rapids_of(rapids)
     original = np.where(stamp, insert_at, mapped.begin[at])
     line = np.where(stamp, first, mapped.line[at])

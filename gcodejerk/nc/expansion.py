@@ -46,10 +46,12 @@ from gcodejerk.nc.start import NOTHING_KNOWN, Start
 from gcodejerk.nc.tokenizer import parse_line
 from gcodejerk.reasons import Reason
 
-# A cycle's code, blanks and zeros as the controller allows them; or one that is computed.
-_CYCLE = re.compile(rb"[gG][ \t]*[0+]*[ \t]*[78]|[gG][ \t]*[#\[]")
+# A cycle's code, blanks and zeros as the controller allows them; one that is computed is unknown.
+_CYCLE = re.compile(rb"[gG][0+ \t]*[78]")
 # What may change the spindle or the path mode.
-_NOTED = re.compile(rb"[mMoO]|[gG][ \t]*[0+]*[ \t]*6|[gG][ \t]*[#\[]")
+_NOTED = re.compile(rb"[mMoO]|[gG][0+ \t]*6")
+ROOM = 16
+"""Characters by which a line may become longer than the block: its code, blanks, a sign, a dot."""
 _SHOWN = 20
 """Series left alone that get a finding of their own."""
 
@@ -347,6 +349,8 @@ class _Walker(Reader):
         if series.reason is not None:
             return
         reason = judge(series, moment, block, self.rules)
+        if len(text) > self.dialect.line_limit - ROOM:
+            reason = reason or "the block is too long"
         call = reason or call_of(series, moment, block, self.rules)
         if isinstance(call, str):
             self._leave(series, call, place[2])

@@ -124,6 +124,16 @@ def test_the_difference_replaces_what_it_says(result):
     assert text.count(b"\n@@") == len(result.hunks)
 
 
+def test_the_stamp_in_front_of_a_cycle_is_a_difference_of_its_own():
+    machine = replace(VMC, program=replace(VMC.program, start={"X": 0.0, "Y": 0.0, "Z": 20.0}))
+    program = b"G21 G90 G94 G99 G81 X3 Z-2 R2 F100\nG80\nM2\n"
+    result = process(program, machine, expand_cycles=True)
+    first, second = result.hunks.tolist()
+    assert result.output[first[0] : first[1]].startswith(b"(gcodejerk stamp")
+    assert (second[0], second[2:]) == (first[1], [1, 0, program.index(b"G80")])
+    assert result.output[second[1] :] == b"G80\nM2\n"
+
+
 def test_the_difference_of_a_program_whose_cycles_cannot_be_planned_is_there_too():
     machine = replace(VMC, design=replace(VMC.design, minimum_length=1e6))
     result = process(HOLES, machine, expand_cycles=True)

@@ -51,6 +51,13 @@ def test_a_comment_names_each_block_and_is_short():
     assert len(lines[0]) <= 69
 
 
+@pytest.mark.parametrize("code", [b"g 0 8 1", b"G081.0", b"G+81", b"G 00 81."])
+def test_a_cycle_is_found_however_it_is_spelled(code):
+    lines, found = expanded(HEAD + code + b"X1 Z-5 R2\nG80\nM2\n")
+    assert found.written == 1
+    assert lines[1] == "G0 X1"
+
+
 def test_increments_are_exact():
     lines, _ = expanded(HEAD + b"G91 G81 X0.1 Y.2 Z-5.1 R-7.3 L3\nG80\nM2\n")
     down = ["G0 Z-7.3", "G1 Z-5.1", "G0 Z12.4"]
@@ -134,6 +141,7 @@ LEFT = {
     "inverse time": (b"G93 G81 X1 Z-5 R2 F1\nG80\n", None),
     "end in the block": (b"G81 X1 Y1 Z-5 R2 M2\n", None),
     "end in a later block": (CYCLE + b"X3 M2\n", "order"),
+    "long": (b"G81 X" + b"0" * 230 + b"1 Z-5 R2\nG80\n", "too long"),
     "rotated": (b"G10 L2 P1 R30\nG0 X0 Y0 Z10\n" + CYCLE + b"G80\n", "rotation"),
     "unknown code": (CYCLE + b"G77\nX3\nG80\n", "not understood"),
 }

@@ -196,6 +196,14 @@ def test_a_series_that_is_not_certain_may_not_be_written_out(case):
     assert not check(bad, original).ok
 
 
+@pytest.mark.parametrize("code", [b"g 0 8 1", b"G081.0", b"G+81", b"G 00 81."])
+def test_a_cycle_is_seen_however_it_is_spelled(code):
+    plain = b"G21 G90 G61 G98 F100\nG0 X0 Y0 Z10\n" + code + b" X1 Z-5 R2\nG80\nM2\n"
+    good = plain.replace(code + b" X1 Z-5 R2\n", b"G0 X1\nG0 Z2\nG1 Z-5\nG0 Z10\n")
+    assert check(good, plain).ok
+    assert check(good, plain).rewritten == 1
+
+
 def test_a_rest_behind_every_move_is_needed_where_the_path_mode_is_not_known():
     program = PROGRAM.replace(b" G64 P0.05", b"")
     good = written(program)
