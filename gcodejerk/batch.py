@@ -110,7 +110,8 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         diff = difference(source, target, result) if job.mode == "diff" else b""
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}"
-    changed = result.planned > 0
+    written = 0 if result.expansion is None else result.expansion.written
+    changed = result.planned > 0 or written > 0
     return Done(job.input, changed, summary, result.notes, diff)
 
 

@@ -9,7 +9,6 @@ Rule 2: nothing is given back that `verify` has not accepted (unless the user sw
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,26 +17,28 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk import __version__
 from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.errors import EmitError, Place, ProgramError
+from gcodejerk.expanded import (
+    hunks,
+    in_original,
+    lines_in_original,
+    written_out,
+)
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
+from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
+from gcodejerk.splice import Splicer, stamp_text
 from gcodejerk.start import program_start
-from gcodejerk.stream import Batch, make_streams
+from gcodejerk.stream import Residuals, make_streams
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
 
-TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
-"""Bytes of a line end, by `Rapids.terminator`."""
 Progress = Callable[[str, int, int], None]
 """Called with a step's name, how much of it is done, and of how much."""
-COPY_SIZE = 1 << 20
-STAMP_LENGTH = 69
-"""Controllers and senders with short lines choke on longer comments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,8 @@ class Settings:
     verify: bool = True
     force: bool = False
     """Process a file that carries our stamp."""
+    expand_cycles: bool = False
+    """Write drilling cycles out as explicit moves first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +64,8 @@ class Result:
     Attributes
     ----------
     program : Program
-        As it was read, with its rapids.
+        As it was read, with its rapids. Those of cycles that were written out carry the line and
+        the place of the cycle's block; several of them share one.
     plans : Plans
         Row i is rapid i.
     controller : str
@@ -75,8 +79,12 @@ class Result:
     verification : Verification or None
         None where it was switched off, or where nothing was written.
     edits : ndarray of int, shape (k, 3)
-        Begin and end in the output of everything that is not the source's, and the rapid that it
-        replaces; -1 for the stamp. Empty where the output is a file of its own. [bytes]
+        Begin and end in the output of every stream, and the rapid that it replaces; -1 for the
+        stamp. Empty where the output is a file of its own. [bytes]
+    hunks : ndarray of int, shape (n, 5)
+        All that is not the source's, cycles included: see `expanded.hunks`.
+    expansion : Expansion or None
+        What became of the cycles; None where they were not to be written out.
     notes : tuple of str
         What the user has to know: of the program, and of the controller.
     output : bytes or None
@@ -94,6 +102,8 @@ class Result:
     deviation: Array
     verification: Verification | None
     edits: NDArray[np.int64]
+    hunks: NDArray[np.int64]
+    expansion: Expansion | None
     notes: tuple[str, ...]
     output: bytes | None = field(default=None, repr=False)
 
@@ -118,6 +128,7 @@ def process(
     comments: bool = True,
     verify: bool = True,
     force: bool = False,
+    expand_cycles: bool = False,
     name: str = "<program>",
 ) -> Result:
     r"""Rewrite every rapid of a program that is certain.
@@ -136,6 +147,8 @@ def process(
         Read the output back and prove it.
     force : bool
         Accept a program that carries our stamp.
+    expand_cycles : bool
+        Write drilling cycles out as explicit moves, whose rapids can then be rewritten.
     name : str
         What messages call the program.
 
@@ -161,7 +174,9 @@ def process(
     >>> result.planned, result.left
     (1, 1)
     """
-    settings = Settings(controller, "stream", profile, dialect, comments, verify, force)
+    settings = Settings(
+        controller, "stream", profile, dialect, comments, verify, force, expand_cycles
+    )
     target = io.BytesIO()
     result = process_file(io.BytesIO(data), target, machine, settings, name)
     return _with_output(result, target.getvalue())
@@ -199,7 +214,39 @@ def process_file(
     """
     emitter = load_controller(settings.controller or machine.controller)
     _check_form(emitter, settings.form)
-    report = progress or silent
+    if not settings.expand_cycles:
+        return _process(source, target, machine, settings, name, emitter, progress or silent, None)
+    if target is not None and not emitter.in_place:
+        raise EmitError(
+            f"--expand-cycles needs streams within the program, those of controller {emitter.name} "
+            "are a file of their own",
+            "choose another --controller, or leave --expand-cycles out",
+        )
+    with written_out(
+        source,
+        machine,
+        name=name,
+        dialect=settings.dialect,
+        comments=settings.comments,
+        prove=target is not None and settings.verify,
+    ) as (used, expansion):
+        return _process(
+            used, target, machine, settings, name, emitter, progress or silent, expansion
+        )
+
+
+def _process(
+    source: BinaryIO,
+    target: BinaryIO | None,
+    machine: Machine,
+    settings: Settings,
+    name: str,
+    emitter: Controller,
+    report: Progress,
+    expansion: Expansion | None,
+) -> Result:
+    """Process a program; the source is that with its cycles written out, if they are."""
+    lines = None if expansion is None else expansion.map
     source.seek(0, io.SEEK_END)
     size = source.tell()
     source.seek(0)
@@ -214,7 +261,7 @@ def process_file(
         raise ProgramError(
             "this program has been processed by gcodejerk before",
             "process the original, or add --force to process its remaining rapids",
-            Place(name, program.stamp),
+            Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
         )
     plans = plan_rapids(
         program.rapids,
@@ -222,14 +269,20 @@ def process_file(
         settings.profile,
         lambda done, total: report("planning", done, total),
     )
-    collected = _Residuals(plans)
-    writer = _Writer(source, target, program, machine, emitter, settings)
+    collected = Residuals(plans)
+    deviation = np.zeros(len(plans))
+    chosen = [emitter.name, settings.form, settings.profile or machine.design.profile]
+    chosen += ["expand-cycles"] if settings.expand_cycles else []
+    options = Options(settings.comments, find_dialect(program.dialect))
+    writer = Splicer(source, target, program, emitter, options, stamp_text(machine, chosen))
+    writer.write_header(machine)
     done = 0
     for window in make_streams(
         plans, emitter.spelling(program.rapids, machine), emitter.stride(machine.interval)
     ):
         for batch in window:
             collected.add(batch)
+            deviation[batch.moves] = path_deviation(batch)
         writer.write(window)
         done += sum(map(len, window))
         report("writing", done, int(np.count_nonzero(plans.planned)))
@@ -249,16 +302,20 @@ def process_file(
             dialect=program.dialect,
             start=program_start(machine),
         )
-        require(verification)
+        require(lines_in_original(verification, lines))
         report("verifying", 1, 1)
-    notes = [_finding(finding.line, finding.message) for finding in program.findings]
+    edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
+    differences = hunks(edits, program.rapids, program.insert_at, lines)
+    program = in_original(program, expansion)
+    findings = (*program.findings, *(() if expansion is None else expansion.findings))
+    notes = [_finding(finding.line, finding.message) for finding in findings]
     home = DIALECT_OF_CONTROLLER.get(emitter.name)
     if emitter.in_place and home is not None and not program.dialect.startswith(home):
         notes.append(
             f"the program is read as {program.dialect}, controller {emitter.name} reads {home}: "
             "how the program's control follows its streams was not measured"
         )
-    notes += dogleg_notes(plans, collected.deviation)
+    notes += dogleg_notes(plans, deviation)
     return Result(
         program=program,
         plans=plans,
@@ -268,22 +325,13 @@ def process_file(
         residual=collected.residual,
         conventional_residual=collected.conventional,
         kept=collected.kept,
-        deviation=collected.deviation,
+        deviation=deviation,
         verification=verification,
-        edits=np.array(writer.edits, dtype=np.int64).reshape(-1, 3),
+        edits=edits,
+        hunks=differences,
+        expansion=expansion,
         notes=(*notes, *emitter.notes(program.rapids, plans)),
     )
-
-
-def stamp_comment(machine: Machine, settings: Settings, emitter: Controller) -> bytes:
-    """Text of the comment at the top of an output: version, machine and a hash of the settings."""
-    chosen = (emitter.name, settings.form, settings.profile or machine.design.profile)
-    text = " ".join((machine.settings_hash, *chosen)).encode()
-    digest = hashlib.blake2b(text, digest_size=4).hexdigest()
-    plain = "".join(
-        c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name
-    )
-    return f"gcodejerk stamp {__version__} {digest} {plain}"[: STAMP_LENGTH - 2].encode()
 
 
 def _with_output(result: Result, output: bytes) -> Result:
@@ -308,109 +356,3 @@ def _check_form(emitter: Controller, form: str) -> None:
             f"controller {emitter.name} cannot write --as {form} in this version",
             f"it can write: {', '.join(names)}",
         )
-
-
-class _Residuals:
-    """Collects from batches what a report needs."""
-
-    def __init__(self, plans: Plans) -> None:
-        shape = (len(plans), len(plans.modes.poles))
-        self.residual = np.full(shape, np.nan)
-        self.conventional = np.full(shape, np.nan)
-        self.kept = np.zeros(len(plans), dtype=bool)
-        self.deviation = np.zeros(len(plans))
-
-    def add(self, batch: Batch) -> None:
-        """Note one batch."""
-        self.residual[batch.moves] = batch.residual
-        self.conventional[batch.moves] = batch.conventional_residual
-        self.kept[batch.moves] = batch.kept
-        self.deviation[batch.moves] = path_deviation(batch)
-
-
-class _Writer:
-    """Copies the source and puts streams in the place of blocks, in one pass through the file."""
-
-    def __init__(
-        self,
-        source: BinaryIO,
-        target: BinaryIO | None,
-        program: Program,
-        machine: Machine,
-        emitter: Controller,
-        settings: Settings,
-    ) -> None:
-        self.source, self.target, self.program = source, target, program
-        self.emitter = emitter
-        self.dialect = find_dialect(program.dialect)
-        self.options = Options(settings.comments, self.dialect)
-        self.stamp = b""
-        if emitter.in_place and self.dialect.writing is not None:
-            opens, closes = self.dialect.writing.comment
-            stamp = stamp_comment(machine, settings, emitter)
-            self.stamp = opens + stamp + closes + program.newline
-        self.digest = hashlib.blake2b(digest_size=16)
-        self.at = 0
-        self.edits: list[tuple[int, int, int]] = []
-        source.seek(0)
-        if target is not None:
-            target.write(emitter.header(machine))
-
-    def write(self, window: list[Batch]) -> None:
-        """Write the streams of a window; windows come in the order of the file."""
-        if self.target is None:
-            return
-        if self.emitter.in_place and not self.edits:
-            self._copy(self.program.insert_at)
-            self._put(self.stamp, -1)
-        texts: dict[int, bytes] = {}
-        rapids = self.program.rapids
-        for batch in window:
-            blocks = [self._block(move) for move in batch.moves]
-            new = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
-            texts.update(zip(batch.moves.tolist(), new, strict=True))
-        self.source.seek(self.at)
-        for move in sorted(texts):
-            self._copy(int(rapids.begin[move]))
-            self._read(int(rapids.end[move] + TERMINATOR_LENGTH[rapids.terminator[move]]))
-            self._put(texts[move], move)
-
-    def _block(self, move: int) -> bytes:
-        """The block of a rapid."""
-        begin, end = int(self.program.rapids.begin[move]), int(self.program.rapids.end[move])
-        self.source.seek(begin)
-        return self.source.read(end - begin)
-
-    def _put(self, text: bytes, move: int) -> None:
-        """Write what is not the source's, and note where."""
-        assert self.target is not None
-        begin = self.target.tell()
-        self.target.write(text)
-        if self.emitter.in_place:
-            self.edits.append((begin, begin + len(text), move))
-
-    def finish(self) -> None:
-        """Copy what follows the last stream, and see that the source is still what was planned."""
-        if self.target is None:
-            return
-        self._copy(self.program.size)
-        if self.source.read(1) or self.digest.digest() != self.program.digest:
-            raise EmitError(
-                f"{self.program.name} was changed while it was being processed",
-                "run the command again when nothing writes to the file",
-            )
-        self.target.flush()
-
-    def _read(self, end: int) -> bytes:
-        """The source's next bytes, up to an offset."""
-        data = self.source.read(end - self.at)
-        self.at = end
-        self.digest.update(data)
-        return data
-
-    def _copy(self, end: int) -> None:
-        """Copy the source up to an offset; only read it where the output is its own file."""
-        while self.at < end:
-            data = self._read(min(end, self.at + COPY_SIZE))
-            if self.target is not None and self.emitter.in_place:
-                self.target.write(data)

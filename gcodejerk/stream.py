@@ -298,3 +298,19 @@ class _Maker:
         response = np.zeros((len(self.moves), len(self.modes.poles)), dtype=np.complex128)
         np.add.at(response, self.row_of, each * weights)
         return response
+
+
+class Residuals:
+    """Collects from batches what a report needs."""
+
+    def __init__(self, plans: Plans) -> None:
+        shape = (len(plans), len(plans.modes.poles))
+        self.residual = np.full(shape, np.nan)
+        self.conventional = np.full(shape, np.nan)
+        self.kept = np.zeros(len(plans), dtype=bool)
+
+    def add(self, batch: Batch) -> None:
+        """Note one batch."""
+        self.residual[batch.moves] = batch.residual
+        self.conventional[batch.moves] = batch.conventional_residual
+        self.kept[batch.moves] = batch.kept

@@ -36,6 +36,9 @@ def process(
     form: Annotated[str, typer.Option("--as", help="stream, pvt or parameters")] = "stream",
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    expand_cycles: Annotated[
+        bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
+    ] = False,
     report: Annotated[str | None, typer.Option(metavar="FILE.json", help="write a report")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
     strict: Annotated[
@@ -79,6 +82,7 @@ def process(
         comments=not no_comments,
         verify=not no_verify,
         force=force,
+        expand_cycles=expand_cycles,
     )
     mode = "check" if check else "diff" if diff else "write"
     described = load_machine(machine, files[0])
@@ -122,6 +126,9 @@ def inspect(
     machine: MachineOption,
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    expand_cycles: Annotated[
+        bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print the report as JSON")] = False,
 ) -> None:
     """Show all rapids of a program: planned, or left alone and why."""
@@ -131,7 +138,7 @@ def inspect(
     from gcodejerk.report.tables import rapids_table, summary_line
 
     described = load_machine(machine, file)
-    settings = Settings(profile=profile, dialect=dialect, force=True)
+    settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
     with open_input(file) as source, progress(as_json) as show:
         result = process_file(source, None, described, settings, file, show)
         record = record_of(result, described, None, source, show, bounds=as_json)
@@ -152,9 +159,13 @@ def verify(
     machine: MachineOption,
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    expand_cycles: Annotated[
+        bool, typer.Option("--expand-cycles", help="the original's cycles are written out")
+    ] = False,
     most: Annotated[int, typer.Option(min=1, help="stop after so many violations")] = 100,
 ) -> None:
     """Prove that a program is the original with only its rapids re-timed; list what it is not."""
+    from gcodejerk.expanded import verify_expanded
     from gcodejerk.files import open_input
     from gcodejerk.start import program_start
     from gcodejerk.verification import verify_csv, verify_files
@@ -164,12 +175,21 @@ def verify(
     described = load_machine(machine, original)
     if profile is not None:
         described = replace(described, design=replace(described.design, profile=profile))
-    judge = verify_csv if processed.lower().endswith(".csv") else verify_files
+    table = processed.lower().endswith(".csv")
+    if table and expand_cycles:
+        raise typer.BadParameter("--expand-cycles: a table of streams has no cycles written out")
+    written = 0
     with open_input(original) as one, open_input(processed) as other:
-        found = judge(
-            one, other, described, names=(original, processed), dialect=dialect,
-            start=program_start(described), most=most,
-        )  # fmt: skip
+        names = (original, processed)
+        if expand_cycles:
+            found, written = verify_expanded(
+                one, other, described, names=names, dialect=dialect, most=most
+            )
+        else:
+            found = (verify_csv if table else verify_files)(
+                one, other, described, names=names, dialect=dialect,
+                start=program_start(described), most=most,
+            )  # fmt: skip
     for violation in found.violations:
         file, line = (
             (processed, violation.line) if violation.line else (original, violation.original_line)
@@ -177,9 +197,10 @@ def verify(
         place = f"{file}:{line}" if line else file
         print(f"{place}: {violation.kind}: {violation.problem}")
     if found.ok:
+        cycles = f"{written} cycles written out, " if expand_cycles else ""
         print(
-            f"{processed}: is {original} with {found.rewritten} of its {found.rapids} rapids "
-            f"re-timed and nothing else changed"
+            f"{processed}: is {original} with {cycles}{found.rewritten} of its {found.rapids} "
+            "rapids re-timed and nothing else changed"
         )
         return
     more = " or more" if len(found.violations) >= most else ""

@@ -1,9 +1,9 @@
 """Where a canned cycle leaves the tool: G73, G74, G76 and G81 to G89.
 
-Rule: only the end matters here; what a cycle does on the way down belongs to the controller. As
-in LinuxCNC, the tool goes to the hole, then to R, drills to Z, and comes back to R (G99) or to
-where the series of cycles began, if that is higher (G98). In G91, R counts from where the tool
-stands, Z from R, and every repeat (L) moves on by the same increments.
+Rule: only the end matters here; what a cycle does on the way down is told in `drilling`. As in
+LinuxCNC, the tool goes to the hole, then to R, drills to Z, and comes back to R (G99) or to where
+the series of cycles began, if that is higher (G98). In G91, R counts from where the series began,
+Z from R, and every repeat (L) moves on by the same increments.
 """
 
 from __future__ import annotations
@@ -60,17 +60,17 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
         return False
     state.put("cycle", (code, depth, clearance))
 
-    here = state.position[along]
     if not series:
-        state.put("cycle_level", here)
-    scale = state.scale(along)
-    incremental = state.distance == 910
-    r = clearance * scale + (here if incremental else 0.0)
-    if state.distance is None:
-        r = NAN
+        state.put("cycle_level", state.position[along])
     level = state.cycle_level
-    if series and incremental:
-        level = NAN  # not measured: where a series in G91 takes its level from
+    scale = state.scale(along)
+    r, bottom = clearance * scale, depth * scale
+    if state.distance == 910:
+        r, bottom = r + level, r + level + bottom
+    elif state.distance is None:
+        r = bottom = NAN
+    if r < bottom:
+        return False
     # max() with a NaN would return either operand
     above = NAN if level != level or r != r else max(level, r)
     known = above == r or state.retract is not None
@@ -80,11 +80,9 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
             value = values[AXES[axis]] * state.scale(axis)
             if state.distance == 900:
                 state.move(axis, value)
-            elif incremental:
+            elif state.distance == 910:
                 state.move(axis, state.position[axis] + repeats * value)
             else:
                 state.move(axis, NAN)
-    if not series and here < r:
-        state.put("cycle_level", r)
     state.move(along, end)
     return True

@@ -1,13 +1,14 @@
 """What would change in a program, in the form of `diff -u`.
 
-The streams are the only differences and where they are is known, so nothing has to be searched for.
+Streams, and cycles that were written out, are the only differences, and where they are is known: so
+nothing has to be searched for.
 """
 
 from __future__ import annotations
 
 from typing import BinaryIO
 
-from gcodejerk.pipeline import TERMINATOR_LENGTH, Result
+from gcodejerk.pipeline import Result
 
 
 def difference(source: BinaryIO, target: BinaryIO, result: Result) -> bytes:
@@ -28,18 +29,12 @@ def difference(source: BinaryIO, target: BinaryIO, result: Result) -> bytes:
     name = result.program.name.encode()
     out = [b"--- %s\n+++ %s (gcodejerk)\n" % (name, name)]
     added = 0
-    rapids = result.program.rapids
-    for begin, end, row in result.edits.tolist():
+    for begin, end, line, first, last in result.hunks.tolist():
         target.seek(begin)
         new = target.read(end - begin).splitlines(keepends=True)
-        old: list[bytes] = []
-        # The stamp is inserted behind the first line at the most: an opening %.
-        line = 1 if result.program.insert_at else 0
-        if row >= 0:
-            line = int(rapids.line[row])
-            source.seek(int(rapids.begin[row]))
-            size = rapids.end[row] - rapids.begin[row] + TERMINATOR_LENGTH[rapids.terminator[row]]
-            old = [source.read(int(size))]
+        source.seek(first)
+        # The stamp replaces nothing.
+        old = [source.read(last - first)] if last > first else []
         out.append(b"@@ -%d,%d +%d,%d @@\n" % (line, len(old), line + added, len(new)))
         out += [b"-" + _ended(text) for text in old] + [b"+" + _ended(text) for text in new]
         added += len(new) - len(old)

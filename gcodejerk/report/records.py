@@ -168,7 +168,11 @@ class Records:
 def summary_of(result: Result) -> Record:
     """The summary of a report, without the records of its rapids."""
     records = Records(result.plans, result.kept, result.residual, result.conventional_residual)
-    return {"blocks": result.program.blocks} | records.summary()
+    summary = {"blocks": result.program.blocks} | records.summary()
+    if result.expansion is not None:
+        summary["cycles"] = result.expansion.holes
+        summary["cycles_expanded"] = result.expansion.written
+    return summary
 
 
 def process_record(

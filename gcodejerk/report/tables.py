@@ -70,6 +70,9 @@ def summary_line(name: str, summary: Record) -> str:
     if not summary["rapids"]:
         return f"{name}: 0 rapids found, nothing to do"
     parts = [f"{name}: {rapids}, {summary['planned']} rewritten"]
+    if summary.get("cycles"):
+        of = f" of {summary['cycles']}" if summary["cycles_expanded"] != summary["cycles"] else ""
+        parts.append(f"{summary['cycles_expanded']}{of} cycles written out")
     if summary["planned"] and summary["worst_conventional_residual"]:
         now = summary["worst_conventional_residual"] * UM_PER_MM
         then = summary["worst_residual"] * UM_PER_MM

@@ -160,6 +160,7 @@ def verify_files(
     stride = stride_of(machine)
     for streams in _batches(_checked(walk, reader)):
         _judge(reader.paths(streams), program, machine, stride, found)
+    walk.check_sum()
     return Verification(len(program.rapids), walk.rewritten, walk.kept, found.sorted(), names)
 
 

@@ -45,6 +45,8 @@ class Kind(enum.StrEnum):
     TIME = "duration"
     RESIDUAL = "residual"
     TABLE = "table"
+    CYCLE = "moves of a cycle"
+    SERIES = "cycle that had to be left to the controller"
 
 
 @dataclass(frozen=True, slots=True)

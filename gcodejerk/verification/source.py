@@ -5,18 +5,22 @@ Rule: bytes are handed out exactly as they are; a line is what ends with LF.
 
 from __future__ import annotations
 
+import hashlib
+import re
 from typing import BinaryIO
 
 PIECE = 1 << 18
 """Bytes read and compared at a time."""
 LONGEST_LINE = 1 << 16
 """What is longer is not a line of a program."""
+_SUM = re.compile(rb"gcodejerk stamp [ -~]{1,40}? sum:([0-9a-f]{16})")
+"""A sum in a stamp; it counts as zeros in itself, and stands in the first piece of the file."""
 
 
 class Window:
     """A place in a file, with what follows it."""
 
-    __slots__ = ("_ended", "at", "data", "file", "line")
+    __slots__ = ("_begun", "_digest", "_ended", "at", "claimed", "data", "file", "line")
 
     def __init__(self, file: BinaryIO) -> None:
         self.file = file
@@ -26,6 +30,24 @@ class Window:
         self.line = 1
         """Number of the line that the place is in."""
         self._ended = False
+        self._digest = hashlib.blake2b(digest_size=8)
+        self._begun = False
+        self.claimed: str | None = None
+        """The sum of the whole file, as its stamp states it."""
+
+    @property
+    def sum(self) -> str:
+        """The sum of what has been read."""
+        return self._digest.hexdigest()
+
+    def _add(self, piece: bytes) -> None:
+        """Add a piece to the sum."""
+        match = None if self._begun else _SUM.search(piece)
+        self._begun = True
+        if match:
+            self.claimed = match[1].decode()
+            piece = piece[: match.start(1)] + b"0" * len(match[1]) + piece[match.end(1) :]
+        self._digest.update(piece)
 
     def fill(self, size: int) -> int:
         """Have this many bytes in memory behind the place, or all there are; how many they are."""
@@ -37,6 +59,7 @@ class Window:
                 if not piece:
                     self._ended = True
                     break
+                self._add(piece)
                 parts.append(piece)
                 have += len(piece)
             self.data, self.at = b"".join(parts), 0

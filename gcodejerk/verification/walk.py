@@ -161,6 +161,19 @@ class Walk:
                 Kind.STAMP, self._stamp_line, None, "stamp, though nothing was rewritten"
             )
 
+    def check_sum(self) -> None:
+        """Compare the sum in the stamp with that of the file, once nothing else was found."""
+        claimed, found = self.processed.claimed, self.processed.sum
+        if (
+            self._stamp_line is not None
+            and claimed not in (None, found)
+            and not self.found.violations
+        ):
+            problem = f"the file was changed after it was written: its sum is {found}"
+            self.found.add(
+                Kind.STAMP, self._stamp_line, None, f"{problem}, the stamp says {claimed}"
+            )
+
     def _complain(self, kind: Kind, problem: str) -> None:
         line = None if self.original.ended else self.original.line
         self.found.add(kind, self.processed.line, line, problem)

@@ -1,7 +1,8 @@
 """Whole programs with their whole output, compared as bytes.
 
 A case is a folder with `in.ngc`, `machine.yaml` and `out.ngc` (`out.csv` where the machine's
-controller is `csv`); a new folder is a new test. `pytest --update-golden` writes the outputs anew.
+controller is `csv`); a new folder is a new test, and one whose name begins with `cycles_` writes
+drilling cycles out. `pytest --update-golden` writes the outputs anew.
 The intervals are long, so that a move is a dozen points that a reader can follow by eye.
 """
 
@@ -20,7 +21,11 @@ def made(case):
     """The machine, the program and what becomes of it."""
     machine = Machine.load(HERE / case / "machine.yaml")
     program = (HERE / case / "in.ngc").read_bytes()
-    return machine, program, process(program, machine, name=f"{case}/in.ngc")
+    return (
+        machine,
+        program,
+        process(program, machine, name=f"{case}/in.ngc", expand_cycles=case.startswith("cycles_")),
+    )
 
 
 @pytest.mark.parametrize("case", CASES)

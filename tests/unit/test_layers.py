@@ -21,6 +21,7 @@ PICTURE = """
  <- nc | machine | motion
  <- start plans solutions optima designs refusals plan stream move survey arrival comparison dogleg
  <- emit | verification | testing
+ <- expanded splice
  <- pipeline
  <- report
  <- files batch

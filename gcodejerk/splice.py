@@ -1,0 +1,180 @@
+"""Streams into a program: what is replaced, what is copied, and the stamp at the top.
+
+Rule 1: what is not a planned rapid's block is copied from the source, byte for byte.
+
+Rule 2: the stamp carries a sum of the whole output, itself left out, so that every later change of
+it shows, however small: an F that is 1 % off at low speed moves no point and breaks no limit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Sequence
+from typing import BinaryIO
+
+from gcodejerk import __version__
+from gcodejerk.emit import Controller, Options
+from gcodejerk.errors import EmitError
+from gcodejerk.expanded import TERMINATOR_LENGTH
+from gcodejerk.machine import Machine
+from gcodejerk.nc import Program
+from gcodejerk.stream import Batch
+
+COPY_SIZE = 1 << 20
+STAMP_LENGTH = 67
+"""Of the text without its comment marks: controllers with short lines choke on longer ones."""
+SUM_DIGITS = 16
+SUM_MARK = b" sum:"
+SUM_UNKNOWN = SUM_MARK + b"0" * SUM_DIGITS
+"""The sum while it is computed: BLAKE2b, 8 bytes, over the output with these digits in it."""
+SUM_WITHIN = 1 << 17
+"""A stamp that stands farther from the top than this has no sum. [bytes]"""
+
+
+def stamp_text(machine: Machine, chosen: Sequence[str]) -> bytes:
+    """Text of the stamp: version, a hash of the settings, room for the sum, and the machine.
+
+    Parameters
+    ----------
+    machine : Machine
+        What the program runs on.
+    chosen : sequence of str
+        The user's choices that shape the output.
+
+    Returns
+    -------
+    bytes
+        Without the marks of a comment.
+    """
+    text = " ".join((machine.settings_hash, *chosen)).encode()
+    digest = hashlib.blake2b(text, digest_size=4).hexdigest()
+    plain = "".join(
+        c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name
+    )
+    head = f"gcodejerk stamp {__version__} {digest}".encode() + SUM_UNKNOWN
+    return (head + b" " + plain.encode())[:STAMP_LENGTH].rstrip()
+
+
+class Splicer:
+    """Copies the source and puts streams in the place of blocks, in one pass through the file."""
+
+    def __init__(
+        self,
+        source: BinaryIO,
+        target: BinaryIO | None,
+        program: Program,
+        emitter: Controller,
+        options: Options,
+        stamp: bytes,
+    ) -> None:
+        """Begin.
+
+        Parameters
+        ----------
+        source : binary file
+            The program; seekable.
+        target : binary file or None
+            Empty and seekable; None to write nothing.
+        program : Program
+            As it was read.
+        emitter : Controller
+            Writes the streams.
+        options : Options
+            The user's choices, and the program's dialect.
+        stamp : bytes
+            Text of the stamp, of `stamp_text`.
+        """
+        self.source, self.target, self.program = source, target, program
+        self.emitter, self.options = emitter, options
+        self.stamp = b""
+        if emitter.in_place and options.dialect.writing is not None:
+            opens, closes = options.dialect.writing.comment
+            self.stamp = opens + stamp + closes + program.newline
+        self.digest = hashlib.blake2b(digest_size=16)
+        self.written = hashlib.blake2b(digest_size=SUM_DIGITS // 2)
+        self.sum_at: int | None = None
+        self.at = 0
+        self.edits: list[tuple[int, int, int]] = []
+        source.seek(0)
+
+    def write_header(self, machine: Machine) -> None:
+        """Write the first lines of a file of its own."""
+        if self.target is not None:
+            self.target.write(self.emitter.header(machine))
+
+    def write(self, window: list[Batch]) -> None:
+        """Write the streams of a window; windows come in the order of the file."""
+        if self.target is None:
+            return
+        if self.emitter.in_place and not self.edits:
+            self._copy(self.program.insert_at)
+            self._put_stamp()
+        texts: dict[int, bytes] = {}
+        rapids = self.program.rapids
+        for batch in window:
+            blocks = [self._block(move) for move in batch.moves]
+            new = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
+            texts.update(zip(batch.moves.tolist(), new, strict=True))
+        self.source.seek(self.at)
+        for move in sorted(texts):
+            self._copy(int(rapids.begin[move]))
+            self._read(int(rapids.end[move] + TERMINATOR_LENGTH[rapids.terminator[move]]))
+            self._put(texts[move], move)
+
+    def _block(self, move: int) -> bytes:
+        """The block of a rapid."""
+        begin, end = int(self.program.rapids.begin[move]), int(self.program.rapids.end[move])
+        self.source.seek(begin)
+        return self.source.read(end - begin)
+
+    def _put(self, text: bytes, move: int) -> None:
+        """Write what is not the source's, and note where."""
+        assert self.target is not None
+        begin = self.target.tell()
+        self.target.write(text)
+        self.written.update(text)
+        if self.emitter.in_place:
+            self.edits.append((begin, begin + len(text), move))
+
+    def _put_stamp(self) -> None:
+        """Write the stamp, its sum to be filled in at the end."""
+        assert self.target is not None
+        at = self.target.tell()
+        if at < SUM_WITHIN:
+            found = self.stamp.find(SUM_UNKNOWN)
+            self.sum_at = None if found < 0 else at + found + len(SUM_MARK)
+        self._put(
+            self.stamp if self.sum_at is not None else self.stamp.replace(SUM_UNKNOWN, b""), -1
+        )
+
+    def finish(self) -> None:
+        """Copy what follows the last stream, and see that the source is still what was planned."""
+        if self.target is None:
+            return
+        self._copy(self.program.size)
+        if self.source.read(1) or self.digest.digest() != self.program.digest:
+            raise EmitError(
+                f"{self.program.name} was changed while it was being processed",
+                "run the command again when nothing writes to the file",
+            )
+        if self.sum_at is not None:
+            self.target.seek(self.sum_at)
+            self.target.write(self.written.hexdigest().encode())
+            self.target.seek(0, io.SEEK_END)
+        self.target.flush()
+
+    def _read(self, end: int) -> bytes:
+        """The source's next bytes, up to an offset."""
+        data = self.source.read(end - self.at)
+        self.at = end
+        self.digest.update(data)
+        return data
+
+    def _copy(self, end: int) -> None:
+        """Copy the source up to an offset; only read it where the output is its own file."""
+        while self.at < end:
+            data = self._read(min(end, self.at + COPY_SIZE))
+            if self.target is not None and self.emitter.in_place:
+                self.target.write(data)
+                self.written.update(data)

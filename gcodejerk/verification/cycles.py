@@ -1,0 +1,285 @@
+"""What drilling cycles mean, told a second time: the places that the tool visits for each hole.
+
+By this measure `verification.expansion` judges cycles that were written out. It follows the
+description of the cycles in LinuxCNC's manual and shares nothing with `nc.drilling`, `nc.series`
+and `nc.expansion`, which write them; the words of a block and what is in force there come from the
+reader, as everywhere in this package.
+
+Rule: every number is exact, and every place absolute where the program tells it; a place that it
+does not tell has an origin of its own, so that increments can be compared all the same.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from gcodejerk.nc import AXES, Block, Word
+from gcodejerk.nc.dialect import PLANES
+from gcodejerk.nc.modal import State
+
+CLOSE = Fraction(1, 10**8)
+"""Numbers of a program that differ by less are the same; in its unit, far below a resolution."""
+
+HEIGHTS = {
+    # What the tool does over a hole, once it is at R (LinuxCNC manual, "Canned cycles"):
+    # z feed to the bottom, r feed to R, t feed to the top, T rapid to the top (R in G99, else where
+    # the series began if that is higher), P dwell, S stop the spindle, M start it again,
+    # b pecks that break the chip, c pecks that clear it.
+    730: "bzT",
+    810: "zT",
+    820: "zPT",
+    830: "czT",
+    850: "zrT",
+    860: "zPSTM",
+    890: "zPt",
+}
+CLEARANCE = Fraction(10, 1000)
+"""Inches that a peck goes back, or stops above where it was."""
+MOST_PECKS = 20_000
+"""Of one block, repeats included."""
+
+_MOVE = re.compile(rb"(G0|G1)((?: [XYZ][-+]?\d*\.?\d*)+)")
+_DWELL = re.compile(rb"G4 P(\d*\.?\d*)")
+QUIET_G = frozenset({17, 18, 19, 20, 21, 40, 90, 91, 90.1, 91.1, 94, 95, 98, 99})
+QUIET_M = frozenset({3, 4, 5, 7, 8, 9, 48, 49})
+STOPS = frozenset({0, 1, 2, 30, 60})
+"""G and M codes that a block of a cycle may hold: what they do, they do before or after it."""
+
+Height = tuple[str, Fraction]
+"""Origin (empty: the program's zero; `?`: a place that is not known), and distance to it."""
+Event = tuple[str, tuple[Height, ...] | Fraction]
+"""rapid or feed and the place in the plane's three axes, dwell or spindle and its number."""
+
+
+@dataclass(slots=True)
+class Series:
+    """A run of blocks in which a cycle is in force."""
+
+    level: Height
+    at: dict[str, Height]
+    plane: int | None
+    unit: float | None
+    written: bool | None = None
+    code: int = 0
+    said: dict[str, Fraction] = field(default_factory=dict)
+    """Words that stay in force: the depth (under `z`), R, P and Q."""
+    doubt: str | None = None
+
+
+def begin_series(here: list[float], state: State) -> Series:
+    """The tool as a series finds it; `here` are the positions in front of its first block."""
+    at: dict[str, Height] = {}
+    for letter in "XYZ":
+        axis = AXES.index(letter)
+        number = here[axis] / state.scale(axis)
+        at[letter] = ("?", Fraction(0)) if math.isnan(number) else ("", Fraction(number))
+    along = PLANES[state.plane][2] if state.plane in PLANES else "Z"
+    return Series(at.get(along, ("?", Fraction(0))), at, state.plane, state.unit)
+
+
+def doubt_of(series: Series, state: State) -> str | None:
+    """What is not certain of the state in which a hole is made."""
+    if state.motion not in HEIGHTS:
+        return "only the controller can do this cycle"
+    if state.plane != series.plane or state.unit != series.unit or series.unit is None:
+        return "plane or unit change, or are not known"
+    if state.plane not in (170, 180, 190) or (state.plane == 190 and state.diameter is not False):
+        return "nobody knows cycles in this plane"
+    if state.compensation != 400 or state.rotated is not False:
+        return "cutter compensation or rotation"
+    if state.distance not in (900, 910) or state.feed_mode not in (94, 95):
+        return "distance mode or feed mode"
+    if not state.feed > 0.0:
+        return "no feed"
+    if series.level[0]:
+        return "where it starts is not known"
+    return None
+
+
+def _belongs(word: Word, code: int, letters: set[str]) -> bool:
+    """Whether a word may stand in a block of a cycle."""
+    number = -1.0 if word.value is None else word.value
+    if word.letter == "G":
+        return number in QUIET_G or round(number * 10) == code
+    return word.letter in letters or (word.letter == "M" and number in QUIET_M | STOPS)
+
+
+def calls_for(series: Series, block: Block, state: State, turning: int) -> list[list[Event]] | str:
+    """What a block calls for: its moves, for each count of pecks that may be meant."""
+    plane = PLANES[state.plane or 170]
+    code = state.motion or 0
+    said = {w.letter: number_of(w.text[1:]) for w in block.words if w.letter in "XYZRPQL"}
+    own = {"P"} & set(HEIGHTS[code]) | ({"Q"} if HEIGHTS[code][0] in "bc" else set())
+    for word in block.words:
+        if not _belongs(word, code, {*plane, "R", "L", "N", "F", "S", "T"} | own):
+            return f"nobody knows when {word.text.decode('latin-1')} acts"
+    if series.code != code:
+        series.code, series.said = code, {}
+    if plane[2] in said:
+        series.said["z"] = said[plane[2]]
+    series.said |= {letter: said[letter] for letter in "RPQ" if letter in said}
+    needs = {"z", "R"} | own
+    repeats = said.get("L", Fraction(1))
+    if needs - series.said.keys() or repeats < 1 or repeats.denominator != 1:
+        return "a word that it needs is missing"
+    level = series.level[1]
+    r, z = series.said["R"], series.said["z"]
+    if state.distance == 910:
+        r, z = level + r, level + r + z
+    if z > r or ("Q" in needs and series.said["Q"] <= 0):
+        return "the controller refuses it"
+    if state.retract is None and level > r:
+        return "G98 or G99 is not known"
+    if "S" in HEIGHTS[code] and not turning:
+        return "the spindle may stand"
+    top = r if state.retract == 990 else max(r, level)
+    out = []
+    for pecks in _pecks(series, code, r, z):
+        if (pecks + 1) * repeats > MOST_PECKS:
+            return f"it pecks more than {MOST_PECKS} times"
+        visits = [*_visits(series, code, (r, z, top), pecks, state, turning)]
+        places = _places(series, said, visits, (r, top), int(repeats), state)
+        out.append([*_moving(places, series, plane)])
+    return out
+
+
+def _pecks(series: Series, code: int, r: Fraction, z: Fraction) -> list[int]:
+    """How many pecks end above the bottom; two counts where binary numbers decide."""
+    if HEIGHTS[code][0] == "z":
+        return [0]
+    steps = (r - z) / series.said["Q"]
+    nearest = round(steps)
+    if nearest > 0 and abs(steps - nearest) * series.said["Q"] < CLOSE:
+        return [nearest - 1, nearest]
+    return [math.floor(steps)]
+
+
+def _visits(
+    series: Series,
+    code: int,
+    heights: tuple[Fraction, Fraction, Fraction],
+    pecks: int,
+    state: State,
+    turning: int,
+) -> Iterator[tuple[str, Fraction]]:
+    """What happens over a hole once the tool is at R: its kind, and the height or number."""
+    r, z, top = heights
+    back = CLEARANCE if state.unit != 1.0 else CLEARANCE * Fraction(254, 10)
+    for step in HEIGHTS[code]:
+        if step in "bc":
+            for k in range(1, pecks + 1):
+                depth = r - k * series.said["Q"]
+                yield "feed", depth
+                if step == "c":
+                    yield "rapid", r
+                yield "rapid", depth + back
+        elif step in "zrt":
+            yield "feed", {"z": z, "r": r, "t": top}[step]
+        elif step == "T":
+            yield "rapid", top
+        elif step == "P":
+            yield "dwell", series.said["P"]
+        else:
+            yield "spindle", Fraction(5 if step == "S" else turning)
+
+
+def _places(
+    series: Series,
+    said: dict[str, Fraction],
+    visits: list[tuple[str, Fraction]],
+    heights: tuple[Fraction, Fraction],
+    repeats: int,
+    state: State,
+) -> Iterator[Event]:
+    """Every place of every hole, standing still included."""
+    first, second, along = PLANES[state.plane or 170]
+    r, top = heights
+    a, b, c = series.at[first], series.at[second], series.at[along][1]
+    if series.level[1] < r:
+        c = r
+        yield "rapid", (a, b, ("", c))
+    for k in range(repeats):
+        if state.distance == 910:
+            a = (a[0], a[1] + said.get(first, Fraction(0)))
+            b = (b[0], b[1] + said.get(second, Fraction(0)))
+        else:
+            a = ("", said[first]) if first in said else a
+            b = ("", said[second]) if second in said else b
+        # The manual's "preliminary motion": level where that is above R.
+        c = c if k == 0 and c > r else top
+        yield "rapid", (a, b, ("", c))
+        yield "rapid", (a, b, ("", r))
+        for kind, value in visits:
+            moves = kind in ("rapid", "feed")
+            yield kind, (a, b, ("", value)) if moves else value
+        c = top
+
+
+def number_of(text: bytes) -> Fraction:
+    """A decimal number, exactly."""
+    return Fraction(b"".join(text.split()).decode() or "0")
+
+
+def read_event(
+    line: bytes, at: dict[str, Height], incremental: bool, plane: tuple[str, str, str]
+) -> tuple[Event, dict[str, Height]] | None:
+    """One line as what it does, and where it leaves the tool; None where it is none of ours."""
+    if match := _MOVE.fullmatch(line):
+        after = dict(at)
+        for word in match[2].split():
+            letter, number = word[:1].decode(), word[1:]
+            if not number.strip(b"+-."):
+                return None
+            value = number_of(number)
+            after[letter] = (at[letter][0], at[letter][1] + value) if incremental else ("", value)
+        if after.keys() != at.keys() or len(match[2].split()) > 3:
+            return None
+        kind = "rapid" if match[1] == b"G0" else "feed"
+        return (kind, tuple(after[letter] for letter in plane)), after
+    if (match := _DWELL.fullmatch(line)) and match[1].strip(b"."):
+        return ("dwell", number_of(match[1])), at
+    if line in (b"M3", b"M4", b"M5"):
+        return ("spindle", number_of(line[1:])), at
+    return None
+
+
+def same(one: Event, other: Event) -> bool:
+    """Whether two events are the same."""
+    if one[0] != other[0]:
+        return False
+    if one[1] == other[1]:
+        return True
+    if isinstance(one[1], tuple) and isinstance(other[1], tuple):
+        pairs = zip(one[1], other[1], strict=True)
+        return all(a == b or (a[0] == b[0] and abs(a[1] - b[1]) < CLOSE) for a, b in pairs)
+    return False
+
+
+def _moving(
+    events: Iterator[Event], series: Series, plane: tuple[str, str, str]
+) -> Iterator[Event]:
+    """The events but for moves that stand still."""
+    at: Event = ("", tuple(series.at[letter] for letter in plane))
+    for event in events:
+        if event[0] not in ("rapid", "feed"):
+            yield event
+        elif not same((at[0], event[1]), at):
+            at = ("", event[1])
+            yield event
+
+
+def told(event: Event, plane: tuple[str, str, str]) -> str:
+    """An event in words."""
+    kind, value = event
+    if isinstance(value, tuple):
+        words = (
+            f"{letter}{float(number):.10g}"
+            for letter, (origin, number) in zip(plane, value, strict=True)
+            if not origin
+        )
+        return f"a {kind} to {' '.join(words)}"
+    return f"{kind} {float(value):g}"

@@ -1,0 +1,374 @@
+"""Proof that a program with its drilling cycles written out makes the moves that they call for.
+
+Both files are walked side by side, each block of the original against what stands in its place.
+What a cycle means, `cycles` says; nothing is shared with those who write cycles out (`nc.drilling`,
+`nc.series`, `nc.expansion`) but the reading of the original: its words, and what is in force there.
+
+Rule: a series is written out whole or not at all; everything else is kept byte for byte.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import BinaryIO
+
+from gcodejerk.nc import AXES, Block, Dialect, Start, find_dialect, parse_block
+from gcodejerk.nc.chunks import Chunk, read_chunks
+from gcodejerk.nc.dialect import PLANES
+from gcodejerk.nc.modal import State
+from gcodejerk.nc.program import Reader, read_chunk, split_lines
+from gcodejerk.verification.cycles import (
+    CLOSE,
+    HEIGHTS,
+    QUIET_G,
+    QUIET_M,
+    STOPS,
+    Event,
+    Height,
+    Series,
+    begin_series,
+    calls_for,
+    doubt_of,
+    number_of,
+    read_event,
+    same,
+    told,
+)
+from gcodejerk.verification.findings import Findings, Kind, Verification
+from gcodejerk.verification.source import Window
+
+_CANDIDATE = re.compile(rb"[gG][0+ \t]*[678]|[mMoO#\[%]")
+_PATH = re.compile(rb"G64((?: [PQ]\d*\.?\d*)*)")
+
+
+def check_expansion(
+    original: BinaryIO,
+    expanded: BinaryIO,
+    *,
+    dialect: str | Dialect = "linuxcnc",
+    start: Start | None = None,
+    names: tuple[str, str] = ("<original>", "<expanded>"),
+    most: int = 100,
+) -> Verification:
+    r"""Compare a program with what became of it when its cycles were written out.
+
+    Parameters
+    ----------
+    original, expanded : BinaryIO
+        Opened for reading bytes, at their beginning.
+    dialect : str or Dialect, optional
+        How the original is written.
+    start : Start, optional
+        What it may assume.
+    names : tuple of str, optional
+        For messages.
+    most : int, optional
+        Violations after which it stops; the walk ends at the first one that it cannot pass.
+
+    Returns
+    -------
+    Verification
+        `rapids` are the blocks of cycles, `rewritten` those that are written out.
+
+    Examples
+    --------
+    >>> import io
+    >>> program = b"G21 G90 G61 G98 F100\nG0 X0 Y0 Z10\nG81 X5 Z-3 R2\nG80\nM2\n"
+    >>> moves = b"G0 X5\nG0 Z2\nG1 Z-3\nG0 Z10\n"
+    >>> written = program.replace(b"G81 X5 Z-3 R2\n", moves)
+    >>> check_expansion(io.BytesIO(program), io.BytesIO(written)).ok
+    True
+    >>> damaged = written.replace(b"Z-3", b"Z-3.1")
+    >>> found = check_expansion(io.BytesIO(program), io.BytesIO(damaged)).violations
+    >>> str(found[0].kind), found[0].line, found[0].original_line
+    ('moves of a cycle', 5, 3)
+    """
+    walk = _Walk(Window(expanded), find_dialect(dialect), Start() if start is None else start, most)
+    for chunk in read_chunks(original, names[0]):
+        if not walk.take(chunk):
+            break
+    else:
+        walk.end()
+    return Verification(walk.holes, walk.written, walk.kept, walk.found.sorted(), names)
+
+
+class _Walk:
+    """Side by side through both files."""
+
+    def __init__(self, theirs: Window, dialect: Dialect, start: Start, most: int) -> None:
+        self.theirs, self.dialect = theirs, dialect
+        self.reader = Reader("<original>", dialect, start)
+        self.found = Findings(most)
+        self.holes = self.written = self.kept = 0
+        self.series: Series | None = None
+        self.turning = 0
+        self.path: dict[str, Fraction] | None = None
+        """P and Q of the G64 in force [mm]; None where they are not known."""
+        self.newline = b""
+        if start.startup:
+            self._remember(parse_block(start.startup.encode("latin-1", "replace"), dialect), True)
+
+    def take(self, chunk: Chunk) -> bool:
+        """Walk over a chunk of the original; whether the walk can go on."""
+        if not self.newline:
+            head = chunk.data.split(b"\n", 1)[0]
+            self.newline = b"\r\n" if head.endswith(b"\r") else b"\n"
+        plain = self.series is None and not _CANDIDATE.search(chunk.data)
+        if plain and self.theirs.peek(len(chunk.data)) == chunk.data:
+            self.theirs.skip(len(chunk.data))
+            read_chunk(self.reader, chunk, True)
+            self.kept += chunk.data.count(b"\n")
+            return True
+        return all(self._line(*line) for line in split_lines(chunk))
+
+    def end(self) -> None:
+        """Behind the last line of the original."""
+        if not self.theirs.ended:
+            rest = self.theirs.peek_line()[:60].decode("latin-1").strip()
+            self.found.add(
+                Kind.ADDED, self.theirs.line, None, f"the original ends, here follows '{rest}'"
+            )
+
+    def _line(self, text: bytes, begin: int, number: int, terminator: int) -> bool:
+        """Take one line of the original; whether the walk can go on."""
+        state, reader = self.reader.state, self.reader
+        here, motion, ended = list(state.position), state.motion, state.ended
+        odd, inside = reader.odd_count, reader.flow.inside
+        reader.read_line(text, begin, number, terminator)
+        state = reader.state
+        bare = text.removesuffix(b"\r")
+        block = parse_block(bare, self.dialect)
+        sure = odd == reader.odd_count and not (inside or reader.flow.inside)
+        sure = sure and not (block.block_delete or block.assigns or block.o_word is not None)
+        sure = sure and all(word.value is not None for word in block.words)
+        if not ended:
+            self._remember(block, sure)
+        line = text + b"\n" * terminator
+        codes = [word.value for word in block.words if word.letter == "G"]
+        axes = any(word.letter in AXES for word in block.words)
+        in_cycle = state.motion in self.dialect.cycles
+        if self.series is None and in_cycle and not ended:
+            self.series = begin_series(here, state)
+            if motion in self.dialect.cycles:
+                self.series.doubt = "it began before the program"
+        if not self._is_kept(line):
+            return self._written(bare, line, block, number, sure and axes and in_cycle)
+        self.theirs.skip(len(line))
+        self.kept += 1
+        series = self.series
+        if series is None or ended:
+            return True
+        taken = any(code in (10, 28, 30, 52, 92, 53, 43.1, 43.2) for code in codes)
+        if in_cycle and sure and axes and not taken:
+            self.holes += 1
+            if series.written:
+                return self._complain(Kind.CYCLE, number, "a hole of the series is not written out")
+            series.written = False
+        elif not sure:
+            series.doubt = series.doubt or f"line {number} is not certain"
+            if series.written:
+                return self._complain(Kind.SERIES, number, "it may make a hole, or end the series")
+        elif not self._quiet(block) and in_cycle:
+            series.doubt = series.doubt or f"line {number} stands between its holes"
+        if not in_cycle or state.ended:
+            # The end of a series must be one beyond doubt, or a later block may be a hole.
+            closes = state.ended or any(
+                self.dialect.groups.get(round((code or 0.0) * 10)) == "motion" for code in codes
+            )
+            self.series = None
+            if series.written and not closes:
+                return self._complain(Kind.SERIES, number, "its end is not certain")
+        return True
+
+    def _is_kept(self, line: bytes) -> bool:
+        """Whether the other file goes on with this very line."""
+        if self.theirs.peek(len(line)) != line:
+            return False
+        return line.endswith(b"\n") or len(self.theirs.peek(len(line) + 1)) == len(line)
+
+    def _quiet(self, block: Block) -> bool:
+        """Whether a block may stand between two holes."""
+        return all(
+            (w.letter == "G" and w.value in QUIET_G | {4})
+            or (w.letter == "M" and w.value in QUIET_M | {0, 1, 60})
+            or w.letter in "NFSTP"
+            for w in block.words
+        )
+
+    def _written(self, text: bytes, line: bytes, block: Block, number: int, hole: bool) -> bool:
+        """A line that is not kept: the moves of a hole, or a violation."""
+        theirs = self.theirs.peek_line()[:60].decode("latin-1").rstrip()
+        series, state = self.series, self.reader.state
+        if series is None or not hole:
+            mine = line[:60].decode("latin-1").rstrip()
+            problem = f"expected '{mine}' as in the original, found '{theirs}'"
+            if not self.theirs.peek(1):
+                return self._complain(Kind.MISSING, number, f"file ends where '{mine}' follows")
+            return self._complain(Kind.CHANGED, number, problem)
+        self.holes += 1
+        doubt = series.doubt or doubt_of(series, state)
+        if series.written is False:
+            doubt = "an earlier hole of the series is not written out"
+        if doubt is not None:
+            return self._complain(Kind.SERIES, number, f"its series is not certain: {doubt}")
+        series.written = True
+        self.written += 1
+        return self._moves(series, text, line, block, number)
+
+    def _moves(self, series: Series, text: bytes, line: bytes, block: Block, number: int) -> bool:
+        """Compare what stands in the place of a hole's block with what the block calls for."""
+        state = self.reader.state
+        wanted = calls_for(series, block, state, self.turning)
+        if isinstance(wanted, str):
+            return self._complain(Kind.SERIES, number, f"its series is not certain: {wanted}")
+        lines = _Lines(self.theirs)
+        if lines.peek().startswith(b"(gcodejerk: "):
+            comment = lines.next()
+            if not (comment.endswith(b")") and comment.count(b"(") == comment.count(b")") == 1):
+                return self._complain(Kind.COMMENT, number, "not one closed comment")
+        plane = PLANES[state.plane or 170]
+        head, stops = self._head(text, block, {*plane, "R", "L", "P", "Q"})
+        if head and squeezed(lines.peek()) != head:
+            return self._complain(Kind.HEAD, number, f"expected '{head.decode('latin-1')}'")
+        if head:
+            lines.next()
+        # Where the path mode is not known, a rest behind every move does what G61 would.
+        stops_between = state.path != 64 or self.path is None
+        exact = state.path in (61, 62) or stops_between
+        if stops_between and state.path not in (61, 62):
+            wanted = [[*_with_rests(events)] for events in wanted]
+        if not exact and lines.next() != b"G61":
+            return self._complain(Kind.MODE, number, "cycles run in exact path mode: no G61")
+        if not self._compare(series, wanted, lines, number, plane):
+            return False
+        if not exact and not self._path_restored(lines.next(), state):
+            return self._complain(Kind.PATH, number, "the path mode of the program does not return")
+        if stops and lines.next().split() != stops:
+            return self._complain(Kind.STOP, number, "its stop is lost")
+        last = line[len(text) :]
+        if lines.ends and not lines.well_ended(last if b"\n" in last else self.newline, last):
+            return self._complain(Kind.LINE_END, number, "lines do not end as the block did")
+        return True
+
+    def _compare(
+        self,
+        series: Series,
+        wanted: list[list[Event]],
+        lines: _Lines,
+        number: int,
+        plane: tuple[str, str, str],
+    ) -> bool:
+        """Compare moves one by one; a second list is another count of pecks that is as good."""
+        at = dict(series.at)
+        incremental = self.reader.state.distance == 910
+        candidates = wanted
+        for k in range(max(map(len, wanted))):
+            open_ = [events for events in candidates if len(events) > k]
+            if not open_:
+                break
+            ending = [events for events in candidates if len(events) == k]
+            got = read_event(lines.peek(), at, incremental, plane)
+            if got is not None and _stays(got[1], at):
+                lines.next()
+                got = read_event(lines.peek(), at, incremental, plane)
+            fits = [events for events in open_ if got is not None and same(events[k], got[0])]
+            if not fits and ending:
+                candidates = ending
+                break
+            if not fits or got is None:
+                found = lines.peek()[:60].decode("latin-1")
+                problem = f"expected {told(open_[0][k], plane)}, found '{found}'"
+                return self._complain(Kind.CYCLE, number, problem)
+            lines.next()
+            at, candidates = got[1], fits
+        for event, place in candidates[0]:
+            if event in ("rapid", "feed") and isinstance(place, tuple):
+                series.at.update(zip(plane, place, strict=True))
+        return True
+
+    def _head(self, text: bytes, block: Block, taken: set[str]) -> tuple[bytes, list[bytes]]:
+        """What a block says besides its cycle, without blanks; and its stops."""
+        rest, stops = bytearray(text), []
+        for word in block.words:
+            number = word.value or 0.0
+            cycle = word.letter == "G" and round(number * 10) in HEIGHTS
+            stop = word.letter == "M" and number in STOPS
+            if word.letter in taken or cycle or stop:
+                rest[word.begin : word.end] = b" " * (word.end - word.begin)
+            if stop:
+                stops.append(b"".join(word.text.split()))
+        return squeezed(bytes(rest)), stops
+
+    def _path_restored(self, line: bytes, state: State) -> bool:
+        """Whether a line states the G64 that was in force."""
+        match = _PATH.fullmatch(line)
+        if match is None or self.path is None:
+            return False
+        unit = Fraction(str(state.unit))
+        got = {word[:1].decode(): number_of(word[1:]) * unit for word in match[1].split()}
+        return got.keys() == self.path.keys() and all(
+            abs(got[letter] - value) <= abs(value) * CLOSE for letter, value in self.path.items()
+        )
+
+    def _remember(self, block: Block, sure: bool) -> None:
+        """Note which way the spindle turns and which G64 is in force."""
+        codes = [word.value for word in block.words if word.letter == "G"]
+        for word in block.words:
+            if word.letter == "M" and word.value not in (0, 1, 7, 8, 9, 48, 49):
+                self.turning = int(word.value) if sure and word.value in (3, 4) else 0
+        if block.o_word is not None:
+            self.turning = 0
+        if any(code in (61, 61.1, 64) for code in codes):
+            self.path = None
+            if sure and self.reader.state.unit is not None:
+                unit = Fraction(str(self.reader.state.unit))
+                words = (word for word in block.words if word.letter in "PQ")
+                self.path = {word.letter: number_of(word.text[1:]) * unit for word in words}
+
+    def _complain(self, kind: Kind, number: int, problem: str) -> bool:
+        """Note a violation, with which the walk ends."""
+        self.found.add(kind, self.theirs.line, number, problem)
+        return False
+
+
+class _Lines:
+    """The lines that stand in the place of one block."""
+
+    def __init__(self, theirs: Window) -> None:
+        self.theirs = theirs
+        self.ends: list[bytes] = []
+
+    def peek(self) -> bytes:
+        """The next line without its end."""
+        return self.theirs.peek_line().removesuffix(b"\n").removesuffix(b"\r")
+
+    def next(self) -> bytes:
+        """Take it."""
+        whole, bare = self.theirs.peek_line(), self.peek()
+        self.ends.append(whole[len(bare) :])
+        self.theirs.skip(len(whole))
+        return bare
+
+    def well_ended(self, end: bytes, last: bytes) -> bool:
+        """Whether every line taken ends in one way, and the last one as the block did."""
+        return self.ends[-1:] == [last] and all(got == end for got in self.ends[:-1])
+
+
+def _with_rests(events: list[Event]) -> Iterator[Event]:
+    """The events with a rest behind every move that no dwell follows."""
+    for k, event in enumerate(events):
+        yield event
+        if event[0] in ("rapid", "feed") and [e[0] for e in events[k + 1 : k + 2]] != ["dwell"]:
+            yield "dwell", Fraction(0)
+
+
+def _stays(after: dict[str, Height], before: dict[str, Height]) -> bool:
+    """Whether a move goes by less than a number of the program can say, but not by nothing."""
+    return after != before and same(("", (*after.values(),)), ("", (*before.values(),)))
+
+
+def squeezed(text: bytes) -> bytes:
+    """Without blanks."""
+    return b"".join(text.split())

@@ -1,0 +1,92 @@
+"""Cycles written out, over drawn programs: always accepted, and any change of a number noticed."""
+
+import io
+import re
+
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from gcodejerk.nc import read_program
+from gcodejerk.nc.expansion import expand
+from gcodejerk.testing.cycles import cycle_programs
+from gcodejerk.testing.programs import programs
+from gcodejerk.verification.expansion import check_expansion
+
+CALM = settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
+
+
+def written(program, comments):
+    target = io.BytesIO()
+    found = expand(io.BytesIO(program), target, comments=comments)
+    return (target.getvalue() if found.written else program), found
+
+
+def check(program, text):
+    return check_expansion(io.BytesIO(program), io.BytesIO(text))
+
+
+@CALM
+@given(cycle_programs(), st.booleans())
+def test_every_series_is_written_out_and_accepted(program, comments):
+    text, found = written(program, comments)
+    assert found.written == found.holes
+    judged = check(program, text)
+    assert judged.ok, (judged.violations, program, text)
+    assert (judged.rewritten, judged.rapids) == (found.written, found.holes)
+
+
+@CALM
+@given(programs())
+def test_programs_of_all_kinds_are_written_out_as_accepted(program):
+    text, found = written(program, True)
+    judged = check(program, text)
+    assert judged.ok, (judged.violations, program, text)
+    assert judged.rewritten == found.written
+
+
+@CALM
+@given(cycle_programs(), st.data())
+def test_any_changed_number_is_noticed(program, data):
+    text, _ = written(program, False)
+    lines = text.split(b"\n")
+    moves = [k for k, line in enumerate(lines) if re.match(rb"G[01] .*\d", line)]
+    assume(moves and lines != program.split(b"\n"))
+    k = data.draw(st.sampled_from(moves))
+    numbers = list(re.finditer(rb"(?<=[XYZ])-?[\d.]+", lines[k]))
+    at = data.draw(st.sampled_from(numbers))
+    step = data.draw(st.sampled_from([-1.0, -0.001, 0.001, 0.25]))
+    changed = b"%.4f" % (float(at[0]) + step)
+    lines[k] = lines[k][: at.start()] + changed + lines[k][at.end() :]
+    assert not check(program, b"\n".join(lines)).ok
+
+
+@CALM
+@given(cycle_programs(), st.data())
+def test_any_lost_doubled_or_exchanged_move_is_noticed(program, data):
+    text, _ = written(program, False)
+    lines = text.split(b"\n")
+    moves = [k for k, line in enumerate(lines) if re.match(rb"G[01] [XYZ]", line)]
+    moves = [k for k in moves if lines[k] not in program.split(b"\n")]
+    assume(moves)
+    k = data.draw(st.sampled_from(moves))
+    kind = data.draw(st.sampled_from(["lost", "doubled", "exchanged", "rapid and feed"]))
+    if kind == "lost":
+        del lines[k]
+    elif kind == "doubled":
+        lines.insert(k, lines[k])
+    elif kind == "exchanged":
+        assume(lines[k] != lines[k + 1])
+        lines[k], lines[k + 1] = lines[k + 1], lines[k]
+    else:
+        lines[k] = lines[k][:2].translate(bytes.maketrans(b"01", b"10")) + lines[k][2:]
+    assert not check(program, b"\n".join(lines)).ok, (kind, k)
+
+
+@CALM
+@given(cycle_programs())
+def test_lines_lead_back_to_the_blocks_that_they_come_from(program):
+    text, found = written(program, True)
+    original = program.replace(b"\r", b"").split(b"\n")
+    rapids = found.map.rapids_of(read_program(io.BytesIO(text)).rapids)
+    for begin, end, line in zip(rapids.begin, rapids.end, rapids.line, strict=True):
+        assert program[begin:end] == original[line - 1]
