@@ -109,7 +109,9 @@ class Executor:
                 m_group = dialect.m_groups.get(number) if number == value else None
                 if m_group is None:
                     codes.unknown = True
-                elif m_group in _GROUPED_M and any(dialect.m_groups[m] == m_group for m in codes.m):
+                elif m_group in _GROUPED_M and any(
+                    dialect.m_groups.get(m) == m_group for m in codes.m
+                ):
                     codes.fault = True
                 codes.m.append(number)
             elif letter != "N":

@@ -94,6 +94,8 @@ class Series:
     """What stands in the series that a further hole must not follow."""
     code: int = 0
     sticky: dict[str, Decimal] | None = None
+    dwells: bool = False
+    """A block of it states a dwell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,7 +304,7 @@ def write_block(
     Returns
     -------
     list of bytes
-        At least one line.
+        Empty where the block says nothing else and the tool is at the bottom already.
     """
     state = moment.state
     kept, stops, rest, begin = [], [], [], 0
@@ -365,9 +367,10 @@ def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
 def _with_stops(moves: list[bytes]) -> list[bytes]:
     """The moves, with a rest behind each that has none."""
     out = []
-    for line, following in zip(moves, [*moves[1:], b""], strict=True):
+    for k, line in enumerate(moves):
         out.append(line)
-        if line.startswith((b"G0", b"G1")) and not following.startswith(b"G4"):
+        dwells = moves[k + 1 : k + 2] and moves[k + 1].startswith(b"G4")
+        if line.startswith((b"G0", b"G1")) and not dwells:
             out.append(b"G4 P0")
     return out
 
