@@ -332,7 +332,7 @@ class _Walker(Reader):
             if any(word.letter in "XYZABCUVW" for word in block.words):
                 self._leave(series, str(Reason.OTHER_WORDS), place[2])
             self._close(series)
-        elif drills(block, state, cycles, self.dialect.groups):
+        elif drills(block, state, cycles):
             self.holes += 1
             series.dwells |= any(word.letter == self.rules.dwell for word in block.words)
             self._drill(series, block, text, moment, place)

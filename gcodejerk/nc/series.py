@@ -21,7 +21,6 @@ Rule 2: depths and increments are decimals, words in the plane are the program's
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Context, Decimal
 
@@ -52,6 +51,8 @@ _STOPS = frozenset({0, 1, 2, 30, 60})
 _HARMLESS_M = frozenset({3, 4, 5, 7, 8, 9, 48, 49})
 _HARMLESS_G = frozenset({170, 180, 190, 200, 210, 400, 900, 910, 901, 911, 940, 950, 980, 990})
 """G codes that act before the motion of their block, and of which the state tells all."""
+_TAKERS = frozenset({100, 280, 300, 520, 920})
+"""G codes that the axis words of their block belong to, whatever motion is in force."""
 _HARMLESS_LETTERS = frozenset("NFST")
 _EXACT = frozenset({61, 62})
 
@@ -123,12 +124,11 @@ def begin_series(line: int, moment: Moment) -> Series:
     return Series(line, state.plane, state.unit, level, level)
 
 
-def drills(block: Block, state: State, cycles: frozenset[int], groups: Mapping[int, str]) -> bool:
-    """Whether a block makes a hole: a cycle is in force and takes its axis words."""
+def drills(block: Block, state: State, cycles: frozenset[int]) -> bool:
+    """Whether a block makes a hole: a cycle is in force, and nothing else takes its axis words."""
     if state.motion not in cycles or not any(word.letter in AXES for word in block.words):
         return False
-    users = ("non-modal", "tool length")
-    return not any(groups.get(code) in users and code != 40 for code in g_codes(block))
+    return not _TAKERS & {*g_codes(block)}
 
 
 def g_codes(block: Block) -> list[int]:

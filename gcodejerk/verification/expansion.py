@@ -164,7 +164,7 @@ class _Walk:
             return self._complain(Kind.SERIES, number, "the dwell of a later cycle gets lost")
         if series is None or ended:
             return True
-        taken = any(code in (10, 28, 30, 52, 92, 53, 43.1, 43.2) for code in codes)
+        taken = any(code in (10, 28, 30, 52, 92) for code in codes)
         if in_cycle and sure and axes and not taken:
             self.holes += 1
             if series.written:

@@ -125,6 +125,8 @@ LEFT = {
     "tool": (CYCLE + b"T2 M6\nX3\nG80\n", "something else stands between"),
     "home": (CYCLE + b"G28 Z5\nX3\nG80\n", "something else stands between"),
     "in the block": (b"G54 " + CYCLE + b"G80\n", "order"),
+    "in the last block": (CYCLE + b"X3 G92.1\nG80\n", "order"),
+    "length in the block": (CYCLE + b"X3 G43 H1\nG80\n", "order"),
     "user code": (CYCLE.replace(b"\n", b" M101\n") + b"G80\n", "order"),
     "plane": (CYCLE + b"G18\nX3\nG80\n", "plane"),
     "unit": (CYCLE + b"G20 F9\nX3\nG80\n", "unit"),
