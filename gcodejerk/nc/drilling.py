@@ -65,6 +65,8 @@ class DrillingRules:
     """Address of the depth of a peck."""
     dwell: str
     """Address of the dwell, which `G4` takes in the same unit."""
+    borrows_dwell: frozenset[int]
+    """Cycles that, without a dwell of their own, take that of whichever cycle stated one last."""
     clearance: Mapping[bool, Decimal | None]
     """Distance that G83 and G73 keep above, or go back: in mm (False) and inches (True); None where
     a parameter of the machine decides."""
@@ -87,6 +89,8 @@ LINUXCNC = DrillingRules(
     repeats="L",
     peck="Q",
     dwell="P",
+    # Tapping keeps the P of an earlier cycle, G80 or not; all others must state theirs.
+    borrows_dwell=frozenset({740, 840}),
     # "G83 rapids down to 0.010 inch above", whatever the unit of the program
     clearance={False: Decimal("0.254"), True: Decimal("0.010")},
 )

@@ -246,12 +246,14 @@ class _Walker(Reader):
         self.series: Series | None = None
         self.reason_at = 0
         self.holes = 0
+        self.lenders: list[int] = []
+        """Series to be written out whose dwell a later cycle might take."""
         self.places = array("q")
         """The columns of the map, row by row."""
         self.spindle: int | None = None
         self.path: PathWords | None = None
         if start.startup:
-            self._note(parse_line(start.startup.encode("latin-1", "replace"), dialect), True)
+            self._note(parse_line(start.startup.encode("latin-1", "replace"), dialect), True, 0)
         self.newline = b"\n"
         self._chunk = Chunk(b"", 0, 1)
         self._at = 0
@@ -284,7 +286,7 @@ class _Walker(Reader):
             super().read_line(text, begin, number, terminator)
             if noted:
                 sure = faults == self.odd_count and not inside
-                self._note(parse_line(bare, self.dialect), sure)
+                self._note(parse_line(bare, self.dialect), sure, number)
             return
         block = parse_line(bare, self.dialect)
         before, faults, inside = list(self.state.position), self.odd_count, self.flow.inside
@@ -295,7 +297,11 @@ class _Walker(Reader):
         why = str(Reason.NOT_UNDERSTOOD) if faults != self.odd_count else doubt(block)
         if inside or self.flow.inside:
             why = str(Reason.SUBPROGRAM)
-        self._note(block, why is None)
+        self._note(block, why is None, number)
+        if self.rules.borrows_dwell & {*g_codes(block)}:
+            states = any(word.letter == self.rules.dwell for word in block.words)
+            if not states and not (self.series is not None and self.series.dwells):
+                self._borrow(number)
         moment = Moment(before, self.state, self.path, self.spindle)
         if self.series is None:
             if self.state.motion not in self.dialect.cycles:
@@ -327,8 +333,9 @@ class _Walker(Reader):
             if any(word.letter in "XYZABCUVW" for word in block.words):
                 self._leave(series, str(Reason.OTHER_WORDS), place[2])
             self._close(series)
-        elif drills(block, state, cycles, self.dialect.groups):
+        elif drills(block, state, cycles):
             self.holes += 1
+            series.dwells |= any(word.letter == self.rules.dwell for word in block.words)
             self._drill(series, block, text, moment, place)
         elif state.motion not in cycles:
             own = any(self.dialect.groups.get(code) == "motion" for code in g_codes(block))
@@ -366,7 +373,7 @@ class _Walker(Reader):
         last = b"\r" * returns + b"\n" * terminator
         line_end = last if terminator else self.newline
         lines = write_block(text, block, call, moment, self.comments)
-        new = line_end.join(lines) + last
+        new = line_end.join(lines) + last if lines else b""
         kind = (0, 1, 3, 2)[2 * returns + terminator]
         self.places.extend((number + self._added, len(lines), self._out, self._out + len(new)))
         self.places.extend((number, begin, end, kind))
@@ -381,14 +388,26 @@ class _Walker(Reader):
 
     def _close(self, series: Series) -> None:
         """The series is over."""
+        if series.dwells:
+            # A dwell that the controller itself reads replaces those before it.
+            self.lenders = [*self.lenders, len(self.verdicts)] if series.reason is None else []
         self.verdicts.append(_Verdict(series.line, series.reason, self.reason_at))
         self.series = None
 
-    def _note(self, block: Block, sure: bool) -> None:
-        """Follow the spindle and the words of G64."""
+    def _borrow(self, line: int) -> None:
+        """A cycle may take its dwell from those before it: the controller has to read them."""
+        for index in self.lenders:
+            reason = "a later cycle takes its dwell from this one"
+            self.verdicts[index] = _Verdict(self.verdicts[index].line, reason, line)
+        self.lenders = []
+
+    def _note(self, block: Block, sure: bool, line: int) -> None:
+        """Follow the spindle, the words of G64, and calls of what may hold any cycle."""
         sure = sure and doubt(block) is None
         if block.o_word is not None:
             self.spindle = None
+        if block.o_word == "call" or any(w.letter == "M" and w.value == 98 for w in block.words):
+            self._borrow(line)
         for word in block.words:
             if word.letter == "M" and word.value not in (0, 1, 7, 8, 9, 48, 49):
                 self.spindle = int(word.value) if sure and word.value in (3.0, 4.0) else None
@@ -396,7 +415,8 @@ class _Walker(Reader):
             words = (
                 [(w.letter, decimal(w)) for w in block.words if w.letter in "PQ"] if sure else []
             )
-            self.path = PathWords(tuple(words), self.state.unit) if sure else None
+            known = sure and all(number >= 0 for _, number in words)
+            self.path = PathWords(tuple(words), self.state.unit) if known else None
 
     def _copy(self, end: int) -> None:
         """Copy the original up to an offset within the chunk."""

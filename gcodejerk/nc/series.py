@@ -21,7 +21,6 @@ Rule 2: depths and increments are decimals, words in the plane are the program's
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Context, Decimal
 
@@ -52,6 +51,8 @@ _STOPS = frozenset({0, 1, 2, 30, 60})
 _HARMLESS_M = frozenset({3, 4, 5, 7, 8, 9, 48, 49})
 _HARMLESS_G = frozenset({170, 180, 190, 200, 210, 400, 900, 910, 901, 911, 940, 950, 980, 990})
 """G codes that act before the motion of their block, and of which the state tells all."""
+_TAKERS = frozenset({100, 280, 300, 520, 920})
+"""G codes that the axis words of their block belong to, whatever motion is in force."""
 _HARMLESS_LETTERS = frozenset("NFST")
 _EXACT = frozenset({61, 62})
 
@@ -94,6 +95,8 @@ class Series:
     """What stands in the series that a further hole must not follow."""
     code: int = 0
     sticky: dict[str, Decimal] | None = None
+    dwells: bool = False
+    """A block of it states a dwell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,12 +124,11 @@ def begin_series(line: int, moment: Moment) -> Series:
     return Series(line, state.plane, state.unit, level, level)
 
 
-def drills(block: Block, state: State, cycles: frozenset[int], groups: Mapping[int, str]) -> bool:
-    """Whether a block makes a hole: a cycle is in force and takes its axis words."""
+def drills(block: Block, state: State, cycles: frozenset[int]) -> bool:
+    """Whether a block makes a hole: a cycle is in force, and nothing else takes its axis words."""
     if state.motion not in cycles or not any(word.letter in AXES for word in block.words):
         return False
-    users = ("non-modal", "tool length")
-    return not any(groups.get(code) in users and code != 40 for code in g_codes(block))
+    return not _TAKERS & {*g_codes(block)}
 
 
 def g_codes(block: Block) -> list[int]:
@@ -302,7 +304,7 @@ def write_block(
     Returns
     -------
     list of bytes
-        At least one line.
+        Empty where the block says nothing else and the tool is at the bottom already.
     """
     state = moment.state
     kept, stops, rest, begin = [], [], [], 0
@@ -365,9 +367,10 @@ def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
 def _with_stops(moves: list[bytes]) -> list[bytes]:
     """The moves, with a rest behind each that has none."""
     out = []
-    for line, following in zip(moves, [*moves[1:], b""], strict=True):
+    for k, line in enumerate(moves):
         out.append(line)
-        if line.startswith((b"G0", b"G1")) and not following.startswith(b"G4"):
+        dwells = moves[k + 1 : k + 2] and moves[k + 1].startswith(b"G4")
+        if line.startswith((b"G0", b"G1")) and not dwells:
             out.append(b"G4 P0")
     return out
 

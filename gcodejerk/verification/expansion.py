@@ -104,6 +104,8 @@ class _Walk:
         self.holes = self.written = self.kept = 0
         self.series: Series | None = None
         self.turning = 0
+        self.lent = False
+        """The P stated last is one that the controller does not read any more."""
         self.path: dict[str, Fraction] | None = None
         """P and Q of the G64 in force [mm]; None where they are not known."""
         self.newline = b""
@@ -158,14 +160,17 @@ class _Walk:
         self.theirs.skip(len(line))
         self.kept += 1
         series = self.series
+        if self.lent and not ended and self._borrows(block, codes):
+            return self._complain(Kind.SERIES, number, "the dwell of a later cycle gets lost")
         if series is None or ended:
             return True
-        taken = any(code in (10, 28, 30, 52, 92, 53, 43.1, 43.2) for code in codes)
+        taken = any(code in (10, 28, 30, 52, 92) for code in codes)
         if in_cycle and sure and axes and not taken:
             self.holes += 1
             if series.written:
                 return self._complain(Kind.CYCLE, number, "a hole of the series is not written out")
             series.written = False
+            self.lent = self.lent and not any(word.letter == "P" for word in block.words)
         elif not sure:
             series.doubt = series.doubt or f"line {number} is not certain"
             if series.written:
@@ -187,6 +192,14 @@ class _Walk:
         if self.theirs.peek(len(line)) != line:
             return False
         return line.endswith(b"\n") or len(self.theirs.peek(len(line) + 1)) == len(line)
+
+    def _borrows(self, block: Block, codes: list[float | None]) -> bool:
+        """Whether a block may tap with the P of an earlier cycle, or call what does."""
+        if any(code in (74, 84) for code in codes):
+            return not any(word.letter == "P" for word in block.words)
+        return block.o_word == "call" or any(
+            word.letter == "M" and word.value == 98 for word in block.words
+        )
 
     def _quiet(self, block: Block) -> bool:
         """Whether a block may stand between two holes."""
@@ -215,6 +228,7 @@ class _Walk:
             return self._complain(Kind.SERIES, number, f"its series is not certain: {doubt}")
         series.written = True
         self.written += 1
+        self.lent = self.lent or any(word.letter == "P" for word in block.words)
         return self._moves(series, text, line, block, number)
 
     def _moves(self, series: Series, text: bytes, line: bytes, block: Block, number: int) -> bool:
@@ -324,8 +338,9 @@ class _Walk:
             self.path = None
             if sure and self.reader.state.unit is not None:
                 unit = Fraction(str(self.reader.state.unit))
-                words = (word for word in block.words if word.letter in "PQ")
-                self.path = {word.letter: number_of(word.text[1:]) * unit for word in words}
+                words = [word for word in block.words if word.letter in "PQ"]
+                if all((word.value or 0.0) >= 0.0 for word in words):
+                    self.path = {word.letter: number_of(word.text[1:]) * unit for word in words}
 
     def _complain(self, kind: Kind, number: int, problem: str) -> bool:
         """Note a violation, with which the walk ends."""

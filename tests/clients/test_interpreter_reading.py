@@ -303,6 +303,7 @@ CASES = [
     b"G61 G0 X1 P5\nM2\n",
     b"F100 G1 Z1 S100\nS-5\nM2\n",
     b"F-5\nM2\n",
+    b"G0 X1\nM90 M3 S1\nM3 M90\nX2\nM2\n",
     # the level of G98 is where the series began, and R may be another one in each block
     b"F100 G0 Z1\nG98 G81 X1 Y1 Z-5 R2\nX3 R1.5\nX4 R5\nX5 R4\nG80\nG0 X9\nM2\n",
     b"F100 G0 Z1\nG98 G81 X1 Y1 Z-5 R2\nM3 S9\nX3 R1.5\nG80\nG81 X5 Z-4 R1\nM2\n",

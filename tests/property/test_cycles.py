@@ -44,6 +44,44 @@ def test_programs_of_all_kinds_are_written_out_as_accepted(program):
     assert judged.rewritten == found.written
 
 
+ODD_LINES = [
+    *("G92 Z1", "G92.1", "G43.1 Z2", "G49", "G55", "G54", "G28 Z5", "G53 G0 Z1", "G10 L2 P1 X3"),
+    *("G52 X1", "/X3", "/G80", "#1=3", "X[1+2]", "o1 if [1]", "o1 endif", "o2 call", "M98 P2"),
+    *("G84 X1 Z-3 R2", "G84 X1 Z-3 R2 P1", "G88 X1 Z-3 R2 P1", "X3 G92.1", "X3 G54", "X3 M6 T1"),
+    *("G20", "G21 F100", "G18", "G17", "G90", "G91", "G93", "G94 F50", "G95 F.3", "G7", "G8"),
+    *(
+        "G41 D1",
+        "G40",
+        "M2",
+        "%",
+        "M70",
+        "M72",
+        "M6 T1",
+        "M19",
+        "M5",
+        "M3",
+        "M4",
+        "M62 P1",
+        "M90 M3",
+    ),
+    *("G61", "G64 P.2", "G64 P-1", "G64 P#1", "G61.1", "R1", "R1 X2", "L0 X2", "X2 A3", "G81"),
+    *("G81 X1 Z5 R1", "G38.2 Z-3 F10", "G33 Z-1 K1", "G0 X4..2", "G2 X3 I1", "X1" + 240 * "0"),
+]
+
+
+@CALM
+@given(cycle_programs(), st.lists(st.sampled_from(ODD_LINES), max_size=3), st.data())
+def test_whatever_stands_among_cycles_what_is_written_out_is_accepted(program, odd, data):
+    lines = program.splitlines(keepends=True)
+    for line in odd:
+        lines.insert(data.draw(st.integers(0, len(lines) - 1)), line.encode() + b"\n")
+    program = b"".join(lines)
+    text, found = written(program, data.draw(st.booleans()))
+    judged = check(program, text)
+    assert judged.ok, (judged.violations, program, text)
+    assert judged.rewritten == found.written
+
+
 @CALM
 @given(cycle_programs(), st.data())
 def test_any_changed_number_is_noticed(program, data):

@@ -9,6 +9,7 @@ import pytest
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.nc import DIALECTS, Start, read_program
 from gcodejerk.nc.expansion import expand
+from gcodejerk.verification.expansion import check_expansion
 
 HEAD = b"G21 G90 G64 P0.05 G98 F100\nM3 S500\nG0 X0 Y0 Z10\n"
 
@@ -116,12 +117,16 @@ LEFT = {
     "assignment": (CYCLE + b"#1=3\nX3\nG80\n", "expression"),
     "subprogram": (b"o1 sub\n" + CYCLE + b"G80\no1 endsub\no1 call\n", "subprogram"),
     "call": (CYCLE + b"o1 call\nG80\n", "subprogram"),
+    "borrowed dwell": (b"G82 X1 Z-5 R2 P1\nG80\nG84 X2 Z-5 R2\nG80\n", "takes its dwell"),
+    "dwell that may be borrowed": (b"G82 X1 Z-5 R2 P1\nG80\no<tap> call\n", "takes its dwell"),
     "loop": (b"o1 repeat [2]\n" + CYCLE + b"G80\no1 endrepeat\n", "subprogram"),
     "frame": (CYCLE + b"G92 Z5\nX3\nG80\n", "something else stands between"),
     "offset": (CYCLE + b"G55\nX3\nG80\n", "something else stands between"),
     "tool": (CYCLE + b"T2 M6\nX3\nG80\n", "something else stands between"),
     "home": (CYCLE + b"G28 Z5\nX3\nG80\n", "something else stands between"),
     "in the block": (b"G54 " + CYCLE + b"G80\n", "order"),
+    "in the last block": (CYCLE + b"X3 G92.1\nG80\n", "order"),
+    "length in the block": (CYCLE + b"X3 G43 H1\nG80\n", "order"),
     "user code": (CYCLE.replace(b"\n", b" M101\n") + b"G80\n", "order"),
     "plane": (CYCLE + b"G18\nX3\nG80\n", "plane"),
     "unit": (CYCLE + b"G20 F9\nX3\nG80\n", "unit"),
@@ -184,6 +189,20 @@ def test_a_hole_where_the_tool_stands_needs_no_way():
     assert lines[1:-3] == ["G0 Z2.", "G1 Z-5.", "G0 Z10."]
 
 
+@pytest.mark.parametrize("mode", [b"G64 P0.05", b"G61", b""])
+@pytest.mark.parametrize("comments", [True, False])
+def test_a_hole_without_depth_where_the_tool_stands_is_nothing(mode, comments):
+    program = HEAD.replace(b"G64 P0.05", mode) + b"G81 X0 Y0 Z10 R10\nX3\nX3\nG80\nG0 X5\nM2\n"
+    target = io.BytesIO()
+    found = expand(io.BytesIO(program), target, comments=comments)
+    assert found.written == 3
+    text = target.getvalue()
+    assert check_expansion(io.BytesIO(program), io.BytesIO(text)).ok
+    rapids = found.map.rapids_of(read_program(io.BytesIO(text)).rapids)
+    assert rapids.line.tolist() == [3, 5, 8]
+    assert found.map.line_of(len(text.splitlines())) == 9
+
+
 def test_an_uncertain_series_does_not_keep_another_from_being_written():
     lines, found = expanded(
         HEAD + b"G84 X1 Z-5 R2\nX2\nG80\nG81 X3 Z-5 R2\nX4\nG80\nG88 X5 Z-5 R2 P1\nG80\nM2\n"
@@ -191,6 +210,12 @@ def test_an_uncertain_series_does_not_keep_another_from_being_written():
     assert (found.holes, found.written) == (5, 2)
     assert lines[:3] == ["G84 X1 Z-5 R2", "X2", "G80"]
     assert [f.line for f in found.findings] == [4, 10]
+
+
+def test_tapping_that_states_its_dwell_borrows_none():
+    program = HEAD + b"G82 X1 Z-5 R2 P1\nG80\nG84 X2 Z-5 R2 P0.5\nG80\nG84 X3 Z-5 R2\nG80\nM2\n"
+    _, found = expanded(program)
+    assert (found.holes, found.written) == (3, 1)
 
 
 def test_a_series_runs_on_over_chunks_of_the_file():

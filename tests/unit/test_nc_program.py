@@ -260,6 +260,11 @@ def test_numbers_beyond_any_machine_are_not_understood():
     assert last(b"G0 X1000000000000\n")[0] is Reason.NOT_UNDERSTOOD
 
 
+@pytest.mark.parametrize("block", [b"G0 X1 M90 M3\n", b"G0 X1 M3 M90\n"])
+def test_an_unknown_m_word_beside_a_known_one_is_found(block):
+    assert any("does not know" in f.message for f in read(HEAD + block).findings)
+
+
 def test_code_that_is_no_number_leaves_its_mode_unknown():
     assert last(b"G9..1 X1\nG0 X5\n")[0] is Reason.CUTTER_COMPENSATION
 

@@ -215,6 +215,18 @@ def test_a_rest_behind_every_move_is_needed_where_the_path_mode_is_not_known():
         assert not check(bad, program).ok, k
 
 
+@pytest.mark.parametrize("later", [b"G84 X2 Z-3 R2\n", b"o<tap> call\n", b"M98 P5\n"])
+def test_a_dwell_that_a_later_cycle_takes_may_not_be_written_out(later):
+    plain = b"G21 G90 G61 G98 F100\nM3\nG0 X0 Y0 Z10\nG82 X1 Z-5 R2 P1\nG80\n"
+    hole = b"G0 X1\nG0 Z2\nG1 Z-5\nG4 P1\nG0 Z10\n"
+    good = plain.replace(b"G82 X1 Z-5 R2 P1\n", hole)
+    assert check(good + b"M2\n", plain + b"M2\n").ok
+    tapping = b"G84 X2 Z-3 R2 P.5\nG80\n"
+    assert check(good + tapping + b"M2\n", plain + tapping + b"M2\n").ok
+    found = check(good + later + b"G80\nM2\n", plain + later + b"G80\nM2\n")
+    assert [v.kind for v in found.violations] == [Kind.SERIES]
+
+
 def test_binary_numbers_may_peck_once_more_but_not_twice():
     program = b"G21 G90 G61 G99 F100\nG0 X0 Y0 Z10\nG73 X1 Z-1 R0 Q.1\nG80\nM2\n"
     good = written(program)
