@@ -5,6 +5,7 @@ The streams are the only differences and where they are is known, so nothing has
 
 from __future__ import annotations
 
+import os
 from typing import BinaryIO
 
 from gcodejerk.pipeline import TERMINATOR_LENGTH, Result
@@ -25,7 +26,7 @@ def difference(source: BinaryIO, target: BinaryIO, result: Result) -> bytes:
     bytes
         Empty where nothing changes.
     """
-    name = result.program.name.encode()
+    name = os.fsencode(result.program.name)
     out = [b"--- %s\n+++ %s (gcodejerk)\n" % (name, name)]
     added = 0
     rapids = result.program.rapids

@@ -23,7 +23,7 @@ PICTURE = """
  <- emit | verification | testing
  <- pipeline
  <- report
- <- files batch
+ <- files gather workers batch
  <- cli
 """
 LAYERS = [
