@@ -20,9 +20,9 @@ from typing import BinaryIO
 
 from gcodejerk.designs import known_limits
 from gcodejerk.errors import EmitError, GcodejerkError
-from gcodejerk.files import STANDARD, make_folder, new_file, open_input, same_file
+from gcodejerk.files import STANDARD, make_folder, new_file, open_input, same_file, version
 from gcodejerk.machine import Machine
-from gcodejerk.pipeline import Progress, Result, Settings, process_file, silent
+from gcodejerk.pipeline import Progress, Result, Settings, changed_error, process_file, silent
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line
@@ -138,6 +138,7 @@ def _lost(job: Job, status: int | None) -> Done:
 def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
     _refuse_overwriting(job)
     with ExitStack() as stack:
+        before = version(job.input)
         source = stack.enter_context(open_input(job.input))
         # The outputs are renamed when the stack closes without an error, the report last.
         report = None
@@ -155,7 +156,10 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
             report.write(dump(record_of(result, machine, job.output, source, progress)))
+            report.flush()  # a full disk shows here, and not when the output is in its place
         diff = difference(source, target, result) if job.mode == "diff" else b""
+        if job.in_place and version(job.input) != before:
+            raise changed_error(job.input)  # an edit of the user's would be lost
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}"
     return Done(job.input, result.planned, result.left, summary, result.notes, diff)

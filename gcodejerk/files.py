@@ -93,19 +93,13 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
     EmitError
         It cannot be written: a full disk, a folder that is missing or read-only.
     """
-    place = Path(path)
-    # A pipe or a device is written to; only a file can be replaced by another one.
-    special = path != STANDARD and place.exists() and not (place.is_file() or place.is_dir())
-    if path == STANDARD or special:
+    if path == STANDARD or _is_special(path):
         with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:
             yield spool  # type: ignore[misc]
             spool.seek(0)
             _pass_on(spool, path)
         return
-    # A link stays a link: what it points to is replaced.
-    place = Path(os.path.realpath(place)) if place.is_symlink() else place
-    if place.is_dir():
-        raise EmitError(f"{path} is a folder", "name a file in it (-o), or use --output-dir")
+    place = _place(path)
     # The name is known before the file is there: interrupted between the two, it is removed, too.
     temporary = place.parent / f"{PREFIX}{secrets.token_hex(8)}"
     try:
@@ -124,6 +118,31 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
     finally:
         with contextlib.suppress(OSError, ValueError):
             os.unlink(temporary)
+
+
+def _is_special(path: str) -> bool:
+    """Whether this is a pipe or a device: it is written to, as only a file can be replaced."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def _place(path: str) -> Path:
+    """Where a file of a name is to be: a link stays a link, and what it points to is replaced."""
+    try:
+        place = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+        mode = place.lstat().st_mode
+    except FileNotFoundError:
+        return place
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from error
+    if stat.S_ISLNK(mode):
+        raise EmitError(f"{path} cannot be written: it is a link to itself", "remove the link")
+    if stat.S_ISDIR(mode):
+        raise EmitError(f"{path} is a folder", "name a file in it (-o), or use --output-dir")
+    return place
 
 
 class _Input(io.FileIO):
@@ -165,7 +184,7 @@ def _unreadable(path: str, error: Exception) -> ProgramError:
 def _unwritable(path: str, error: Exception) -> EmitError:
     return EmitError(
         f"{path} cannot be written: {getattr(error, 'strerror', None) or error}",
-        "nothing was written; check the folder, its permissions and the space on the disk",
+        "it was left as it was; check the folder, its permissions and the space on the disk",
     )
 
 
@@ -196,6 +215,15 @@ def _pass_on(spool: IO[bytes], path: str) -> None:
         ) from error
 
 
+def version(path: str) -> tuple[int, ...] | None:
+    """What tells one version of a file from the next, None where there is none."""
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
 def make_folder(path: str) -> None:
     """Make a folder for outputs, and those above it, where they are missing."""
     try:
@@ -213,7 +241,7 @@ def same_file(one: str, other: str) -> bool:
         return False
     try:
         return os.path.samefile(one, other)
-    except OSError:
+    except (OSError, ValueError):
         return os.path.abspath(one) == os.path.abspath(other)
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gcodejerk import __version__
 from gcodejerk.emit import Controller, Options, load_controller
-from gcodejerk.errors import EmitError, Place, ProgramError
+from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, read_program
@@ -233,19 +233,12 @@ def process_file(
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
-        source.seek(0)
-        target.seek(0)
-        judge = verify_files if emitter.in_place else verify_csv
-        design = replace(machine.design, profile=settings.profile or machine.design.profile)
-        verification = judge(
-            source,
-            target,
-            replace(machine, design=design),
-            names=(name, f"the output for {name}"),
-            dialect=settings.dialect,
-            start=program_start(machine),
-        )
-        require(verification)
+        try:
+            verification = _judged(source, target, machine, settings, name, emitter.in_place)
+        except (ProgramError, VerifyError):
+            if _digest(source) != program.digest:
+                raise changed_error(name) from None
+            raise
         report("verifying", 1, 1)
     notes = [_finding(finding.line, finding.message) for finding in program.findings]
     return Result(
@@ -263,6 +256,40 @@ def process_file(
     )
 
 
+def _judged(
+    source: BinaryIO,
+    target: BinaryIO,
+    machine: Machine,
+    settings: Settings,
+    name: str,
+    in_place: bool,
+) -> Verification:
+    """Read an output back; an error where it is not right."""
+    source.seek(0)
+    target.seek(0)
+    judge = verify_files if in_place else verify_csv
+    design = replace(machine.design, profile=settings.profile or machine.design.profile)
+    verification = judge(
+        source,
+        target,
+        replace(machine, design=design),
+        names=(name, f"the output for {name}"),
+        dialect=settings.dialect,
+        start=program_start(machine),
+    )
+    require(verification)
+    return verification
+
+
+def _digest(source: BinaryIO) -> bytes:
+    """What a file holds now, as `Program.digest` has it."""
+    source.seek(0)
+    digest = hashlib.blake2b(digest_size=16)
+    while data := source.read(COPY_SIZE):
+        digest.update(data)
+    return digest.digest()
+
+
 def stamp_comment(machine: Machine, settings: Settings, emitter: Controller) -> bytes:
     """The comment at the top of an output: version, machine and a hash of the settings."""
     chosen = (emitter.name, settings.form, settings.profile or machine.design.profile)
@@ -277,6 +304,14 @@ def stamp_comment(machine: Machine, settings: Settings, emitter: Controller) -> 
 def _with_output(result: Result, output: bytes) -> Result:
     """The result with its output."""
     return replace(result, output=output)
+
+
+def changed_error(name: str) -> EmitError:
+    """The error for a program that somebody else has written to meanwhile."""
+    return EmitError(
+        f"{name} was changed while it was being processed",
+        "run the command again when nothing writes to the file",
+    )
 
 
 def silent(step: str, done: int, total: int) -> None:
@@ -376,10 +411,7 @@ class _Writer:
             return
         self._copy(self.program.size)
         if self.source.read(1) or self.digest.digest() != self.program.digest:
-            raise EmitError(
-                f"{self.program.name} was changed while it was being processed",
-                "run the command again when nothing writes to the file",
-            )
+            raise changed_error(self.program.name)
         self.target.flush()
 
     def _read(self, end: int) -> bytes:
