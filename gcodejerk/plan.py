@@ -34,6 +34,8 @@ PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
 STANDSTILL = 1e-9
 """An axis that moves less than this does not move [mm] or [deg]."""
+FARTHEST = 1e8
+"""Where no axis ever is [mm] or [deg]; what is farther away could not be written exactly."""
 MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
 
@@ -173,6 +175,8 @@ def plan_rapids(
             where = position + rapids.offset[:, k]
             named = (rapids.words >> k & 1) != 0
             _rule_out(reason, named & ((where < low) | (where > high)), Reason.BEYOND_TRAVEL)
+    for position in (rapids.start, rapids.target):
+        _rule_out(reason, (np.abs(position) > FARTHEST).any(axis=1), Reason.BEYOND_TRAVEL)
     displacement = np.where((reason == CERTAIN)[:, np.newaxis], rapids.target - rapids.start, 0.0)
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)

@@ -28,6 +28,9 @@ def machine_of(axes, *, interval=0.001, positioning="linear", extra=""):
 PAPER = machine_of({"Z": f"{Z_AXIS}, {ROCKING}}}"})
 
 
+PAPER_WIDE = machine_of({axis: f"{Z_AXIS}}}" for axis in "XYZ"})
+
+
 def moves(*rows):
     """Displacements by axis as the planner takes them."""
     out = np.zeros((len(rows), len(AXES)))
@@ -424,12 +427,19 @@ def test_a_rapid_that_would_fill_the_memory_is_left_alone(positioning):
         for name in "XZ"
     )
     machine = Machine.loads(f"interval: 0.001\npositioning: {positioning}\naxes:\n{axes}")
-    text = "G21 G90 G94 G64\nG1 X0 Z0 F600\nG0 X59999\nX999999999 Z5\nX0\nZ6\nM2\n"
+    text = "G21 G90 G94 G64\nG1 X0 Z0 F600\nG0 X59999\nX9999999 Z5\nX0\nZ6\nM2\n"
     plans = plan_rapids(rapids_of(text, machine), machine)
     assert reasons(plans) == [None, Reason.TOO_LONG, Reason.TOO_LONG, None]
     assert plans.counts.max() < 1.01 * MOST_INTERVALS
     with pytest.raises(PlanError, match="more than 100000 intervals"):
         plan_moves(moves({"Z": 1.0}), machine, time=101.0)
+
+
+@pytest.mark.parametrize("far", ["X1000000000", "Y1000000000", "X-100000001"])
+def test_a_rapid_where_no_machine_is_is_left_alone(far):
+    text = f"G21 G90 G94 G64 F100\nG1 X0 Y0 Z0\nG1 {far}\nG0 X-100000001 Z1\nX0 Y0\nG0 Z9\nM2\n"
+    assert reasons(plan_rapids(rapids_of(text, PAPER_WIDE), PAPER_WIDE))[0] == Reason.BEYOND_TRAVEL
+    assert reasons(plan_rapids(rapids_of(text, PAPER_WIDE), PAPER_WIDE))[2] is None
 
 
 def test_travel_counts_only_where_the_offset_is_known():
