@@ -176,7 +176,9 @@ def plan_rapids(
             named = (rapids.words >> k & 1) != 0
             _rule_out(reason, named & ((where < low) | (where > high)), Reason.BEYOND_TRAVEL)
     for position in (rapids.start, rapids.target):
-        _rule_out(reason, (np.abs(position) > FARTHEST).any(axis=1), Reason.BEYOND_TRAVEL)
+        _rule_out(
+            reason, np.abs(np.nan_to_num(position)).max(axis=1) > FARTHEST, Reason.BEYOND_TRAVEL
+        )
     displacement = np.where((reason == CERTAIN)[:, np.newaxis], rapids.target - rapids.start, 0.0)
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)

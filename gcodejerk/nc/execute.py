@@ -109,7 +109,7 @@ class Executor:
                 m_group = dialect.m_groups.get(number) if number == value else None
                 if m_group is None:
                     codes.unknown = True
-                elif m_group in _GROUPED_M and any(dialect.m_groups[m] == m_group for m in codes.m):
+                elif m_group in _GROUPED_M and m_group in map(dialect.m_groups.get, codes.m):
                     codes.fault = True
                 codes.m.append(number)
             elif letter != "N":
