@@ -2,25 +2,32 @@
 
 This module owns what happens around `process_file` for one file: opening, the output's rename, the
 report, `--check` and `--diff`.
+
+Rule: whatever happens to one program is told of that program, be it an error of the system, a bug
+of ours or the death of the process that worked on it. Only for a single program a bug keeps its
+traceback.
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
+import traceback
+from collections.abc import Generator
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from functools import partial
 from typing import BinaryIO
 
 from gcodejerk.designs import known_limits
 from gcodejerk.errors import EmitError, GcodejerkError
-from gcodejerk.files import STANDARD, new_file, open_input, same_file
+from gcodejerk.files import STANDARD, make_folder, new_file, open_input, same_file, version
 from gcodejerk.machine import Machine
 from gcodejerk.pipeline import Progress, Result, Settings, process_file, silent
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line
+from gcodejerk.splice import changed_error
+from gcodejerk.workers import map_jobs
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +42,8 @@ class Job:
     in_place: bool
     """The output is meant to replace the input."""
     strict: bool
+    new_folders: tuple[str, ...] = ()
+    """Are made where they are missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,16 +51,25 @@ class Done:
     """What became of one program; `error` is a message where it failed."""
 
     input: str
-    changed: bool = False
+    planned: int = 0
+    """Rapids that were rewritten, and left alone."""
+    left: int = 0
+    written_out: int = 0
+    """Blocks of drilling cycles that became explicit moves."""
     summary: str = ""
     notes: tuple[str, ...] = ()
     diff: bytes = b""
     error: str | None = None
 
+    @property
+    def changed(self) -> bool:
+        """Whether the output is not the input."""
+        return self.planned > 0 or self.written_out > 0
+
 
 def run_jobs(
     jobs: list[Job], machine: Machine, settings: Settings, workers: int, progress: Progress | None
-) -> Iterator[Done]:
+) -> Generator[Done, None, None]:
     """Process programs, in their order.
 
     Parameters
@@ -65,36 +83,75 @@ def run_jobs(
     workers : int
         How many are worked on at a time.
     progress : callable or None
-        For a single worker.
+        See `pipeline.Progress`; where several work at a time, it counts the programs.
 
     Yields
     ------
     Done
         One for each job.
     """
-    if workers == 1 or len(jobs) == 1:
+    if len(jobs) == 1:
+        yield run_job(jobs[0], machine, settings, progress)
+    elif workers == 1:
         for job in jobs:
-            yield run_job(job, machine, settings, progress)
-        return
-    with ProcessPoolExecutor(max_workers=min(workers, len(jobs))) as pool:
-        for future in [pool.submit(run_job, job, machine, settings, None) for job in jobs]:
-            yield future.result()
+            yield _run_whatever_happens(job, machine, settings, progress)
+    else:
+        work = partial(_run_whatever_happens, machine=machine, settings=settings, progress=None)
+        with closing(map_jobs(work, jobs, workers, _lost)) as answers:
+            for number, done in enumerate(answers, 1):
+                yield done
+                if progress is not None:
+                    progress("programs", number, len(jobs))
 
 
 def run_job(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
-    """Process one program; a user's mistake becomes a message."""
+    """Process one program; a user's mistake, or the system's refusal, becomes a message."""
     try:
         return _run(job, machine, settings, progress)
+    except BrokenPipeError:
+        raise
     except GcodejerkError as error:
         return Done(job.input, error=str(error))
+    except MemoryError:
+        problem = "there is not enough memory"
+        return Done(job.input, error=str(EmitError(f"{job.input}: {problem}", "use fewer --jobs")))
+    except OSError as error:
+        return Done(job.input, error=f"{job.input}: {error}")
+
+
+def _run_whatever_happens(
+    job: Job, machine: Machine, settings: Settings, progress: Progress | None
+) -> Done:
+    """The same for one of many; a bug of ours is told and does not stop the others."""
+    try:
+        return run_job(job, machine, settings, progress)
+    except Exception:
+        bug = EmitError(
+            f"{job.input}: failed by a bug of gcodejerk, please report it; nothing was written",
+            traceback.format_exc(),
+        )
+        return Done(job.input, error=str(bug))
+
+
+def _lost(job: Job, status: int | None) -> Done:
+    """What to say of a job whose process died."""
+    how = f"signal {-status}" if status is not None and status < 0 else f"status {status}"
+    lost = EmitError(
+        f"{job.input}: the process that worked on it died ({how})",
+        "if memory was short, use fewer --jobs; otherwise please report it",
+    )
+    return Done(job.input, error=str(lost))
 
 
 def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
     _refuse_overwriting(job)
     with ExitStack() as stack:
+        before = version(job.input)
         source = stack.enter_context(open_input(job.input))
         # The outputs are renamed when the stack closes without an error, the report last.
         report = None
+        for name in job.new_folders if job.mode == "write" else ():
+            make_folder(name)
         if job.report is not None and job.mode == "write":
             report = stack.enter_context(new_file(job.report))
         if job.mode == "write":
@@ -107,12 +164,14 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
             report.write(dump(record_of(result, machine, job.output, source, progress)))
+            report.flush()  # a full disk shows here, and not when the output is in its place
         diff = difference(source, target, result) if job.mode == "diff" else b""
+        if job.in_place and version(job.input) != before:
+            raise changed_error(job.input)  # an edit of the user's would be lost
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}"
     written = 0 if result.expansion is None else result.expansion.written
-    changed = result.planned > 0 or written > 0
-    return Done(job.input, changed, summary, result.notes, diff)
+    return Done(job.input, result.planned, result.left, written, summary, result.notes, diff)
 
 
 def record_of(

@@ -4,19 +4,22 @@ Rule 1: an output is written beside its place under a hidden name, and renamed w
 and verified. Killed at any moment, a run leaves the old file or the new one; at worst a hidden
 `.~gcodejerk-` file stays, which nothing reads.
 Rule 2: an input is never opened for writing.
+Rule 3: whatever the system refuses, in whichever step, becomes an error that names the file.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
+import secrets
 import shutil
 import stat
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, Any, BinaryIO
 
 from gcodejerk.errors import EmitError, ProgramError
 
@@ -52,16 +55,14 @@ def open_input(path: str) -> Iterator[BinaryIO]:
             yield spool  # type: ignore[misc]
         return
     try:
-        file = open(path, "rb")  # noqa: SIM115
+        raw = _Input(path)
     except FileNotFoundError:
         raise ProgramError(f"there is no file {path}", "check the name and the folder") from None
     except IsADirectoryError:
         raise ProgramError(f"{path} is a folder", "name the program in it") from None
-    except OSError as error:
-        raise ProgramError(
-            f"{path} cannot be read: {error.strerror}", "check its permissions"
-        ) from None
-    with file:
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
+    with io.BufferedReader(raw) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:
                 shutil.copyfileobj(file, spool)
@@ -92,38 +93,108 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
     EmitError
         It cannot be written: a full disk, a folder that is missing or read-only.
     """
-    place = Path(path)
-    # A pipe or a device is written to; only a file can be replaced by another one.
-    special = path != STANDARD and place.exists() and not (place.is_file() or place.is_dir())
-    if path == STANDARD or special:
+    if path == STANDARD or _is_special(path):
         with tempfile.SpooledTemporaryFile(max_size=SPOOL) as spool:
             yield spool  # type: ignore[misc]
             spool.seek(0)
             _pass_on(spool, path)
         return
-    # A link stays a link: what it points to is replaced.
-    place = Path(os.path.realpath(place)) if place.is_symlink() else place
-    temporary: str | None = None
+    place = _place(path)
+    # The name is known before the file is there: interrupted between the two, it is removed, too.
+    temporary = place.parent / f"{PREFIX}{secrets.token_hex(8)}"
     try:
-        if place.is_dir():
-            raise EmitError(f"{path} is a folder", "name a file in it (-o), or use --output-dir")
-        handle, temporary = tempfile.mkstemp(prefix=PREFIX, dir=place.parent)
-        with os.fdopen(handle, "w+b") as file:
+        try:
+            raw = _Output(temporary, path)
+        except (OSError, ValueError) as error:
+            raise _unwritable(path, error) from error
+        with io.BufferedRandom(raw) as file:
             yield file
             file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, _mode(like))
-        os.replace(temporary, place)
-        temporary = None
-    except OSError as error:
-        raise EmitError(
-            f"{path} cannot be written: {error.strerror or error}",
-            "nothing was written; check the folder, its permissions and the space on the disk",
-        ) from error
+            with _naming(path):
+                os.fsync(file.fileno())
+        with _naming(path):
+            os.chmod(temporary, _mode(like))
+            os.replace(temporary, place)
     finally:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                os.unlink(temporary)
+        with contextlib.suppress(OSError, ValueError):
+            os.unlink(temporary)
+
+
+def _is_special(path: str) -> bool:
+    """Whether this is a pipe or a device: it is written to, as only a file can be replaced."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def _place(path: str) -> Path:
+    """Where a file of a name is to be: a link stays a link, and what it points to is replaced."""
+    try:
+        place = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+        mode = place.lstat().st_mode
+    except FileNotFoundError:
+        return place
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from error
+    if stat.S_ISLNK(mode):
+        raise EmitError(f"{path} cannot be written: it is a link to itself", "remove the link")
+    if stat.S_ISDIR(mode):
+        raise EmitError(f"{path} is a folder", "name a file in it (-o), or use --output-dir")
+    return place
+
+
+class _Input(io.FileIO):
+    """A file to read from, whose failures are errors of ours."""
+
+    def __init__(self, path: str) -> None:
+        super().__init__(path, "rb")
+        self.path = path
+
+    def readinto(self, buffer: Any) -> int | None:
+        try:
+            return super().readinto(buffer)
+        except OSError as error:
+            raise _unreadable(self.path, error) from error
+
+
+class _Output(io.FileIO):
+    """A new file to write to, whose failures are errors of ours, in the name of its final place."""
+
+    def __init__(self, temporary: Path, path: str) -> None:
+        super().__init__(temporary, "x+b", opener=_for_us_alone)
+        self.path = path
+
+    def write(self, data: Any) -> Any:
+        with _naming(self.path):
+            return super().write(data)
+
+
+def _for_us_alone(path: str, flags: int) -> int:
+    """Open a file that nobody else may read before it has its final permissions."""
+    return os.open(path, flags, 0o600)
+
+
+def _unreadable(path: str, error: Exception) -> ProgramError:
+    reason = getattr(error, "strerror", None) or error
+    return ProgramError(f"{path} cannot be read: {reason}", "check its name and permissions")
+
+
+def _unwritable(path: str, error: Exception) -> EmitError:
+    return EmitError(
+        f"{path} cannot be written: {getattr(error, 'strerror', None) or error}",
+        "it was left as it was; check the folder, its permissions and the space on the disk",
+    )
+
+
+@contextlib.contextmanager
+def _naming(path: str) -> Iterator[None]:
+    """Failures of the system in here are about a file."""
+    try:
+        yield
+    except OSError as error:
+        raise _unwritable(path, error) from error
 
 
 def _pass_on(spool: IO[bytes], path: str) -> None:
@@ -144,13 +215,23 @@ def _pass_on(spool: IO[bytes], path: str) -> None:
         ) from error
 
 
+def version(path: str) -> tuple[int, ...] | None:
+    """What tells one version of a file from the next, None where there is none."""
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
 def make_folder(path: str) -> None:
     """Make a folder for outputs, and those above it, where they are missing."""
     try:
         os.makedirs(path, exist_ok=True)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise EmitError(
-            f"{path} cannot be made a folder: {error.strerror}", "choose another --output-dir"
+            f"{path} cannot be made a folder: {getattr(error, 'strerror', None) or error}",
+            "choose another --output-dir",
         ) from error
 
 
@@ -160,7 +241,7 @@ def same_file(one: str, other: str) -> bool:
         return False
     try:
         return os.path.samefile(one, other)
-    except OSError:
+    except (OSError, ValueError):
         return os.path.abspath(one) == os.path.abspath(other)
 
 

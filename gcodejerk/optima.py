@@ -14,6 +14,8 @@ from __future__ import annotations
 import hashlib
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -149,15 +151,32 @@ def _workers(problems: int) -> Iterator[Callable[[list[Question]], list[Optimum 
     """What solves a list of problems: all cores where that pays, this process otherwise.
 
     The solver keeps Python's lock, so threads would not help. Processes are forked: other ways of
-    starting them would run the user's own script again.
+    starting them would run the user's own script again. Where this process is itself one of several
+    workers, the other cores have work of their own.
     """
-    cores = os.cpu_count() or 1
+    cores = 1 if multiprocessing.parent_process() else os.cpu_count() or 1
     if problems < FEW or cores == 1 or "fork" not in multiprocessing.get_all_start_methods():
         yield lambda questions: [_answer(question) for question in questions]
         return
     context = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(min(cores, problems), mp_context=context) as pool:
+    with ProcessPoolExecutor(
+        min(cores, problems), mp_context=context, initializer=_follow_master
+    ) as pool:
         yield lambda questions: list(pool.map(_answer, questions))
+
+
+def _follow_master() -> None:
+    """In a worker: Ctrl-C is the master's business, and with the master it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    def follow() -> None:
+        master = multiprocessing.parent_process()
+        if master is not None:
+            master.join()
+            os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
 
 
 @cache

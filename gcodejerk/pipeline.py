@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
-from gcodejerk.errors import EmitError, Place, ProgramError
+from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.expanded import (
     hunks,
     in_original,
@@ -32,7 +32,7 @@ from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
-from gcodejerk.splice import Splicer, stamp_text
+from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
 from gcodejerk.start import program_start
 from gcodejerk.stream import Residuals, make_streams
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
@@ -290,19 +290,13 @@ def _process(
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
-        source.seek(0)
-        target.seek(0)
-        judge = verify_files if emitter.in_place else verify_csv
-        design = replace(machine.design, profile=settings.profile or machine.design.profile)
-        verification = judge(
-            source,
-            target,
-            replace(machine, design=design),
-            names=(name, f"the output for {name}"),
-            dialect=program.dialect,
-            start=program_start(machine),
-        )
-        require(lines_in_original(verification, lines))
+        try:
+            verification = _judged(source, target, machine, settings, program, emitter.in_place)
+            require(lines_in_original(verification, lines))
+        except (ProgramError, VerifyError):
+            if digest_of(source) != program.digest:
+                raise changed_error(name) from None
+            raise
         report("verifying", 1, 1)
     edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
     differences = hunks(edits, program.rapids, program.insert_at, lines)
@@ -331,6 +325,29 @@ def _process(
         hunks=differences,
         expansion=expansion,
         notes=(*notes, *emitter.notes(program.rapids, plans)),
+    )
+
+
+def _judged(
+    source: BinaryIO,
+    target: BinaryIO,
+    machine: Machine,
+    settings: Settings,
+    program: Program,
+    in_place: bool,
+) -> Verification:
+    """Read an output back."""
+    source.seek(0)
+    target.seek(0)
+    judge = verify_files if in_place else verify_csv
+    design = replace(machine.design, profile=settings.profile or machine.design.profile)
+    return judge(
+        source,
+        target,
+        replace(machine, design=design),
+        names=(program.name, f"the output for {program.name}"),
+        dialect=program.dialect,
+        start=program_start(machine),
     )
 
 

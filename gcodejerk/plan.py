@@ -35,6 +35,10 @@ PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
 STANDSTILL = 1e-9
 """An axis that moves less than this does not move [mm] or [deg]."""
+FARTHEST = 1e8
+"""Where no axis ever is [mm] or [deg]; what is farther away could not be written exactly."""
+MOST_INTERVALS = 100_000
+"""Of one stream. A number without its decimal point would ask for more than fits into memory."""
 
 
 def path_length(displacement: Array, machine: Machine) -> Array:
@@ -115,6 +119,13 @@ def plan_moves(
     known = np.array([axis in machine.axis_names for axis in AXES])
     _rule_out(reason, (length == 0.0), Reason.NO_MOTION)
     _rule_out(reason, (displacement[:, ~known] != 0.0).any(axis=1), Reason.AXIS_UNKNOWN)
+    longest = MOST_INTERVALS * machine.interval
+    _rule_out(reason, _least_time(displacement, machine) > longest, Reason.TOO_LONG)
+    if time is not None and time > longest:
+        raise PlanError(
+            f"the time is {time:g} s, more than {MOST_INTERVALS} intervals ({longest:g} s)",
+            "give a shorter one",
+        )
     return _Planner(machine, profile, displacement, length, reason, time, T1, progress, speed).run()
 
 
@@ -169,11 +180,25 @@ def plan_rapids(
             where = position + rapids.offset[:, k]
             named = (rapids.words >> k & 1) != 0
             _rule_out(reason, named & ((where < low) | (where > high)), Reason.BEYOND_TRAVEL)
+    for position in (rapids.start, rapids.target):
+        _rule_out(
+            reason, np.abs(np.nan_to_num(position)).max(axis=1) > FARTHEST, Reason.BEYOND_TRAVEL
+        )
     displacement = np.where((reason == CERTAIN)[:, np.newaxis], rapids.target - rapids.start, 0.0)
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)
     _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
     return plan_moves(displacement, machine, profile, reason, progress=progress, speed=rapids.speed)
+
+
+def _least_time(displacement: Array, machine: Machine) -> Array:
+    """What moves take at least [s]: at full speed, and at full acceleration to the middle."""
+    out = np.zeros(len(displacement))
+    for axis in machine.axes:
+        size = np.abs(displacement[:, AXES.index(axis.name)])
+        out = np.maximum(out, size / axis.rapid.velocity)
+        out = np.maximum(out, 2.0 * np.sqrt(size / axis.rapid.acceleration))
+    return out
 
 
 def _is_rotary(machine: Machine, axis: str) -> bool:

@@ -32,6 +32,7 @@ class Reason(enum.StrEnum):
     FEED_UNKNOWN = "feed to restore unknown"
     AXIS_UNKNOWN = "axis not in the machine file"
     TOO_SHORT = "shorter than minimum_length"
+    TOO_LONG = "too long for a stream"
     BEYOND_TRAVEL = "beyond travel"
     LIMITS = "limits cannot be met"
     NOT_BETTER = "no profile within the limits is better"

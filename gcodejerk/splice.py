@@ -56,6 +56,23 @@ def stamp_text(machine: Machine, chosen: Sequence[str]) -> bytes:
     return (head + b" " + plain.encode())[:STAMP_LENGTH].rstrip()
 
 
+def digest_of(source: BinaryIO) -> bytes:
+    """What a file holds now, as `Program.digest` has it."""
+    source.seek(0)
+    digest = hashlib.blake2b(digest_size=16)
+    while data := source.read(COPY_SIZE):
+        digest.update(data)
+    return digest.digest()
+
+
+def changed_error(name: str) -> EmitError:
+    """The error for a program that somebody else has written to meanwhile."""
+    return EmitError(
+        f"{name} was changed while it was being processed",
+        "run the command again when nothing writes to the file",
+    )
+
+
 class Splicer:
     """Copies the source and puts streams in the place of blocks, in one pass through the file."""
 
@@ -154,10 +171,7 @@ class Splicer:
             return
         self._copy(self.program.size)
         if self.source.read(1) or self.digest.digest() != self.program.digest:
-            raise EmitError(
-                f"{self.program.name} was changed while it was being processed",
-                "run the command again when nothing writes to the file",
-            )
+            raise changed_error(self.program.name)
         if self.sum_at is not None:
             self.target.seek(self.sum_at)
             self.target.write(self.written.hexdigest().encode())

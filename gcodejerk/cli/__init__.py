@@ -7,7 +7,9 @@ in one module per group; this one puts them together and owns what becomes of an
 
 from __future__ import annotations
 
+import io
 import os
+import signal
 import sys
 from typing import Annotated
 
@@ -43,16 +45,39 @@ machine_app.command("schema")(machine_schema)
 
 def main() -> None:
     """Run the command line; every mistake of a user is a message, every other one a traceback."""
+    _end_in_order()
     try:
-        app(standalone_mode=True)
+        try:
+            app(standalone_mode=True)
+        finally:
+            sys.stdout.flush()
     except GcodejerkError as error:
-        sys.stdout.flush()
         print(error, file=sys.stderr)
         sys.exit(1)
     except BrokenPipeError:
         # Whoever read our output has enough. Nothing more can be printed, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        # A full disk behind standard output, and what else no command could name.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"gcodejerk cannot go on: {error}", file=sys.stderr)
+        sys.exit(1)
+
+
+def _end_in_order() -> None:
+    """Asked to end, put temporary files away first; show whatever name a file has."""
+
+    def end(number: int, frame: object) -> None:
+        sys.exit(128 + number)
+
+    for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP, and nohup ignores it
+        asked = getattr(signal, name, None)
+        if asked is not None and signal.getsignal(asked) == signal.SIG_DFL:
+            signal.signal(asked, end)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _version(value: bool) -> None:

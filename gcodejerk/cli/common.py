@@ -34,7 +34,9 @@ def load_machine(name: str, program: str | None) -> Machine:
     """The machine that the user named: a shipped one, or a file, also beside the program."""
     from gcodejerk.machine import Machine, find_machine
 
-    beside = None if program is None or program == "-" else Path(program).parent / name
+    beside = None
+    if program is not None and program != "-":
+        beside = (Path(program) if Path(program).is_dir() else Path(program).parent) / name
     if beside is not None and not Path(name).exists() and beside.is_file():
         return Machine.load(beside)
     found = find_machine(name)

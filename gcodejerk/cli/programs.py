@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,13 +15,18 @@ import typer
 from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
 
 if TYPE_CHECKING:
+    from gcodejerk.batch import Done
+    from gcodejerk.gather import Found
     from gcodejerk.machine import Machine
     from gcodejerk.pipeline import Settings
 
 
 def process(
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE...", help="programs; - is standard input")
+        list[str],
+        typer.Argument(
+            metavar="FILE...", help="programs, and folders of programs; - is standard input"
+        ),
     ],
     machine: MachineOption,
     output: Annotated[
@@ -27,7 +34,10 @@ def process(
         typer.Option("-o", "--output", metavar="OUT", help="output file; - is standard output"),
     ] = None,
     output_dir: Annotated[
-        str | None, typer.Option(metavar="DIR", help="write each program under its own name here")
+        str | None,
+        typer.Option(
+            metavar="DIR", help="write here under the same names; folders keep their tree"
+        ),
     ] = None,
     in_place: Annotated[bool, typer.Option("--in-place", help="replace each program")] = False,
     controller: Annotated[
@@ -39,7 +49,10 @@ def process(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
-    report: Annotated[str | None, typer.Option(metavar="FILE.json", help="write a report")] = None,
+    report: Annotated[
+        str | None,
+        typer.Option(metavar="FILE.json", help="write a report; DIR/: one for each program"),
+    ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
     strict: Annotated[
         bool, typer.Option("--strict", help="refuse a program with rapids left alone")
@@ -63,17 +76,25 @@ def process(
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
     from gcodejerk.batch import Job, run_jobs
-    from gcodejerk.files import make_folder
+    from gcodejerk.gather import NameClashError, check_names, gather
     from gcodejerk.pipeline import Settings
 
     if sum(map(bool, (output, output_dir, in_place))) > 1:
         raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
-    if len(files) > 1 and (output is not None or report is not None):
-        raise typer.BadParameter("-o and --report take one program; use --output-dir for several")
-    if report is not None and not report.endswith(".json"):
-        raise typer.BadParameter(f"--report {report}: a report is a .json file in this version")
+    if "-" in files and len(files) > 1:
+        raise typer.BadParameter("standard input (-) is one program: give it alone")
     if in_place and "-" in files:
         raise typer.BadParameter("--in-place needs a file, not standard input")
+    found, problems = gather(files, output_dir)
+    many = len(found) + len(problems) > 1
+    report_dir = report if report is not None and report.endswith("/") else None
+    if output is not None or (report is not None and report_dir is None):
+        if many or any(map(os.path.isdir, files)):
+            raise typer.BadParameter(
+                "-o and --report FILE.json take one program; use --output-dir and --report DIR/"
+            )
+        if report is not None and report_dir is None and not report.endswith(".json"):
+            raise typer.BadParameter(f"--report {report}: a report is a .json file in this version")
     settings = Settings(
         controller=controller,
         form=form,
@@ -84,41 +105,83 @@ def process(
         force=force,
         expand_cycles=expand_cycles,
     )
-    mode = "check" if check else "diff" if diff else "write"
     described = load_machine(machine, files[0])
-    jobs_list = [
+    suffix = _suffix(in_place, described, settings)
+    outputs = [_output(program, output, output_dir, in_place, suffix) for program in found]
+    try:
+        check_names([program.path for program in found], outputs)
+    except NameClashError as error:
+        raise typer.BadParameter(f"{error.problem}; {error.remedy}") from None
+    mode = "check" if check else "diff" if diff else "write"
+    reports = [_report(program, report, report_dir) for program in found]
+    batch = [
         Job(
-            file,
-            _output(file, output, output_dir, in_place, described, settings),
-            report,
+            program.path,
+            outputs[k],
+            reports[k],
             mode,
             in_place,
             strict,
+            (*_parent(outputs[k], output_dir), *_parent(reports[k], report_dir)),
         )
-        for file in files
+        for k, program in enumerate(found)
     ]
-    if output_dir is not None and mode == "write":
-        make_folder(output_dir)
-    to_stdout = diff or any(job.output == "-" for job in jobs_list)
-    failed = changed = False
-    with progress(quiet or jobs > 1) as show:
-        for done in run_jobs(jobs_list, described, settings, jobs, show):
-            if done.error is not None:
-                print(done.error, file=sys.stderr)
-                failed = True
-                continue
-            changed |= done.changed
-            if done.diff:
-                sys.stdout.flush()
-                sys.stdout.buffer.write(done.diff)
-            for note in () if quiet else done.notes:
-                print(f"{done.input}: note: {note}", file=sys.stderr)
-            if check and done.changed:
-                print(f"{done.input}: would be changed", file=sys.stdout)
-            elif not quiet:
-                print(done.summary, file=sys.stderr if to_stdout else sys.stdout)
-    if failed or (check and changed):
+    tally = _Tally(mode, quiet, aside=diff or "-" in outputs)
+    for problem in problems:
+        tally.fail(str(problem))
+    with progress(quiet) as show, closing(run_jobs(batch, described, settings, jobs, show)) as runs:
+        for done in runs:
+            tally.add(done)
+    if many:
+        tally.finish()
+    if tally.failed or (check and tally.changed):
         raise typer.Exit(1)
+
+
+class _Tally:
+    """Prints what became of each program, and counts."""
+
+    def __init__(self, mode: str, quiet: bool, aside: bool) -> None:
+        self.mode, self.quiet = mode, quiet
+        self.out = sys.stderr if aside else sys.stdout
+        self.programs = self.planned = self.left = self.failed = 0
+        self.changed = False
+
+    def fail(self, error: str) -> None:
+        """Tell and count a failure."""
+        self.programs += 1
+        self.failed += 1
+        print(error, file=sys.stderr)
+
+    def add(self, done: Done) -> None:
+        """Tell and count one program."""
+        if done.error is not None:
+            self.fail(done.error)
+            return
+        self.programs += 1
+        self.planned += done.planned
+        self.left += done.left
+        self.changed |= done.changed
+        if done.diff:
+            sys.stdout.flush()
+            sys.stdout.buffer.write(done.diff)
+        for note in () if self.quiet else done.notes:
+            print(f"{done.input}: note: {note}", file=sys.stderr)
+        if self.mode == "check" and done.changed:
+            print(f"{done.input}: would be changed")
+        elif not self.quiet:
+            print(done.summary, file=self.out)
+
+    def finish(self) -> None:
+        """Print the line for the whole run."""
+        if self.quiet:
+            return
+        would = "" if self.mode == "write" else "would be "
+        print(
+            f"{self.programs} programs: {self.planned} rapids {would}rewritten, "
+            f"{self.left} left alone; {self.failed or 'none'} failed",
+            file=self.out,
+        )
 
 
 def inspect(
@@ -208,29 +271,38 @@ def verify(
     raise typer.Exit(1)
 
 
-def _output(
-    file: str,
-    output: str | None,
-    output_dir: str | None,
-    in_place: bool,
-    machine: Machine,
-    settings: Settings,
-) -> str:
-    """Where the result of a program goes."""
+def _suffix(in_place: bool, machine: Machine, settings: Settings) -> str:
+    """Suffix of the outputs; empty: that of each program."""
     from gcodejerk.emit import load_controller
 
     suffix = load_controller(settings.controller or machine.controller).suffix
+    if suffix and in_place:
+        raise typer.BadParameter("--in-place: this controller's streams are a file of their own")
+    return suffix
+
+
+def _output(
+    program: Found, output: str | None, output_dir: str | None, in_place: bool, suffix: str
+) -> str:
+    """Where the result of a program goes."""
+    from gcodejerk.gather import output_name
+
     if in_place:
-        if suffix:
-            raise typer.BadParameter(
-                "--in-place: this controller's streams are a file of their own"
-            )
-        return file
+        return program.path
     if output is not None:
         return output
-    if file == "-":
+    if program.path == "-":
         return "-"
-    path = Path(file)
-    if output_dir is not None:
-        return str(Path(output_dir) / (path.stem + suffix if suffix else path.name))
-    return str(path.parent / f"{path.stem}.jerk{suffix or path.suffix}")
+    return output_name(program, output_dir, suffix)
+
+
+def _report(program: Found, report: str | None, report_dir: str | None) -> str | None:
+    """Where the report on a program goes."""
+    from gcodejerk.gather import report_name
+
+    return report if report_dir is None else report_name(program, report_dir)
+
+
+def _parent(name: str | None, wanted: str | None) -> tuple[str, ...]:
+    """The folder of an output, where it was named as one that may be made."""
+    return () if name is None or wanted is None else (str(Path(name).parent),)

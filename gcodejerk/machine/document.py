@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +21,20 @@ import yaml
 
 from gcodejerk.errors import Place
 from gcodejerk.machine.problems import Problems, refusal
+from gcodejerk.machine.reading import NotAFileError, read_file
 
 MOST_BYTES = 1 << 20
 MOST_NODES = 20_000
 MOST_DEPTH = 20
 MOST_ALIASES = 1_000
+MOST_DIRECTIVES = 20
+"""Lines such as `%YAML 1.1`; the parser compares each of them with all others."""
 
 # Composing in C is ten times as fast; PyYAML built without libyaml has the same nodes and marks.
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _YAML = "tag:yaml.org,2002:"
 _PLAIN_TAGS = {_YAML + word for word in ("str", "int", "float", "bool", "null", "map", "seq")}
+_DIRECTIVE = re.compile("^%", re.MULTILINE)
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
 _WRITE_TEXT = "write the machine file as UTF-8 text; machines/vmc.yaml is an example"
 
@@ -54,8 +59,7 @@ def read_text(path: str | Path) -> str:
     """
     name = str(path)
     try:
-        with Path(path).open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
+        data = read_file(Path(path), MOST_BYTES + 1)
     except FileNotFoundError:
         raise refusal(
             Place(name), "there is no such file", "give the path of a machine file (YAML)"
@@ -63,6 +67,12 @@ def read_text(path: str | Path) -> str:
     except IsADirectoryError:
         raise refusal(
             Place(name), "is a directory, expected a machine file", "name the file in it"
+        ) from None
+    except NotAFileError:
+        raise refusal(
+            Place(name),
+            "is a pipe or a device, expected a machine file",
+            "write it to a file, and give the path of that",
         ) from None
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
@@ -147,6 +157,9 @@ class Document:
                 f"holds the character {error.character!r}, which YAML does not allow",
                 _WRITE_TEXT,
             ) from None
+        except (ValueError, OverflowError) as error:
+            # Where libyaml is missing, PyYAML asks Python for the character '\\U00110000'.
+            raise refusal(Place(name), f"is not YAML: {error}", _WRITE_TEXT) from None
         if root is None:
             raise refusal(
                 Place(name, 1, 1), "is empty, expected a machine", "start from machines/vmc.yaml"
@@ -231,6 +244,13 @@ class Document:
 
     def _measure(self, text: str) -> None:
         """Refuse what is too large to compose, and tags that stand for more than plain values."""
+        directives = list(islice(_DIRECTIVE.finditer(text), MOST_DIRECTIVES + 1))
+        if len(directives) > MOST_DIRECTIVES:
+            raise refusal(
+                self._place_at(text, directives[-1].start()),
+                f"holds more than {MOST_DIRECTIVES} lines that begin with %",
+                "begin a comment with #",
+            )
         nodes = depth = aliases = 0
         for event in yaml.parse(text, Loader=_LOADER):
             nodes += isinstance(event, yaml.NodeEvent)
@@ -248,7 +268,7 @@ class Document:
             if tag is not None and tag != "!" and tag not in _PLAIN_TAGS:
                 raise refusal(
                     self._place_of(event.start_mark),
-                    f"the tag {tag.replace(_YAML, '!!')!r} is not allowed",
+                    f"the tag {tag.replace(_YAML, '!!')[:60]!r} is not allowed",
                     "write plain words and numbers",
                 )
 

@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 
 from gcodejerk.errors import MachineError, Place
 from gcodejerk.machine.model import Spectrum
+from gcodejerk.machine.reading import NotAFileError, read_file
 
 Array = NDArray[np.float64]
 
 MOST_BYTES = 10_000_000
+MOST_ROWS = 200_000
+"""Of a file; Klipper writes some hundreds."""
 FEWEST_LINES = 8
 MOST_LINES = 48
 """Of a Spectrum: every line is an oscillator that each candidate of a profile is held against."""
@@ -196,12 +199,11 @@ def _widths(f: Array) -> Array:
 
 def _read(path: Path) -> bytes:
     try:
-        # Opening a pipe would wait for a writer, and a device may never end.
-        if path.exists() and not path.is_file():
-            kind = "a folder" if path.is_dir() else "not a file"
-            raise MachineError(f"is {kind}, expected a CSV file", "name the file in it")
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
+        data = read_file(path, MOST_BYTES + 1)
+    except IsADirectoryError:
+        raise MachineError("is a folder, expected a CSV file", "name the file in it") from None
+    except NotAFileError:
+        raise MachineError("is not a file, expected a CSV file", "name a file") from None
     except FileNotFoundError:
         raise MachineError(
             "does not exist", "give its path from the folder of the machine file"
@@ -223,6 +225,11 @@ def _table(data: bytes, source: str) -> tuple[Array, Array]:
     """Columns of frequency and PSD, every line checked."""
     if b"\x00" in data:
         raise MachineError("is not text", "save it as comma-separated text in UTF-8")
+    if max(data.count(b"\n"), data.count(b"\r")) > MOST_ROWS:
+        raise MachineError(
+            f"has more than {MOST_ROWS} lines, which no spectrum has",
+            "name the spectrum, not the recording that it was made from",
+        )
     # Only numbers and a few ASCII words are looked at: a comment may be in any encoding.
     text = data.decode("utf-8-sig", errors="replace")
     columns, header = [1], False

@@ -135,7 +135,8 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     returns = kind == _CR
     if returns.any():
         bad[:-1] |= returns[:-1] & ~ends[1:]
-    odd_lines.append(line[bad])
+    # A line end is a joint of its own line, but a number behind it stands on the next one.
+    odd_lines.append((line + ends)[bad])
     if inner[0] == _NUMBER:
         odd_lines.append(line[:1])
 

@@ -6,6 +6,7 @@ nothing has to be searched for.
 
 from __future__ import annotations
 
+import os
 from typing import BinaryIO
 
 from gcodejerk.pipeline import Result
@@ -26,7 +27,7 @@ def difference(source: BinaryIO, target: BinaryIO, result: Result) -> bytes:
     bytes
         Empty where nothing changes.
     """
-    name = result.program.name.encode()
+    name = os.fsencode(result.program.name)
     out = [b"--- %s\n+++ %s (gcodejerk)\n" % (name, name)]
     added = 0
     for begin, end, line, first, last in result.hunks.tolist():

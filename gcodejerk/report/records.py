@@ -302,7 +302,9 @@ def number(value: float) -> float | None:
 
 def dump(record: Record) -> bytes:
     """A record as the text of a JSON file."""
-    return json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+    text = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False)
+    # A file's name need not be UTF-8; what is not becomes the \\udc.. by which Python names it.
+    return text.encode("utf-8", "backslashreplace") + b"\n"
 
 
 def _scaled(segments: list[tuple[float, float]], length: float, time: float) -> list[Record]:

@@ -153,6 +153,9 @@ def test_csv_has_one_row_per_interval(run, folder):
     [
         (["process", "part.nc", "-m", "vmc", "-o", "a", "--in-place"], "choose one of"),
         (["process", "part.nc", "b.nc", "-m", "vmc", "-o", "a"], "one program"),
+        (["process", ".", "-m", "vmc", "-o", "a"], "one program"),
+        (["process", ".", "-m", "vmc", "--report", "r.json"], "one program"),
+        (["process", "-", "part.nc", "-m", "vmc"], "give it alone"),
         (["process", "part.nc", "-m", "vmc", "--report", "r.html"], "is a .json file"),
         (["process", "-", "-m", "vmc", "--in-place"], "needs a file"),
         (["process", "-m", "vmc"], "Missing argument"),
@@ -172,7 +175,8 @@ def test_wrong_usage_is_status_2(run, folder, arguments, words):
     ("arguments", "words"),
     [
         (["process", "none.nc", "-m", "vmc"], "there is no file none.nc"),
-        (["process", ".", "-m", "vmc"], "is a folder"),
+        (["process", "part.nc", "-m", "vmc", "-o", "."], "is a folder"),
+        (["inspect", ".", "-m", "vmc"], "is a folder"),
         (["process", "part.nc", "-m", "wmc"], "did you mean 'vmc'"),
         (["process", "part.nc", "-m", "vmc", "--as", "pvt"], "cannot write --as pvt"),
         (["process", "part.nc", "-m", "vmc", "--controller", "linuxnc"], "did you mean 'linuxcnc'"),

@@ -24,7 +24,7 @@ PICTURE = """
  <- expanded splice
  <- pipeline
  <- report
- <- files batch
+ <- files gather workers batch
  <- cli
 """
 LAYERS = [

@@ -1,8 +1,9 @@
 import os
 
 import pytest
+import yaml
 
-from gcodejerk.machine import Machine, MachineFileError
+from gcodejerk.machine import Machine, MachineFileError, document
 from gcodejerk.machine.document import MOST_BYTES
 
 
@@ -84,14 +85,39 @@ MANY_MODES = "modes: [" + "&m {frequency: 5}, " + "*m, " * 900 + "]\n"
         ":" * 900_000,
         "\n" * 900_000,
         "#" * 900_000,
+        "!" * 900_000,
+        "a: &a\n  <<: *a\n",
+        "&a {schema: 1, axes: *a, modes: *a, design: *a, program: *a}",
+        "[" * 10_000 + "]" * 10_000,
+        "interval: 0." + "0" * 900_000 + "1",
+        "interval: " + "1:" * 400_000 + "1",
+        "interval: 1e999",
+        'name: "\\U00110000"',
+        'name: "\\Uffffffff"',
+        "%TAG !a! b\n" * 80_000 + "---\na: 1\n",
+        "".join(f"%TAG !{n}! b\n" for n in range(60_000)) + "---\na: 1\n",
+        "--- a\n" * 100_000,
+        "interval: !!python/object/apply:os.system [exit 1]",
+        "interval: !!python/name:os.system",
+        "%TAG ! tag:yaml.org,2002:python/\n--- !object:os.x {}\n",
+        "interval: !<tag:yaml.org,2002:python/object:os.x> {}",
     ],
-    ids=lambda text: text[:12].strip(),
+    ids=lambda text: text[:16].strip(),
 )
-def test_a_hostile_text_is_refused_without_being_expanded(text):
+@pytest.mark.parametrize("loader", ["CSafeLoader", "SafeLoader"])
+def test_a_hostile_text_is_refused_without_being_expanded(text, loader, monkeypatch):
     # Without the bounds some of these take hours and all memory: this test would not end.
+    monkeypatch.setattr(document, "_LOADER", getattr(yaml, loader))
     message = first_line(text)
     assert message.startswith("mill.yaml")
     assert len(message) < 1000
+
+
+def test_a_pipe_and_a_device_are_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    expected = "mill.yaml: is a pipe or a device, expected a machine file\n"
+    assert refusal_of(tmp_path / "pipe.yaml").startswith(expected)
+    assert refusal_of("/dev/zero").startswith(expected)
 
 
 def test_a_file_that_is_missing_is_refused(tmp_path):

@@ -9,7 +9,13 @@ import pytest
 
 from gcodejerk.errors import MachineError
 from gcodejerk.machine import Machine, MachineFileError, Spectrum, machine_yaml
-from gcodejerk.machine.spectrum import MOST_BYTES, MOST_LINES, load_spectrum, read_spectrum
+from gcodejerk.machine.spectrum import (
+    MOST_BYTES,
+    MOST_LINES,
+    MOST_ROWS,
+    load_spectrum,
+    read_spectrum,
+)
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 NYQUIST = 500.0
@@ -481,6 +487,39 @@ def test_a_huge_file_is_refused_before_it_is_read_to_its_end(folder):
         file.truncate(MOST_BYTES + 1)
     with pytest.raises(MachineError, match="is larger than 10 MB"):
         load_spectrum("x.csv", folder, NYQUIST)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"x" * MOST_BYTES,
+        b"9" * MOST_BYTES,
+        b"1" * 5_000_000 + b"," + b"2" * 4_000_000,
+        b"," * MOST_BYTES,
+        b"\n" * MOST_BYTES,
+        b"\r" * MOST_BYTES,
+        b"#\n" * (MOST_BYTES // 2),
+        b"a,b\n" * (MOST_BYTES // 4),
+        bytes(range(1, 256)) * 39_000,
+        b"\x7fELF\0\0" * 1_000_000,
+    ],
+    ids=lambda data: repr(data[:4]),
+)
+def test_a_hostile_file_is_refused_with_a_short_message(folder, data):
+    (folder / "x.csv").write_bytes(data)
+    with pytest.raises(MachineError) as caught:
+        load_spectrum("x.csv", folder, NYQUIST)
+    assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize("rows", [MOST_ROWS, 3 * MOST_ROWS])
+def test_the_number_of_lines_has_an_end(rows):
+    data = b"".join(b"%d.%05d,1\n" % divmod(500_000 + n, 100_000) for n in range(rows))
+    if rows == MOST_ROWS:
+        assert len(read_spectrum(data, "x.csv", NYQUIST).frequency) > 1
+        return
+    with pytest.raises(MachineError, match=f"has more than {MOST_ROWS} lines"):
+        read_spectrum(data, "x.csv", NYQUIST)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")

@@ -265,6 +265,15 @@ def test_an_unknown_m_word_beside_a_known_one_is_found(block):
     assert any("does not know" in f.message for f in read(HEAD + block).findings)
 
 
+@pytest.mark.parametrize(
+    "words", ["M600 M3", "M3 M600", "M999 M6 M5", "M1.5 M30", "M-1 M8", "G999 M3"]
+)
+def test_a_code_beside_one_that_is_not_known_is_no_way_out(words):
+    program = read_program(io.BytesIO(f"G21 G90 G0 X0\n{words}\nG0 X5\nM2\n".encode()))
+    assert program.rapids.reason[-1] != CERTAIN
+    assert any("not know" in f.message or "refuse" in f.message for f in program.findings)
+
+
 def test_code_that_is_no_number_leaves_its_mode_unknown():
     assert last(b"G9..1 X1\nG0 X5\n")[0] is Reason.CUTTER_COMPENSATION
 

@@ -41,3 +41,19 @@ def test_both_ways_agree_on_every_real_file(folder, start):
         data = path.read_bytes()
         if data:
             assert differences(data, start) == [], path
+
+
+PLAIN = [b"G0 X%d Y%d\n" % (n, n + 1) for n in range(40)]
+BEGINNINGS = (b"", b"5", b"-", b".", b" 5", b"(c)5", b"5 (c)", b"/", b"/5", b"X", b"%", b";", b"\r")
+ENDS = (b"", b"X1", b" G0 X9", b"\r", b" ", b"(c)", b";5", b"Y", b"5", b"-", b"5\r", b"\rX1")
+
+
+@pytest.mark.parametrize("where", [0, 1, 20, 39, 40])
+@pytest.mark.parametrize("beginning", BEGINNINGS)
+def test_both_ways_agree_on_an_odd_line_anywhere_in_a_run(where, beginning):
+    for end in ENDS:
+        odd = beginning + end + b"\n"
+        run = [*PLAIN[:where], odd, *PLAIN[where:]]
+        assert differences(b"".join([b"G21 G90\n", *run])) == [], odd
+        assert differences(b"".join(run)) == [], odd
+        assert differences(b"".join(run)[:-1]) == [], odd

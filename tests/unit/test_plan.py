@@ -9,7 +9,7 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import Laws, laws_response, mode_poles
 from gcodejerk.nc import read_program
-from gcodejerk.plan import path_length, plan_moves, plan_rapids
+from gcodejerk.plan import MOST_INTERVALS, path_length, plan_moves, plan_rapids
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.start import program_start
 
@@ -26,6 +26,9 @@ def machine_of(axes, *, interval=0.001, positioning="linear", extra=""):
 
 
 PAPER = machine_of({"Z": f"{Z_AXIS}, {ROCKING}}}"})
+
+
+PAPER_WIDE = machine_of({axis: f"{Z_AXIS}}}" for axis in "XYZ"})
 
 
 def moves(*rows):
@@ -415,6 +418,28 @@ KNOWN = machine_of(
 def test_rapids_are_left_for_the_machine_s_reasons(block, reason):
     rapids = rapids_of(f"G21 G90 G94 G64\nG1 X0 Y0 Z0 A0 F600\n{block}\nM2\n", KNOWN)
     assert reasons(plan_rapids(rapids, KNOWN)) == [reason]
+
+
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+def test_a_rapid_that_would_fill_the_memory_is_left_alone(positioning):
+    axes = "".join(
+        f"  {name}: {{rapid: {{velocity: 600, acceleration: 5000, jerk: 5.0e+5}}}}\n"
+        for name in "XZ"
+    )
+    machine = Machine.loads(f"interval: 0.001\npositioning: {positioning}\naxes:\n{axes}")
+    text = "G21 G90 G94 G64\nG1 X0 Z0 F600\nG0 X59999\nX9999999 Z5\nX0\nZ6\nM2\n"
+    plans = plan_rapids(rapids_of(text, machine), machine)
+    assert reasons(plans) == [None, Reason.TOO_LONG, Reason.TOO_LONG, None]
+    assert plans.counts.max() < 1.01 * MOST_INTERVALS
+    with pytest.raises(PlanError, match="more than 100000 intervals"):
+        plan_moves(moves({"Z": 1.0}), machine, time=101.0)
+
+
+@pytest.mark.parametrize("far", ["X1000000000", "Y1000000000", "X-100000001"])
+def test_a_rapid_where_no_machine_is_is_left_alone(far):
+    text = f"G21 G90 G94 G64 F100\nG1 X0 Y0 Z0\nG1 {far}\nG0 X-100000001 Z1\nX0 Y0\nG0 Z9\nM2\n"
+    assert reasons(plan_rapids(rapids_of(text, PAPER_WIDE), PAPER_WIDE))[0] == Reason.BEYOND_TRAVEL
+    assert reasons(plan_rapids(rapids_of(text, PAPER_WIDE), PAPER_WIDE))[2] is None
 
 
 def test_travel_counts_only_where_the_offset_is_known():

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from gcodejerk.cli import app, machine_app
+from gcodejerk.gather import SUFFIXES
 from gcodejerk.reasons import Reason
 
 ROOT = Path(__file__).parents[2]
@@ -76,3 +77,8 @@ def test_library_example_of_the_readme_runs(samples):
     )
     assert run.returncode == 0, run.stderr
     assert "19 rewritten, 7 left alone" in run.stdout
+
+
+def test_readme_lists_the_suffixes_by_which_programs_are_known():
+    listed = re.search(r"that end in `([^`]*)`", README).group(1).split()
+    assert listed == list(SUFFIXES)
