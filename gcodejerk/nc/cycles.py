@@ -40,7 +40,7 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     bool
         Whether the block is complete; False where the controller would refuse it.
     """
-    if state.plane is None or code == 760:
+    if state.plane is None or code in rules.unknown_ends:
         state.forget_positions()
         state.put("cycle", None)
         return True
@@ -73,6 +73,8 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
         return False
     # max() with a NaN would return either operand
     above = NAN if level != level or r != r else max(level, r)
+    if rules.own_group and not r <= level:
+        above = NAN  # not stated: where such a control returns to from an R above its level
     known = above == r or state.retract is not None
     end = NAN if not known else r if state.retract == 990 else above
     for axis in (first, second):

@@ -107,6 +107,8 @@ class Drilling:
     """How canned cycles of the drilling kind behave."""
 
     codes: frozenset[int] = frozenset()
+    unknown_ends: frozenset[int] = frozenset()
+    """Those of which it is not known where they leave the tool."""
     own_group: bool = False
     """They do not replace G0 or G1, which are in force again after G80."""
     repeats: str = "L"
@@ -154,6 +156,8 @@ class Dialect:
     the table is empty, every letter may stand everywhere."""
     strict: bool = False
     """Only one code may use the axis words, and a code that needs some has to have them."""
+    centres_of_plane: bool = False
+    """A centre word of an arc that does not lie in its plane is an error."""
     modal_motion: bool = True
     """G0 to G3 stay in force; otherwise every block states its own."""
     one_command: bool = False

@@ -96,10 +96,11 @@ class Executor:
         touched, state.touched = state.touched, before
         state.ended = ended
         state.forget_touched(touched)
-        if block.problem is not None:
+        if block.problem is not None or not self.dialect.strict:
+            # A control that is not strict may run what we refuse, and move what it does not name.
             state.forget_positions()
-            if any(byte in b"GMOgmo#[" for byte in block.rest):
-                state.forget()
+        if block.problem is not None and any(byte in b"GMOgmo#[" for byte in block.rest):
+            state.forget()
         step.feed_event = USES_FEED
 
     def _assign(self, target: str) -> None:
@@ -373,5 +374,5 @@ class Executor:
     def _plane_axes(self) -> list[int]:
         """List the axes that cutter compensation may displace."""
         plane = self.state.plane
-        letters = "XYZUVW" if plane is None else PLANES[plane][:2]
+        letters = PLANES[plane][:2] if plane in PLANES else "XYZUVW"
         return [AXES.index(letter) for letter in letters]

@@ -158,7 +158,7 @@ class Reader:
 
     def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
         """Take plain lines of a chunk as arrays; the first that was not taken."""
-        stop, certain = run_plain(self.state, self.log, lines, first, last, place)
+        stop, certain = run_plain(self.state, self.log, lines, first, last, place, self.dialect)
         self.blocks += int(np.count_nonzero(lines.letters[first:stop]))
         if certain is not None:
             self._ask(certain)

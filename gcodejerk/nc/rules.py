@@ -42,7 +42,7 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
         if dialect.effect(g.get("non-modal")) == "machine" and axes and motion not in (0, 10):
             return False
     drawn = dialect.strict or axes or arc_words(values, state)
-    plane = g.get("plane", state.plane) if dialect.strict else None
+    plane = g.get("plane", state.plane) if dialect.centres_of_plane else None
     if motion in dialect.arcs and drawn and not _arc_complete(values, plane):
         return False
     inverse = (

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.nc.dialect import ARC_CENTRES, AXES, PLANES
+from gcodejerk.nc.dialect import ARC_CENTRES, AXES, LINEAR, PLANES, Dialect
 from gcodejerk.nc.modal import State
 from gcodejerk.nc.rapids import CERTAIN, GIVES_FEED, REASONS, USES_FEED, RapidLog, common_columns
 from gcodejerk.nc.words import BIT, Lines
@@ -21,6 +21,7 @@ Column = tuple[NDArray[np.int64], NDArray[np.float64]]
 _AXIS_BITS = (1 << len(AXES)) - 1
 _CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
 _ARC_WORDS = _CENTRES | BIT["R"]
+_IS_LINEAR = np.array([axis in LINEAR for axis in AXES])
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
 
 
@@ -78,7 +79,13 @@ def _words(lines: Lines, letter: str, first: int, last: int) -> Column:
 
 
 def run_plain(
-    state: State, log: RapidLog, lines: Lines, first: int, last: int, place: tuple[int, int]
+    state: State,
+    log: RapidLog,
+    lines: Lines,
+    first: int,
+    last: int,
+    place: tuple[int, int],
+    dialect: Dialect,
 ) -> tuple[int, int | None]:
     """Execute the plain lines first:last of a chunk, or as many of them as are sure.
 
@@ -94,6 +101,8 @@ def run_plain(
         The run; no line of it is odd.
     place : tuple of int
         Number of the chunk's first line and offset of its first byte, in the file.
+    dialect : Dialect
+        Of the program.
 
     Returns
     -------
@@ -135,7 +144,7 @@ def run_plain(
         feed=history[np.searchsorted(feeds, rapid, side="right")],
         # A whole number that matters would have made its line odd.
         feed_whole=np.searchsorted(feeds, rapid, side="right") == 0 if state.feed_whole else False,
-        reason=_reasons(state, named[rapid], start, target),
+        reason=_reasons(state, named[rapid], start, target, dialect),
     )
     # What stands behind the end of the program uses no F.
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
@@ -168,6 +177,7 @@ def _reasons(
     named: NDArray[np.uint16],
     start: NDArray[np.float64],
     target: NDArray[np.float64],
+    dialect: Dialect,
 ) -> NDArray[np.uint8]:
     """Why each rapid has to be left alone, as `execute` would decide."""
     if state.ended:
@@ -176,8 +186,12 @@ def _reasons(
         return np.full(len(named), _INDEX[Reason.ROTATION], dtype=np.uint8)
     is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
     unknown = (is_named & (np.isnan(start) | np.isnan(target))).any(axis=1)
-    moves = (is_named & (start != target)).any(axis=1)
+    moving = is_named & (start != target)
+    moves = moving.any(axis=1)
     reason = np.full(len(named), CERTAIN, dtype=np.uint8)
+    if not dialect.feed_of_mixed:
+        both = moving[:, _IS_LINEAR].any(axis=1) & moving[:, ~_IS_LINEAR].any(axis=1)
+        reason[both] = _INDEX[Reason.MIXED_AXES]
     reason[~moves] = _INDEX[Reason.NO_MOTION]
     reason[unknown] = _INDEX[Reason.START_UNKNOWN]
     return reason

@@ -30,9 +30,10 @@ PROFILES = ("condition3", "conventional", "condition1", "condition2", "cascade")
 
 def load():
     from gcodejerk.errors import GcodejerkError, ProgramError, VerifyError
+    from gcodejerk.expanded import TERMINATOR_LENGTH
     from gcodejerk.machine import Machine, find_machine
     from gcodejerk.nc import DIALECTS
-    from gcodejerk.pipeline import TERMINATOR_LENGTH, process
+    from gcodejerk.pipeline import process
     from gcodejerk.verification import verify
 
     machines = [Machine.load(find_machine(name)) for name in ("vmc", "router", "drill", "paper")]

@@ -30,6 +30,7 @@ import random
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
@@ -165,14 +166,21 @@ class Output:
 OUTPUTS = {}
 
 
-@pytest.fixture(params=[(name, profile) for name in SHIPPED for profile in WRITTEN])
+# The rapids of a machine without rapid.jerk are trapezoids, which are no stream.
+WITH_STREAMS = [
+    (name, profile)
+    for name, machine in SHIPPED.items()
+    for profile in WRITTEN
+    if profile != "conventional" or np.isfinite(machine.axis("Z").rapid.jerk)
+]
+
+
+@pytest.fixture(params=WITH_STREAMS)
 def output(request):
     if request.param not in OUTPUTS:
         OUTPUTS[request.param] = Output(*request.param)
-    found = OUTPUTS[request.param]
-    if not found.streams:
-        pytest.skip("this machine moves with trapezoids, which are no stream")
-    return found
+    assert OUTPUTS[request.param].streams
+    return OUTPUTS[request.param]
 
 
 def scaled(line, factor):

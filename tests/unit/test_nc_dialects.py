@@ -364,3 +364,30 @@ def test_a_broken_dialect_of_a_package_is_named(monkeypatch, made, words):
 def test_an_unknown_dialect_is_refused_with_the_nearest_one():
     with pytest.raises(ProgramError, match="did you mean fanuc"):
         find_dialect("fanuk")
+
+
+def test_a_tool_axis_that_is_no_plane_is_read():
+    # Found by fuzzing: G20 is a tool axis for Heidenhain, and G42 asked for its plane.
+    start = Start(positions=KNOWN.positions)
+    assert math.isnan(end(b"N1 G20*\nN2 G42 G01 X5*\nN3 G40*\n", "heidenhain-iso", start)[0])
+
+
+def test_an_angle_of_direct_drawing_moves_axes_that_it_does_not_name():
+    # G01 X20. A45. computes Z: a block that is not understood leaves no position known.
+    start = Start(positions={"X": 10.0, "Z": 5.0}, diameter=True, startup="G99 F0.1")
+    at = end(b"G00 X40. Z2.\nG01 X20. A45.\n", "fanuc-lathe-a", start)
+    assert math.isnan(at[0])
+    assert math.isnan(at[2])
+
+
+def test_where_a_back_boring_cycle_ends_is_not_known():
+    program = b"G0 X0. Y0. Z50.\nG99 G87 X5. Y5. Z-10. R-12. Q1. F50.\nG80\nG0 X9.\n"
+    assert math.isnan(end(program, "fanuc")[2])
+    above = b"G0 X0. Y0. Z5.\nG98 G81 X5. Z-10. R8. F50.\n"
+    assert math.isnan(end(above, "fanuc")[2])
+    assert end(above, "linuxcnc")[2] == 8.0
+
+
+def test_a_rounded_corner_ends_where_it_is_programmed():
+    assert same(end(b"G90\nG1 X10 Y5 RND=2 F100\n", "siemens")[:2], (10.0, 5.0))
+    assert math.isnan(end(b"G90\nG1 X10 ANG=30 F100\n", "siemens")[1])

@@ -119,7 +119,9 @@ FANUC = Dialect(
     },
     whole_numbers="machine",
     other_m="positions",
-    drilling=Drilling(CYCLES, own_group=True, repeats="KL", missing="unknown"),
+    drilling=Drilling(
+        CYCLES, frozenset({760, 870}), own_group=True, repeats="KL", missing="unknown"
+    ),
     harmless=frozenset(
         {0, 90, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 930, 940, 950, 960, 970}
         | {980, 990, 800, 150, 500, 501, 690, 131, 670, 220, 230, 51, 80}

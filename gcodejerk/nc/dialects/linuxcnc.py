@@ -108,11 +108,12 @@ LINUXCNC = Dialect(
         "R": CYCLE_NAMES | code_names("G2", "G3", "G10", "G76", "M19"),
     },
     strict=True,
+    centres_of_plane=True,
     feed_of_mixed=True,
     paths={610: 61, 611: 62, 640: 64},
     diameter_codes=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),
-    drilling=Drilling(CYCLES, own_group=False, repeats="L", missing="error"),
+    drilling=Drilling(CYCLES, frozenset({760}), own_group=False, repeats="L", missing="error"),
     harmless=frozenset(
         {0, 40, 70, 80, 170, 171, 180, 181, 190, 191, 200, 210, 400, 610, 611, 640}
         | {900, 910, 901, 911, 930, 940, 950, 960, 970, 980, 990}

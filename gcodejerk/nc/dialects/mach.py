@@ -80,7 +80,7 @@ MACH = Dialect(
     },
     redrawn=frozenset({310, 320, 330, 760}),
     other_m="positions",
-    drilling=Drilling(CYCLES, own_group=False, repeats="L", missing="unknown"),
+    drilling=Drilling(CYCLES, frozenset({870}), own_group=False, repeats="L", missing="unknown"),
     harmless=frozenset(
         {0, 40, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 901, 911, 930, 940, 950}
         | {980, 990, 500, 690, 150}

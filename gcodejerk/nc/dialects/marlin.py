@@ -25,7 +25,7 @@ EFFECTS: dict[int, Effect] = {
     **dict.fromkeys((120, 270, 280, 290, 300, 330, 340, 350, 380, 420, 600, 610, 760), "home"),
     **dict.fromkeys((382, 383, 384, 385), "home"),
     **dict.fromkeys(SYSTEMS, "frames"),
-    530: "machine",
+    530: "frames",
     920: "set",
 }
 

@@ -17,7 +17,8 @@ _SILENT = (
     *("COMPON", "COMPOF", "COMPCAD", "COMPCURV", "CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
     *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "SPOS", "SPOSA", "FGROUP", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
-    *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "ID", "WORKPIECE", "SAVE", "ACC"),
+    *("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM", "SF", "SCC"),  # corners: the end stays
+    *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE", "ACC"),
 )
 _TURNED = (
     *("ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CRPL", "SUPA"),
