@@ -185,6 +185,8 @@ class Dialect:
     """G0 runs at F, like G1."""
     tool_frame: frozenset[str] = frozenset()
     """Addresses that change a tool's offset, and with it the frame: T on a lathe, D."""
+    length_axes: str = AXES
+    """Axes that a tool length may shift."""
     tool_cancelled_by_return: bool = False
     """G28 cancels the tool length."""
     other_m: Literal["unknown", "positions"] = "unknown"

@@ -211,7 +211,7 @@ class Executor:
             state.put("turns", True)
             state.put("diameter", None)
         elif effect == "length":
-            frames.tool_length(state, code, values, self.lengths)
+            frames.tool_length(state, code, values, self.lengths, self.dialect.length_axes)
         elif effect == "system":
             frames.select_system(state, code)
         elif effect == "numbered system":

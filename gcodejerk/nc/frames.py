@@ -25,8 +25,36 @@ def _rename(state: State, field: str, after: list[float]) -> None:
             state.move(axis, state.position[axis] + (old - new))
 
 
-def tool_length(state: State, code: int, values: Values, lengths: Mapping[int, float]) -> None:
-    """G43, G43.1, G43.2 and G49."""
+def tool_length(
+    state: State, code: int, values: Values, lengths: Mapping[int, float], axes: str
+) -> None:
+    """G43, G43.1, G43.2 and G49.
+
+    Parameters
+    ----------
+    state : State
+        Changed.
+    code : int
+        Times ten.
+    values : mapping of str to float
+        The block's numbers.
+    lengths : mapping of int to float
+        H number -> length along Z. [mm]
+    axes : str
+        Those that a length may shift in G17; elsewhere, or where the block names another, all may.
+    """
+    if state.plane != 170 or any(axis in values for axis in AXES if axis not in axes):
+        axes = AXES
+    kept = {k: state.tool[k] for k, axis in enumerate(AXES) if axis not in axes}
+    places = {k: state.position[k] for k in kept}
+    _shift_tool(state, code, values, lengths)
+    for k, offset in kept.items():
+        state.tool[k] = offset
+        state.move(k, places[k])
+
+
+def _shift_tool(state: State, code: int, values: Values, lengths: Mapping[int, float]) -> None:
+    """Shift all axes by a tool length."""
     unknown = [NAN] * len(AXES)
     if code == 490:
         _rename(state, "tool", [0.0] * len(AXES))

@@ -391,3 +391,13 @@ def test_where_a_back_boring_cycle_ends_is_not_known():
 def test_a_rounded_corner_ends_where_it_is_programmed():
     assert same(end(b"G90\nG1 X10 Y5 RND=2 F100\n", "siemens")[:2], (10.0, 5.0))
     assert math.isnan(end(b"G90\nG1 X10 ANG=30 F100\n", "siemens")[1])
+
+
+def test_a_tool_length_of_a_mill_shifts_z_alone():
+    program = b"G0 X5. Y6. Z7.\nG43 H1 Z50.\nX8.\n"
+    assert reasons(program, "fanuc")[-1] is None
+    assert same(end(b"G0 X5. Y6. Z7.\nG43 H1\n", "fanuc"), (5.0, 6.0, NOWHERE))
+    # Named, any axis may be the one that is meant; in another plane it is not Z.
+    assert math.isnan(end(b"G0 X5. Y6. Z7.\nG43 H1 Z50. Y1.\n", "fanuc")[0])
+    assert math.isnan(end(b"G18 G0 X5. Y6. Z7.\nG43 H1\n", "fanuc")[1])
+    assert math.isnan(end(b"G0 X5. Y6. Z7.\nG43 H1\n", "linuxcnc")[0])

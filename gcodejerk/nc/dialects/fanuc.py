@@ -105,6 +105,8 @@ FANUC = Dialect(
     effects=_EFFECTS,
     letters="FSTXYZABCUVWDEHIJKLPQR",
     paths={610: 61, 640: 64},
+    # 5001 chooses between Z, the axis across the plane, and the axis that the block names.
+    length_axes="Z",
     transforms={
         **dict.fromkeys((680, 682), ("rotation", True)),
         690: ("rotation", False),

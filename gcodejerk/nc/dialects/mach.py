@@ -73,6 +73,7 @@ MACH = Dialect(
         **dict.fromkeys((120, 130), "cycle"),
     },
     letters="FSTXYZABCUVWDEHIJKLPQR",
+    length_axes="Z",
     transforms={
         **{510: ("scaling", True), 500: ("scaling", False)},
         **{680: ("rotation", True), 690: ("rotation", False)},
