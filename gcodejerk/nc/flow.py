@@ -7,6 +7,8 @@ where it stands, and a call may change everything.
 
 from __future__ import annotations
 
+from collections import Counter
+
 from gcodejerk.nc.modal import State
 
 _OPENS = {"sub": "endsub", "if": "endif", "while": "endwhile", "repeat": "endrepeat"}
@@ -20,6 +22,8 @@ class Flow:
     def __init__(self) -> None:
         self._before: State | None = None
         self._stack: list[tuple[str, str]] = []
+        self._standing: Counter[tuple[str, str]] = Counter()
+        """How often each is in the stack, which may be as deep as the file is long."""
         self._program_number = False
 
     @property
@@ -50,12 +54,12 @@ class Flow:
                 self._program_number = True
                 state.forget()
             return state
+        if keyword == "while" and self._standing["do", name]:
+            return self._close(state, "do", name)
         if keyword in _OPENS:
             return self._open(state, keyword, name)
         if keyword == "do":
             return self._open(state, "do", name)
-        if keyword == "while" and ("do", name) in self._stack:
-            return self._close(state, "do", name)
         if keyword in _CLOSES:
             return self._close(state, keyword[3:], name)
         if keyword not in _INNER or self._before is None:
@@ -70,9 +74,8 @@ class Flow:
         self._program_number = False
 
     def _open(self, state: State, keyword: str, name: str) -> State:
-        if keyword == "while" and ("do", name) in self._stack:
-            return self._close(state, "do", name)
         self._stack.append((keyword, name))
+        self._standing[keyword, name] += 1
         if self._before is None:
             self._before = state
             state = state.copy()
@@ -80,15 +83,19 @@ class Flow:
         state.forget_silently()
         return state
 
+    def _pop(self) -> None:
+        """Leave the innermost block."""
+        self._standing[self._stack.pop()] -= 1
+
     def _close(self, state: State, keyword: str, name: str) -> State:
         if not self._stack or self._stack[-1] != (keyword, name):
             # Not nested as the controller demands; it would refuse the program.
             state.forget()
-            if (keyword, name) not in self._stack:
+            if not self._standing[keyword, name]:
                 return state
             while self._stack[-1] != (keyword, name):
-                self._stack.pop()
-        self._stack.pop()
+                self._pop()
+        self._pop()
         if self._stack:
             state.forget_silently()
             return state
