@@ -51,6 +51,10 @@ class Block:
     """The line holds a ``%``, alone or with a name."""
     assigns: tuple[str, ...] = ()
     """Targets of assignments, for example ``1`` or ``<depth>``; empty text where computed."""
+    assigned: tuple[bytes, ...] = ()
+    """What each of them is set to, as written."""
+    o_arguments: tuple[bytes, ...] = ()
+    """Expressions behind the keyword of an O-word, brackets included."""
     rest: bytes = b""
     """The rest of the line from the word that has the problem."""
     problem: str | None = None

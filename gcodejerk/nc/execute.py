@@ -18,6 +18,7 @@ from gcodejerk.nc.judge import Step, judge, looks_rapid
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.rules import arc_words, is_complete, takes_axes
+from gcodejerk.nc.variables import assign, assigned_values, forget_shared
 from gcodejerk.units import MM_PER_INCH
 
 _TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
@@ -49,10 +50,12 @@ class Executor:
         if not self.dialect.modal_motion:
             state.motion = None
         inch = state.unit == MM_PER_INCH
-        codes = sort_words(block, self.dialect, inch, self.decimal_point)
+        rules = self.dialect.arithmetic
+        codes = sort_words(block, self.dialect, inch, self.decimal_point, state.variables)
         step = Step(start=state.position.copy())
         for axis in codes.moved():
             step.words |= 1 << AXES.index(axis)
+        values = assigned_values(block, state, rules) if block.assigns else []
         for target in block.assigns:
             self._assign(target)
         step.unknown = codes.unknown and not codes.expression
@@ -63,8 +66,11 @@ class Executor:
             or block.problem is not None
             or not is_complete(codes, self.state, self.dialect)
         ):
+            assign(block, [NAN] * len(block.assigns), state, rules)
             self._doubt(block, codes, step)
         else:
+            if block.assigns:
+                assign(block, values, state, rules)
             self._act(codes, step)
         contour = self._contour is not None
         if contour and any(w.letter == "N" and w.value == self._contour for w in block.words):
@@ -232,11 +238,12 @@ class Executor:
         """Execute an M code, the end of the program excepted."""
         state = self.state
         group = self.dialect.m_groups.get(m)
-        if group is None:
-            state.forget_positions()
-        elif m == 6 or group == "user":
+        if group is None or m == 6 or group == "user":
             # A tool change may go anywhere, and so may a program of the user's.
             state.forget_positions()
+            forget_shared(state, self.dialect.arithmetic)
+        elif m == 73 and group == "state":
+            state.put("restores", True)
         elif m == 72 and group == "state":
             state.forget_modes()
             state.forget_positions()

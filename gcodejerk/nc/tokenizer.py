@@ -31,6 +31,7 @@ _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
 _SHAPE = re.compile(rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 _UNSIGNED = re.compile(rb"[0-9]+(?:\.[0-9]*)?")
 _OPERATOR_TEXT = re.compile(rb"[ \t]*([A-Za-z][A-Za-z \t]*?)[ \t]*(?=\[)")
+_OPERATOR = re.compile(rb"[ \t]*(?:[*/]|[-+]|MOD|AND|OR|XOR)(?=[-+#\[0-9. \tA-Z])", re.IGNORECASE)
 _KEYWORD = re.compile(rb"[A-Za-z]*")
 _ACTIVE = re.compile(rb"[ \t]*py[ \t]*,", re.IGNORECASE)
 _FUNCTIONS = frozenset(
@@ -51,8 +52,8 @@ class _Line:
     """A cursor over one line."""
 
     __slots__ = (
-        *("assigns", "at", "comments", "delete", "dialect", "names", "o_name", "o_word"),
-        *("percent", "rules", "text", "words"),
+        *("assigned", "assigns", "at", "comments", "delete", "dialect", "names", "o_arguments"),
+        *("o_name", "o_word", "percent", "rules", "text", "words"),
     )
 
     def __init__(self, text: bytes, dialect: Dialect) -> None:
@@ -63,6 +64,8 @@ class _Line:
         self.words: list[Word] = []
         self.comments: list[tuple[int, int]] = []
         self.assigns: list[str] = []
+        self.assigned: list[bytes] = []
+        self.o_arguments: list[bytes] = []
         self.names: list[Name] = []
         self.o_word: str | None = None
         self.o_name = ""
@@ -171,10 +174,17 @@ class _Line:
         name = self.text[begin : self.at].strip(b" \t")
         known = name.isdigit() or (name.startswith(b"<") and name.endswith(b">"))
         self.assigns.append(name.decode("latin-1") if known else "")
+        self.assigned.append(b"")
         if self.skip() != b"=":
             raise _Odd("assignment without =", self.at)
         self.at += 1
+        begin = self.at
         self.number()
+        if self.rules.open_expressions:
+            while match := _OPERATOR.match(self.text, self.at):
+                self.at = match.end()
+                self.number()
+        self.assigned[-1] = self.text[begin : self.at]
 
     def flow(self) -> None:
         """Pass over an O-word: its name, its keyword, and whatever belongs to that."""
@@ -194,7 +204,9 @@ class _Line:
             if byte in b"(;":
                 self.comment()
             elif byte == b"[":
+                begin = self.at
                 self.bracket()
+                self.o_arguments.append(self.text[begin : self.at])
             else:
                 raise _Odd("text after an O-word", self.at)
 
@@ -216,7 +228,9 @@ class _Line:
             if self.rules.equals and self._equals(letter):
                 if letter == "R" and self.rules.variables == "R":
                     self.assigns.append(self.text[begin : self.at].split(b"=")[0].decode().upper())
+                    at = self.at
                     self._value()
+                    self.assigned.append(self.text[at : self.at])
                     return
                 function = self._function()
                 value = self._value()
@@ -438,6 +452,8 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
         line.o_name,
         line.percent,
         tuple(line.assigns),
+        tuple(line.assigned),
+        tuple(line.o_arguments),
         rest,
         problem,
         column,
