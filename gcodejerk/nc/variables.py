@@ -11,10 +11,10 @@ import math
 from collections.abc import Iterable, Mapping
 
 from gcodejerk.nc.block import Block, Word
+from gcodejerk.nc.cursor import LARGEST
 from gcodejerk.nc.dialect import LINEAR, Arithmetic
 from gcodejerk.nc.expressions import NAN, evaluate, variable_name
 from gcodejerk.nc.modal import State
-from gcodejerk.nc.tokenizer import LARGEST
 
 _INCREMENT_DECIMALS = (3, 4)
 """Of the least increment: 0.001 mm or degrees, 0.0001 inch."""
