@@ -61,3 +61,23 @@ class Block:
     column: int | None = None
     """Where the problem is, counted from 1."""
     names: tuple[Name, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line with its place in the file, kept where it may run more than once."""
+
+    text: bytes
+    """Without its end."""
+    begin: int
+    """Byte offset."""
+    number: int
+    """Counted from 1."""
+    terminator: int
+    """As `Rapids.terminator`."""
+    block: Block
+
+    @property
+    def end(self) -> int:
+        """Offset behind the line's end."""
+        return self.begin + len(self.text) + (self.terminator and (self.terminator % 2 or 2))

@@ -210,6 +210,8 @@ class Dialect:
     """Addresses that change a tool's offset, and with it the frame: T on a lathe, D."""
     tool_cancelled_by_return: bool = False
     """G28 cancels the tool length."""
+    packed_repeats: bool = False
+    """M98 P31000 runs O1000 three times."""
     other_m: Literal["unknown", "positions"] = "unknown"
     """An M code that is not listed: not understood, or a program of the builder's that may move."""
     contours: frozenset[int] = frozenset()

@@ -22,6 +22,7 @@ _IDENTIFIER = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
 _INDEX = re.compile(rb"[0-9]*")
 _FUNCTION = re.compile(rb"(IC|AC|DC|ACP|ACN)[ \t]*\(", re.IGNORECASE)
 _TO_BLANK = re.compile(rb"[^ \t;]*")
+_TO_COMMENT = re.compile(rb"[^;]*")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
 _KEYWORD = re.compile(rb"[A-Za-z]*")
 _ACTIVE = re.compile(rb"[ \t]*py[ \t]*,", re.IGNORECASE)
@@ -173,6 +174,8 @@ class _Line(Cursor):
         name, begin = match[0].decode().upper(), self.at
         if self.dialect.one_command:
             self.at = len(self.text)  # all that follows belongs to the command
+        elif self.dialect.names.get(name) == "flow" and self.skip() != b":":
+            self.at = _TO_COMMENT.match(self.text, self.at).end()  # type: ignore[union-attr]
         elif self.skip() == b"(":
             self._arguments()
         elif self.text[self.at : self.at + 1] == b"=":

@@ -120,6 +120,7 @@ FANUC = Dialect(
         670: ("modal macro", False),
     },
     whole_numbers="machine",
+    packed_repeats=True,
     other_m="positions",
     drilling=Drilling(CYCLES, own_group=True, repeats="KL", missing="unknown"),
     # Custom macro B: AND binds like *, OR and XOR like +. Local #1 to #33, common #100 to #999.
