@@ -5,8 +5,9 @@ from __future__ import annotations
 from gcodejerk.nc.block import Block, Name, Word
 from gcodejerk.nc.dialect import AXES, Dialect
 from gcodejerk.nc.dialects import AUTO, DIALECTS, find_dialect
-from gcodejerk.nc.program import Finding, Program, parse_block, read_program, trace
+from gcodejerk.nc.program import Program, parse_block, read_program, trace
 from gcodejerk.nc.rapids import CERTAIN, REASONS, Rapids
+from gcodejerk.nc.runner import Finding
 from gcodejerk.nc.start import Start
 
 __all__ = [

@@ -51,9 +51,33 @@ class Block:
     """The line holds a ``%``, alone or with a name."""
     assigns: tuple[str, ...] = ()
     """Targets of assignments, for example ``1`` or ``<depth>``; empty text where computed."""
+    assigned: tuple[bytes, ...] = ()
+    """What each of them is set to, as written."""
+    o_arguments: tuple[bytes, ...] = ()
+    """Expressions behind the keyword of an O-word, brackets included."""
     rest: bytes = b""
     """The rest of the line from the word that has the problem."""
     problem: str | None = None
     column: int | None = None
     """Where the problem is, counted from 1."""
     names: tuple[Name, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line with its place in the file, kept where it may run more than once."""
+
+    text: bytes
+    """Without its end."""
+    begin: int
+    """Byte offset."""
+    number: int
+    """Counted from 1."""
+    terminator: int
+    """As `Rapids.terminator`."""
+    block: Block
+
+    @property
+    def end(self) -> int:
+        """Offset behind the line's end."""
+        return self.begin + len(self.text) + (self.terminator and (self.terminator % 2 or 2))

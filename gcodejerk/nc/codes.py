@@ -6,11 +6,13 @@ the controller accepts the whole is asked of `rules`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gcodejerk.nc.block import Block, Name
 from gcodejerk.nc.dialect import AXES, Dialect
 from gcodejerk.nc.modal import NAN
+from gcodejerk.nc.variables import before_block, word_value
 
 _LENGTHS = frozenset("XYZABCUVWR")
 """Addresses whose numbers say where a block ends, and may need a decimal point."""
@@ -28,7 +30,7 @@ class Codes:
     names: list[Name] = field(default_factory=list)
     m: list[int] = field(default_factory=list)
     values: dict[str, float] = field(default_factory=dict)
-    """Letter -> number, NaN for an expression; G, M and N left out."""
+    """Letter -> number, NaN for one that is not known; G, M and N left out."""
     unknown: bool = False
     """A code that is computed or that the dialect does not know."""
     fault: bool = False
@@ -48,7 +50,13 @@ class Codes:
         return {axis for axis in AXES if axis in self.values} | set(self.increments)
 
 
-def sort_words(block: Block, dialect: Dialect, inch: bool, decimal_point: str | None) -> Codes:
+def sort_words(
+    block: Block,
+    dialect: Dialect,
+    inch: bool,
+    decimal_point: str | None,
+    variables: Mapping[str, float],
+) -> Codes:
     """Sort the words of a block into codes and values.
 
     Parameters
@@ -61,6 +69,8 @@ def sort_words(block: Block, dialect: Dialect, inch: bool, decimal_point: str | 
         Lengths are inches, unless the block itself says what they are.
     decimal_point : str or None
         See `nc.start.Start`.
+    variables : mapping of str to float
+        Those that are known.
 
     Returns
     -------
@@ -77,7 +87,9 @@ def sort_words(block: Block, dialect: Dialect, inch: bool, decimal_point: str | 
             if letter in "GM" or letter in dialect.calls:
                 codes.unknown = True
                 continue
-            value = NAN
+            rules = dialect.arithmetic
+            known = before_block(block, variables, rules)
+            value = word_value(word, known, rules, inch and not _states_units(block, dialect))
         if letter == "G":
             code = round(value * 10.0)
             group = dialect.groups.get(code) if abs(value * 10.0 - code) < 1e-3 else None
@@ -128,6 +140,12 @@ def sort_words(block: Block, dialect: Dialect, inch: bool, decimal_point: str | 
     if whole and dialect.whole_numbers == "machine":
         _whole_numbers(codes, whole, dialect, inch, decimal_point)
     return codes
+
+
+def _states_units(block: Block, dialect: Dialect) -> bool:
+    """Whether a code for inch or mm stands in the block."""
+    codes = {round(w.value * 10.0) for w in block.words if w.letter == "G" and w.value is not None}
+    return not codes.isdisjoint(dialect.units)
 
 
 def _whole_numbers(

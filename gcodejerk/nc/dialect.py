@@ -90,6 +90,8 @@ class Text:
     """A value may follow an equals sign: ``X=IC(5)``, ``T1=5``."""
     variables: Literal["#", "R", "Q", "none"] = "none"
     """What a variable begins with."""
+    open_expressions: bool = False
+    """An assignment takes an expression without brackets: ``#1=#2+1``."""
     keywords: tuple[str, ...] = ()
     """Words of program flow that hold no number: ``GOTO``."""
     blanks: Literal["anywhere", "between"] = "between"
@@ -115,6 +117,31 @@ class Drilling:
     """Letters of the number of repeats."""
     missing: Literal["error", "unknown"] = "error"
     """What follows where no R or depth was ever given: the block is refused, or nobody knows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic:
+    """How numbers are computed from variables."""
+
+    levels: tuple[tuple[str, ...], ...] = ()
+    """Operators, those that bind most first; within a level they apply from left to right."""
+    functions: frozenset[str] = frozenset()
+    brackets: Literal["[]", "()"] = "[]"
+    floor: bool = False
+    """FIX and FUP round down and up; otherwise towards zero and away from it."""
+    angles: bool = False
+    """ASIN and ATAN give what mathematics says; otherwise a parameter chooses among the angles."""
+    bits: bool = False
+    """AND, OR and XOR work on bits, and are left alone here; otherwise on true and false."""
+    together: bool = False
+    """All numbers of a line are read before any variable of it is set."""
+    exact: bool = False
+    """A computed position is taken as it is; otherwise it is rounded to the least increment."""
+    local: int = 0
+    """Variables up to this number belong to the program alone: no other sets them behind a call
+    of a tool change."""
+    system: int = 0
+    """From this number on variables belong to the control."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +216,8 @@ class Dialect:
     """Axes that a tool length may shift."""
     tool_cancelled_by_return: bool = False
     """G28 cancels the tool length."""
+    packed_repeats: bool = False
+    """M98 P31000 runs O1000 three times."""
     other_m: Literal["unknown", "positions"] = "unknown"
     """An M code that is not listed: not understood, or a program of the builder's that may move."""
     contours: frozenset[int] = frozenset()
@@ -196,6 +225,7 @@ class Dialect:
     redrawn: frozenset[int] = frozenset()
     """Motions whose end is not what their words say."""
     drilling: Drilling = field(default_factory=Drilling)
+    arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rapid: int = 0
     arcs: frozenset[int] = frozenset({20, 30})
     harmless: frozenset[int] = frozenset({0})

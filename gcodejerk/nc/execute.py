@@ -14,17 +14,20 @@ from gcodejerk.nc.block import Block, Name
 from gcodejerk.nc.codes import Codes, sort_words
 from gcodejerk.nc.cycles import begin_cycle, run_cycle
 from gcodejerk.nc.dialect import AXES, PLANES, Dialect, Effect
-from gcodejerk.nc.judge import Step, judge, looks_rapid
+from gcodejerk.nc.judge import Call, Step, judge, looks_rapid
+from gcodejerk.nc.jumps import known_behind
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.rules import arc_words, is_complete, takes_axes
 from gcodejerk.nc.tokenizer import CHECKSUM
+from gcodejerk.nc.variables import assign, assigned_values, forget_shared
 from gcodejerk.units import MM_PER_INCH
 
 _TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
 """Effects beside which the axis words of the block are no straight move."""
 _CALLS = frozenset({47, 96, 97, 98})
 """M codes of the group "stop" that go on elsewhere."""
+_CALL_WORDS = frozenset("MNPL")
 
 
 class Executor:
@@ -43,6 +46,10 @@ class Executor:
         self.decimal_point = decimal_point
         self._contour: float | None = None
         """N of the block that ends a contour, which a cycle runs by itself."""
+        self.jumps_known = False
+        """Whoever runs the blocks forgets everything at the targets of jumps."""
+        self.calls_followed = False
+        """Whoever runs the blocks runs what they call (`Step.call`)."""
 
     def run(self, block: Block) -> Step:
         """Execute a block that is not an O-word line."""
@@ -50,22 +57,29 @@ class Executor:
         if not self.dialect.modal_motion:
             state.motion = None
         inch = state.unit == MM_PER_INCH
-        codes = sort_words(block, self.dialect, inch, self.decimal_point)
+        rules = self.dialect.arithmetic
+        codes = sort_words(block, self.dialect, inch, self.decimal_point, state.variables)
         step = Step(start=state.position.copy())
         for axis in codes.moved():
             step.words |= 1 << AXES.index(axis)
+        values = assigned_values(block, state, rules) if block.assigns else []
         for target in block.assigns:
             self._assign(target)
         step.unknown = codes.unknown and not codes.expression
         before = state.motion
         ended = state.ended
+        if self.calls_followed and {w.letter for w in block.words} <= _CALL_WORDS:
+            step.call = _call(codes)
         if (
             codes.fault
             or block.problem is not None
             or not is_complete(codes, self.state, self.dialect)
         ):
+            assign(block, [NAN] * len(block.assigns), state, rules)
             self._doubt(block, codes, step)
         else:
+            if block.assigns:
+                assign(block, values, state, rules)
             self._act(codes, step)
         contour = self._contour is not None
         if contour:
@@ -88,6 +102,7 @@ class Executor:
         """Forget what a block that is not understood may have changed."""
         state = self.state
         step.fault = True
+        step.call = None
         before, state.touched, ended = state.touched, set(), state.ended
         self._act(codes, step)
         if step.ends:
@@ -111,7 +126,7 @@ class Executor:
     def _act(self, codes: Codes, step: Step) -> None:
         """Execute, in the fixed order."""
         state, g, values, dialect = self.state, codes.g, codes.values, self.dialect
-        if codes.unknown or any(self._named(name) == "flow" for name in codes.names):
+        if codes.unknown or not self._goes_on(codes, step):
             state.forget()
             step.feed_event = USES_FEED
             return
@@ -150,10 +165,13 @@ class Executor:
         effects = [self._named(name) for name in codes.names]
         if "modal cycle" in effects:
             # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
-            self._modal_cycle(begins=len(effects) > 1)
+            step.leaves = len(effects) > 1
+            self._modal_cycle(begins=step.leaves)
             words_taken = True
         else:
             for effect in effects:
+                if effect == "flow":
+                    continue
                 self._effect(effect, 0, values, step)
                 words_taken |= effect in _TAKES_WORDS or effect in ("frames", "transform")
         if "path" in g:
@@ -175,6 +193,20 @@ class Executor:
         for m in codes.m:
             if m in (2, 17, 30, 99) and self.dialect.m_groups.get(m) == "stop":
                 step.ends = True
+
+    def _goes_on(self, codes: Codes, step: Step) -> bool:
+        """Whether the block leads to the next one, and what it leaves known is certain."""
+        for name in codes.names:
+            if self._named(name) != "flow":
+                continue
+            step.feed_event = USES_FEED
+            changed = known_behind(name) if self.jumps_known else None
+            beside = name.name and (codes.g or codes.m or codes.values or len(codes.names) > 1)
+            if changed is None or beside:
+                return False
+            for variable in changed:
+                self.state.set_variable(variable, NAN)
+        return True
 
     def _named(self, name: Name) -> Effect:
         """What a named word does; one that is not known may do anything."""
@@ -223,6 +255,7 @@ class Executor:
         elif effect == "transform":
             self._transform("frame", on=True)
         elif effect == "modal cycle":
+            step.leaves = True
             self._modal_cycle(begins=True)  # G67, which ends it, is among the transforms
         elif effect == "cycle":
             step.feed_event = USES_FEED
@@ -232,8 +265,7 @@ class Executor:
         elif effect == "home":
             state.forget_positions()
         elif effect == "flow":
-            state.forget()
-            step.feed_event = USES_FEED
+            self._leave(step)
 
     def _modal_cycle(self, begins: bool) -> None:
         """Begin or end a cycle or macro that runs at every position."""
@@ -245,17 +277,23 @@ class Executor:
         """Execute an M code, the end of the program excepted."""
         state = self.state
         group = self.dialect.m_groups.get(m)
-        if group is None:
-            state.forget_positions()
-        elif m == 6 or group == "user":
+        if group is None or m == 6 or group == "user":
             # A tool change may go anywhere, and so may a program of the user's.
             state.forget_positions()
+            forget_shared(state, self.dialect.arithmetic)
+        elif m == 73 and group == "state":
+            state.put("restores", True)
         elif m == 72 and group == "state":
             state.forget_modes()
             state.forget_positions()
-        elif m in _CALLS:
-            state.forget()
-            step.feed_event = USES_FEED
+        elif m in _CALLS and step.call is None:
+            self._leave(step)
+
+    def _leave(self, step: Step) -> None:
+        """Run a program that is not followed."""
+        self.state.forget()
+        step.feed_event = USES_FEED
+        step.leaves = True
 
     def end(self) -> None:
         """End the program: what follows is not executed."""
@@ -376,3 +414,13 @@ class Executor:
         plane = self.state.plane
         letters = PLANES[plane][:2] if plane in PLANES else "XYZUVW"
         return [AXES.index(letter) for letter in letters]
+
+
+def _call(codes: Codes) -> Call | None:
+    """Take a call out of a block that holds nothing else."""
+    number, repeats = codes.values.get("P", NAN), codes.values.get("L", 1.0)
+    if len(codes.m) != 1 or codes.m[0] not in (97, 98) or codes.fault:
+        return None
+    if not (number > 0.0 and number.is_integer() and repeats > 0.0 and repeats.is_integer()):
+        return None
+    return Call(codes.m[0], int(number), int(repeats) if "L" in codes.values else None)

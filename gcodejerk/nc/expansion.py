@@ -27,8 +27,10 @@ from gcodejerk.nc.chunks import Chunk, read_chunks
 from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.drilling import DRILLING
-from gcodejerk.nc.program import Finding, Reader, read_chunk
+from gcodejerk.nc.program import read_chunk
 from gcodejerk.nc.rapids import Rapids
+from gcodejerk.nc.reader import Reader
+from gcodejerk.nc.runner import Finding
 from gcodejerk.nc.series import (
     Moment,
     PathWords,
@@ -282,21 +284,26 @@ class _Walker(Reader):
         bare = text.removesuffix(b"\r")
         if self.series is None and not _CYCLE.search(bare):
             noted = _NOTED.search(bare) is not None
-            faults, inside = self.odd_count, self.flow.inside
+            faults, inside = self.odd_count, self.inside
             super().read_line(text, begin, number, terminator)
             if noted:
                 sure = faults == self.odd_count and not inside
                 self._note(parse_line(bare, self.dialect), sure, number)
             return
         block = parse_line(bare, self.dialect)
-        before, faults, inside = list(self.state.position), self.odd_count, self.flow.inside
+        before, faults, inside = list(self.state.position), self.odd_count, self.inside
         ended, motion = self.state.ended, self.state.motion
         super().read_line(text, begin, number, terminator)
         if ended:
             return
         why = str(Reason.NOT_UNDERSTOOD) if faults != self.odd_count else doubt(block)
-        if inside or self.flow.inside:
+        if inside or self.inside:
             why = str(Reason.SUBPROGRAM)
+        if self.collecting and self.series is None:
+            # The structure runs once it is complete; what drills in it is left to the controller.
+            if self.dialect.cycles & {*g_codes(block)}:
+                self.verdicts.append(_Verdict(number, why, number))
+            return
         self._note(block, why is None, number)
         if self.rules.borrows_dwell & {*g_codes(block)}:
             states = any(word.letter == self.rules.dwell for word in block.words)
@@ -324,14 +331,14 @@ class _Walker(Reader):
         """One line of a series."""
         state, cycles = self.state, self.dialect.cycles
         if why is not None:
-            self._leave(series, why, place[2])
+            self._give_up(series, why, place[2])
             if state.motion not in cycles:
                 self._close(series)
             return
         if state.ended:
             # M2 resets the motion, so whether its block makes a hole is not seen afterwards.
             if any(word.letter in "XYZABCUVW" for word in block.words):
-                self._leave(series, str(Reason.OTHER_WORDS), place[2])
+                self._give_up(series, str(Reason.OTHER_WORDS), place[2])
             self._close(series)
         elif drills(block, state, cycles):
             self.holes += 1
@@ -340,7 +347,7 @@ class _Walker(Reader):
         elif state.motion not in cycles:
             own = any(self.dialect.groups.get(code) == "motion" for code in g_codes(block))
             if not own:
-                self._leave(series, str(Reason.NOT_UNDERSTOOD), place[2])
+                self._give_up(series, str(Reason.NOT_UNDERSTOOD), place[2])
             self._close(series)
         elif not passes(block):
             series.broken = f"something else stands between the holes (line {place[2]})"
@@ -361,7 +368,7 @@ class _Walker(Reader):
             reason = reason or "the block is too long"
         call = reason or call_of(series, moment, block, self.rules)
         if isinstance(call, str):
-            self._leave(series, call, place[2])
+            self._give_up(series, call, place[2])
             return
         if self.known is None or self.target is None:
             return
@@ -381,7 +388,7 @@ class _Walker(Reader):
         self._added += len(lines) - 1
         self._at = end + len(last)
 
-    def _leave(self, series: Series, reason: str, line: int) -> None:
+    def _give_up(self, series: Series, reason: str, line: int) -> None:
         """Leave a series to the controller; the first reason counts."""
         if series.reason is None:
             series.reason, self.reason_at = reason, line

@@ -108,5 +108,4 @@ class Flow:
         if keyword != "sub":
             before.forget_touched(touched)
             before.offsets = {k: v for k, v in before.offsets.items() if k in state.offsets}
-            before.ended = False
         return before

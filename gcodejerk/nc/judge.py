@@ -36,6 +36,17 @@ _FRAME_CHANGES: frozenset[Effect] = frozenset(
 """Effects that, in the block of a rapid, move the origin that its numbers refer to."""
 
 
+@dataclass(frozen=True, slots=True)
+class Call:
+    """``M98 P1000 L3``."""
+
+    m: int
+    number: int
+    """What P says."""
+    repeats: int | None
+    """What L says; None without it."""
+
+
 @dataclass(slots=True)
 class Step:
     """What a block did."""
@@ -53,6 +64,10 @@ class Step:
     """A code that the dialect does not know."""
     ends: bool = False
     """The program ends behind the block's motion."""
+    call: Call | None = None
+    """A subprogram of the file that runs behind the block."""
+    leaves: bool = False
+    """Programs run that are not followed."""
 
 
 def looks_rapid(

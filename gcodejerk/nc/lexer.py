@@ -15,9 +15,9 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.nc.cursor import LARGEST
 from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.numbers import parse_numbers
-from gcodejerk.nc.tokenizer import LARGEST
 from gcodejerk.nc.words import BIT, PLAIN_LETTERS, Lines, Words
 
 _NUMBER, _BLANK, _END, _CR, _OPEN, _CLOSE, _SEMICOLON, _OTHER = range(8)

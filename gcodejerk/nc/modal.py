@@ -24,6 +24,8 @@ MODES = (
     *("retract", "system", "path", "diameter"),
 )
 """The fields of `State` that hold one modal group each."""
+MOST_VARIABLES = 1000
+"""Variables that are known at a time, so that a copy of the state stays cheap."""
 
 GROUP_FIELDS = {
     "motion": "motion",
@@ -35,7 +37,7 @@ GROUP_FIELDS = {
 }
 """Modal groups whose code simply becomes the value of a field."""
 
-STICKY = ("distance_stated", "feed_mode_stated", "unit_stated", "rotates", "turns")
+STICKY = ("distance_stated", "feed_mode_stated", "unit_stated", "rotates", "turns", "restores")
 """Fields that say that the program did something somewhere; never taken back."""
 
 _LINEAR = tuple(axis in LINEAR for axis in AXES)
@@ -60,6 +62,7 @@ class State:
         "path_p",
         "path_q",
         "position",
+        "restores",
         "rotated",
         "rotates",
         "tool",
@@ -67,6 +70,7 @@ class State:
         "transforms",
         "turns",
         "unit_stated",
+        "variables",
     )
 
     motion: int | None
@@ -108,6 +112,9 @@ class State:
         self.turns = False  # the program uses G7, so X may be a diameter
         self.cycle: tuple[int, float, float] | None = None  # code in force, its Z and R words
         self.cycle_level = NAN  # where the series of cycles began
+        self.restores = False  # the subprogram gives the modes of its caller back (M73)
+        self.variables: dict[str, float] = {}
+        """Variables whose value is certain, by `expressions.variable_name`."""
         self.touched: set[str | int] | None = None
 
     def copy(self) -> State:
@@ -121,6 +128,7 @@ class State:
         other.tool = self.tool.copy()
         other.offsets = dict(self.offsets)
         other.transforms = dict(self.transforms)
+        other.variables = dict(self.variables)
         return other
 
     def put(self, field: str, value: object) -> None:
@@ -134,6 +142,21 @@ class State:
         self.position[axis] = value
         if self.touched is not None:
             self.touched.add(axis)
+
+    def set_variable(self, name: str, value: float) -> None:
+        """Set a variable, or, with NaN, forget it; more than `MOST_VARIABLES` are not kept."""
+        if value == value and (name in self.variables or len(self.variables) < MOST_VARIABLES):
+            self.variables[name] = value
+        else:
+            self.variables.pop(name, None)
+        if self.touched is not None:
+            self.touched.add("#" + name)
+
+    def forget_variables(self, but: Iterable[str] = ()) -> None:
+        """Forget all variables but these."""
+        self.variables = {name: self.variables[name] for name in but}
+        if self.touched is not None:
+            self.touched.add("#")
 
     def forget_positions(self, axes: Iterable[int] = range(len(AXES))) -> None:
         """Forget the positions of these axes."""
@@ -164,6 +187,7 @@ class State:
         """Forget everything."""
         self.forget_modes()
         self.forget_positions()
+        self.forget_variables()
         self.offsets = {}
 
     def forget_silently(self) -> None:
@@ -188,6 +212,10 @@ class State:
                 self.put(name, dict.fromkeys(self.transforms))
             elif name == "feed_whole":
                 pass  # F itself is unknown
+            elif name == "#":
+                self.forget_variables()
+            elif name.startswith("#"):
+                self.set_variable(name[1:], NAN)
             else:
                 self.put(name, None)
 
@@ -218,6 +246,18 @@ def same(a: object, b: object) -> bool:
     return a == b or (a != a and b != b)
 
 
+def agree(a: State, b: State) -> bool:
+    """Whether two states know the same."""
+    for name in State.__slots__:
+        x, y = getattr(a, name), getattr(b, name)
+        if name in ("position", "g5x", "g92", "tool"):
+            if not all(map(same, x, y)):
+                return False
+        elif name != "touched" and not same(x, y):
+            return False
+    return True
+
+
 def join(before: State, after: State) -> State:
     """Keep what is known when it is unknown which of two states holds."""
     joined = before.copy()
@@ -243,6 +283,8 @@ def join(before: State, after: State) -> State:
     for axis, (a, b) in enumerate(zip(before.position, after.position, strict=True)):
         if not same(a, b):
             joined.move(axis, NAN)
+    for variable in [n for n, v in before.variables.items() if after.variables.get(n) != v]:
+        joined.set_variable(variable, NAN)
     if before.offsets != after.offsets:
         joined.offsets = {k: v for k, v in before.offsets.items() if after.offsets.get(k) == v}
     return joined

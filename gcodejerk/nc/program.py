@@ -7,7 +7,6 @@ line through the careful tokenizer and `execute`. Which way a line took shows no
 from __future__ import annotations
 
 import hashlib
-import itertools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -15,48 +14,26 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gcodejerk.errors import Place
-from gcodejerk.nc.block import Block
+from gcodejerk.nc.block import Block, Line
+from gcodejerk.nc.calls import Calls
 from gcodejerk.nc.chunks import Chunk, read_chunks
 from gcodejerk.nc.detect import detect_dialect
 from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.dialects import AUTO, find_dialect
-from gcodejerk.nc.execute import Executor
-from gcodejerk.nc.flow import Flow
-from gcodejerk.nc.judge import Step
 from gcodejerk.nc.lexer import read_lines
-from gcodejerk.nc.modal import NAN, State, join
-from gcodejerk.nc.rapids import (
-    GIVES_FEED,
-    USES_FEED,
-    RapidLog,
-    Rapids,
-    common_columns,
-)
-from gcodejerk.nc.runs import can_run, run_plain
-from gcodejerk.nc.start import NOTHING_KNOWN, Start, initial_state
+from gcodejerk.nc.modal import NAN, State
+from gcodejerk.nc.outline import find_outline, read_body, refers, seekable
+from gcodejerk.nc.rapids import Rapids
+from gcodejerk.nc.reader import Reader
+from gcodejerk.nc.runner import Finding
+from gcodejerk.nc.start import NOTHING_KNOWN, Start
 from gcodejerk.nc.tokenizer import parse_line
-from gcodejerk.nc.words import Lines
-from gcodejerk.reasons import Reason
-from gcodejerk.units import SECONDS_PER_MINUTE
 
 STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""
 _STAMP = re.compile(rb"[(;][ \t]*gcodejerk stamp", re.IGNORECASE)
-_FILE_NAME = re.compile(rb"[ \t]*[A-Za-z_][\w-]*\.[A-Za-z]{1,5}[ \t]*(?:\([^()]*\)[ \t]*)?")
 SHORT_RUN = 24
 """Fewer plain lines than this between odd ones go the careful way; arrays would not pay."""
-_SHOWN = 20
-"""Lines not understood that get a finding of their own."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Something in a program that the user can live with."""
-
-    line: int | None
-    message: str
-    place: Place | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,189 +62,6 @@ class Program:
 def parse_block(text: bytes, dialect: str | Dialect = "linuxcnc") -> Block:
     """Read one line, without its line end, the careful way."""
     return parse_line(text, find_dialect(dialect))
-
-
-class Reader:
-    """Follows a program line by line."""
-
-    def __init__(self, name: str, dialect: Dialect, start: Start) -> None:
-        self.name = name
-        self.dialect = dialect
-        self.log = RapidLog()
-        self.flow = Flow()
-        state = initial_state(dialect, start)
-        self.executor = Executor(dialect, state, dict(start.tool_lengths), start.decimal_point)
-        self.blocks = 0
-        self.percent: int | None = None
-        """The line of the opening ``%``."""
-        self.insert_at = 0
-        self.started = False
-        """A line that is not blank has been read."""
-        self.odd_lines: list[Finding] = []
-        self.odd_count = 0
-        self.asked_unit: int | None = None
-        """The first rapid before any G20 or G21."""
-        self.asked_distance: int | None = None
-        self.after_end: int | None = None
-
-    @property
-    def state(self) -> State:
-        """The state in force."""
-        return self.executor.state
-
-    def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
-        """Take one line the careful way; text without its LF."""
-        if text.endswith(b"\r"):
-            text = text[:-1]
-            terminator = 2 if terminator else 3
-        block = parse_line(text, self.dialect)
-        if block.percent:
-            self._percent(number, begin + len(text) + (terminator and (terminator % 2 or 2)))
-            if not any(word.letter == "G" for word in block.words):
-                return
-        says = block.words or block.assigns or block.names or block.problem
-        if not says and block.o_word is None:
-            if text.startswith(b";$") and not self.blocks and terminator:
-                # ;$PATH= belongs to the head of a Siemens program
-                self.insert_at = begin + len(text) + (terminator % 2 or 2)
-            self.started = self.started or bool(block.comments)
-            return
-        first = not self.blocks
-        self.started = True
-        if block.problem is not None and self._is_name(text):
-            return
-        line_end = begin + len(text) + (terminator and (terminator % 2 or 2))
-        if first and block.o_word == "" and terminator:
-            self.insert_at = line_end  # the number of a program goes first
-        self.blocks += bool(block.words or block.names or block.o_word is not None)
-        if block.problem is not None:
-            self._odd(number, block.problem, block.column, text)
-        if block.o_word is not None and block.problem is None:
-            self._o_word(block, first)
-            return
-        self._run(block, text, begin, number, terminator)
-
-    def _is_name(self, text: bytes) -> bool:
-        """Whether the first line is the name of the file."""
-        leader = self.dialect.text.leader and not self.blocks
-        return leader and _FILE_NAME.fullmatch(text) is not None
-
-    def can_run(self) -> bool:
-        """Whether the lines that follow may be taken as a run."""
-        return self.dialect.quick and self.started and not self.flow.inside and can_run(self.state)
-
-    def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
-        """Take plain lines of a chunk as arrays; the first that was not taken."""
-        stop, certain = run_plain(self.state, self.log, lines, first, last, place, self.dialect)
-        self.blocks += int(np.count_nonzero(lines.letters[first:stop]))
-        if certain is not None:
-            self._ask(certain)
-        return stop
-
-    def _run(self, block: Block, text: bytes, begin: int, number: int, terminator: int) -> None:
-        """Execute a block and enter what it did."""
-        executor = self.executor
-        before = executor.state.copy() if block.block_delete else None
-        step = executor.run(block)
-        state = executor.state
-        if step.fault and block.problem is None:
-            self._odd(number, "the controller would refuse this combination of words", None, text)
-        elif step.unknown:
-            self._odd(number, "a code that the dialect does not know", None, text)
-        uncertain = before is not None or self.flow.inside
-        if not (uncertain and step.feed_event == GIVES_FEED):
-            self.log.feed_event(step.feed_event)
-        if step.rapid:
-            self._rapid(step, (number, begin, begin + len(text), terminator))
-        if step.ends:
-            executor.end()
-        if state.ended:
-            self.flow.end_of_subprogram()
-            if before is not None:
-                executor.state = before  # had it run, nothing that follows would matter
-                return
-        if before is not None:
-            executor.state = join(before, state)
-
-    def _rapid(self, step: Step, place: tuple[int, int, int, int]) -> None:
-        """Enter a rapid."""
-        state, reason = self.state, step.reason
-        number = place[0]
-        outer = (Reason.AFTER_END, Reason.BLOCK_DELETE)
-        if self.flow.inside and reason not in outer:
-            reason = Reason.SUBPROGRAM
-        speed = NAN
-        if self.dialect.feed_on_rapids:
-            speed = state.feed * (state.unit or NAN) / SECONDS_PER_MINUTE
-            if reason is None and not speed > 0.0:
-                reason = Reason.FEED_UNKNOWN
-        if reason is None:
-            self._ask(number)
-        row = common_columns(state)
-        row.update(
-            zip(("line", "begin", "end", "terminator"), place, strict=True),
-            start=step.start,
-            target=state.position.copy(),
-            words=step.words,
-            feed=state.feed,
-            speed=speed,
-        )
-        self.log.add(reason, row)
-
-    def _ask(self, number: int) -> None:
-        """Note the first certain rapid that rests on an assumed unit or distance mode."""
-        if not self.state.unit_stated and self.asked_unit is None:
-            self.asked_unit = number
-        fixed = "distance" in self.state.fixed
-        if not (fixed or self.state.distance_stated) and self.asked_distance is None:
-            self.asked_distance = number
-
-    def _percent(self, number: int, end: int) -> None:
-        """Take a lone %: the first one opens the program, the second one ends it."""
-        if not self.started or (self.dialect.text.leader and not self.blocks):
-            self.started = True
-            self.percent = number
-            self.insert_at = end
-        elif self.percent is not None:
-            self.executor.end()
-        else:
-            self._odd(number, "% in the middle of a program that did not begin with one", 1, b"%")
-            self.state.forget()
-            self.log.feed_event(USES_FEED)
-
-    def _o_word(self, block: Block, first: bool) -> None:
-        """Take a line of program flow."""
-        assert block.o_word is not None
-        self.log.feed_event(USES_FEED)
-        for target in block.assigns:
-            if not target or target.isdigit():
-                self.state.offsets = {}
-        after = self.flow.apply(self.state, block.o_word, block.o_name, first)
-        self.executor.state = after
-
-    def _odd(self, number: int, problem: str, column: int | None, text: bytes) -> None:
-        """Note a line that is not understood."""
-        self.odd_count += 1
-        if len(self.odd_lines) < _SHOWN:
-            place = Place(self.name, number, column, text[:200].decode("latin-1"))
-            self.odd_lines.append(Finding(number, f"block not understood: {problem}", place))
-
-    def findings(self) -> tuple[Finding, ...]:
-        """Collect what the user should know."""
-        found = list(self.odd_lines)
-        if self.odd_count > len(found):
-            found.append(Finding(None, f"{self.odd_count - len(found)} more lines not understood"))
-        if self.asked_unit is not None:
-            found.append(
-                Finding(self.asked_unit, "no G20 or G21 before the first rapid: unit is assumed")
-            )
-        if self.asked_distance is not None:
-            found.append(
-                Finding(self.asked_distance, "no G90 or G91 before the first rapid: G90 is assumed")
-            )
-        if not self.state.ended:
-            found.append(Finding(None, "program ends without M2, M30 or a closing %"))
-        return tuple(found)
 
 
 def split_lines(chunk: Chunk) -> Iterator[tuple[bytes, int, int, int]]:
@@ -341,16 +135,32 @@ def read_program(
     >>> program.rapids.reason == 255
     array([False,  True])
     """
-    chunks = read_chunks(file, name)
+    reader, file = open_reader(file, name, dialect, start)
+    return follow(read_chunks(file, name), reader, progress, fast)
+
+
+def open_reader(
+    file: BinaryIO, name: str, dialect: str | Dialect, start: Start
+) -> tuple[Reader, BinaryIO]:
+    """Make the reader of a file, and what it has to be read from: a copy if it cannot go back."""
     why = ""
     if dialect == AUTO:
-        first = next(chunks)
-        dialect, why = detect_dialect(first.data, name)
-        chunks = itertools.chain([first], chunks)
-    reader = Reader(name, find_dialect(dialect), start)
+        file = seekable(file)
+        begin = file.tell()
+        dialect, why = detect_dialect(next(read_chunks(file, name)).data, name)
+        file.seek(begin)
+    chosen = find_dialect(dialect)
+    reader = Reader(name, chosen, start)
     if why:
-        reader.odd_lines.append(Finding(None, f"read as {reader.dialect.name}: {why}"))
-    return follow(chunks, reader, progress, fast)
+        reader.runner.odd_lines.append(Finding(None, f"read as {chosen.name}: {why}"))
+    if refers(chosen):
+        file = source = seekable(file)
+        origin = source.tell()
+        outline = find_outline(source, chosen, name)
+        reader.refer(
+            Calls(reader.runner, outline, lambda mark: read_body(source, origin, mark, chosen))
+        )
+    return reader, file
 
 
 def follow(
@@ -373,6 +183,7 @@ def follow(
         lines += chunk.data.count(b"\n") + (not chunk.data.endswith(b"\n"))
         if progress is not None:
             progress(size)
+    reader.finish()
     return Program(
         name=name,
         dialect=chosen.name,
@@ -437,8 +248,31 @@ def trace(
     motion : int or None
         The motion code in force after it, times ten; None where unknown.
     """
-    reader = Reader("<program>", find_dialect(dialect), start)
+    reader, file = open_reader(file, "<program>", dialect, start)
+    passed: dict[int, _Trace] = {}
+    lines: list[_Trace] = []
+
+    def observe(line: Line, state: State) -> None:
+        now = (line.number, tuple(state.position), state.motion)
+        passed[line.number] = _joined(passed.get(line.number, now), now)
+
+    reader.runner.observe = observe
     for chunk in read_chunks(file, reader.name):
-        for line in split_lines(chunk):
-            reader.read_line(*line)
-            yield line[2], tuple(reader.state.position), reader.state.motion
+        for text in split_lines(chunk):
+            reader.read_line(*text)
+            inside = reader.collecting or reader.flow.inside
+            state = _UNKNOWN if inside else reader.state
+            lines.append((text[2], tuple(state.position), state.motion))
+    reader.finish()
+    for line in lines:
+        yield passed.get(line[0], line)
+
+
+_Trace = tuple[int, tuple[float, ...], int | None]
+_UNKNOWN = State()
+
+
+def _joined(a: _Trace, b: _Trace) -> _Trace:
+    """Keep what two passes over a line have in common."""
+    positions = tuple(x if x == y else NAN for x, y in zip(a[1], b[1], strict=True))
+    return a[0], positions, a[2] if a[2] == b[2] else None

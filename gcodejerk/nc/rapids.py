@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.nc.dialect import AXES
 from gcodejerk.nc.modal import State
+from gcodejerk.nc.visits import Visits
 from gcodejerk.reasons import Reason
 
 REASONS = tuple(Reason)
@@ -116,9 +117,13 @@ class RapidLog:
         self._needed: list[NDArray[np.bool_]] = []
         self._waiting = 0
         self.count = 0
+        self.visits = Visits()
+        """Rapids of lines that may run more than once."""
 
     def feed_event(self, event: int) -> None:
         """Settle the rapids that wait for a block that uses or replaces F."""
+        if event:
+            self.visits.feed_event(event == USES_FEED)
         if event and self._waiting:
             self._needed.append(np.full(self._waiting, event == USES_FEED))
             self._waiting = 0
@@ -131,6 +136,12 @@ class RapidLog:
         self.count += 1
         if len(self._rows) >= 4096:
             self._flush()
+
+    def visit(self, line: int, reason: Reason | None, row: dict[str, object]) -> None:
+        """Take one pass over the block of a rapid that may run more than once."""
+        row["reason"] = CERTAIN if reason is None else _INDEX[reason]
+        row["feed_needed"] = False
+        self.visits.add(line, row)
 
     def add_many(
         self, columns: dict[str, object], events: NDArray[np.uint8], lines: NDArray[np.intp]
@@ -173,6 +184,21 @@ class RapidLog:
                 self._parts[name].append(np.array([row[name] for row in self._rows], dtype=dtype))
         self._rows = []
 
+    def _merge_visits(self, columns: dict[str, NDArray[Any]]) -> None:
+        """Put the rapids of lines that were followed in the place of those that were not."""
+        if not self.visits.rows:
+            return
+        kept = ~np.isin(columns["line"], np.array(list(self.visits.rows), dtype=np.int64))
+        rows = self.visits.finish()
+        for name, (dtype, width) in _TYPES.items():
+            visited: NDArray[Any] = np.array([row[name] for row in rows], dtype=dtype)
+            if width:
+                visited = visited.reshape(len(rows), width)
+            columns[name] = np.concatenate([columns[name][kept], visited])
+        order = np.argsort(columns["line"], kind="stable")
+        for name in columns:
+            columns[name] = columns[name][order]
+
     def finish(self) -> Rapids:
         """All rapids, with what only the whole program tells."""
         self._flush()
@@ -183,6 +209,7 @@ class RapidLog:
             parts = self._parts.pop(name)
             empty: NDArray[np.generic] = np.empty((0, width) if width else 0, dtype=dtype)
             columns[name] = np.concatenate([empty, *parts]).astype(dtype, copy=False)
+        self._merge_visits(columns)
         # In G93 every feed move carries its own F.
         mode, feed = columns["feed_mode"], columns["feed"]
         unknown = (mode == 0) | ((mode != 93) & columns["feed_needed"] & np.isnan(feed))

@@ -14,67 +14,41 @@ import re
 from functools import lru_cache
 
 from gcodejerk.nc.block import Block, Name, Word
+from gcodejerk.nc.cursor import BLANKS, CLOSED_NUMBER, LARGEST, SHAPE, Cursor, Odd
 from gcodejerk.nc.dialect import Dialect
-
-LARGEST = 1e9
-"""Numbers beyond this are not understood: no machine has such an axis."""
 
 CHECKSUM = "*"
 """Name of a checksum among the names of a block."""
-_BLANKS = re.compile(rb"[ \t]*")
 _WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[0-9.]+)[ \t]*(?![-+0-9. \t#\[=])")
-_NUMBER = re.compile(rb"[-+]?[0-9. \t]*")
-_CLOSED_NUMBER = re.compile(rb"[-+]?[ \t]*[0-9.]*")
 _IDENTIFIER = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
 _INDEX = re.compile(rb"[0-9]*")
 _FUNCTION = re.compile(rb"(IC|AC|DC|ACP|ACN)[ \t]*\(", re.IGNORECASE)
 _TO_BLANK = re.compile(rb"[^ \t;]*")
+_TO_COMMENT = re.compile(rb"[^;]*")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
-_SHAPE = re.compile(rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
-_UNSIGNED = re.compile(rb"[0-9]+(?:\.[0-9]*)?")
-_OPERATOR_TEXT = re.compile(rb"[ \t]*([A-Za-z][A-Za-z \t]*?)[ \t]*(?=\[)")
 _KEYWORD = re.compile(rb"[A-Za-z]*")
 _ACTIVE = re.compile(rb"[ \t]*py[ \t]*,", re.IGNORECASE)
-_FUNCTIONS = frozenset(
-    b"abs acos asin atan cos exists exp fix fup ln round sin sqrt tan".upper().split()
-)
 
 
-class _Odd(Exception):  # noqa: N818 - not an error of ours: a place in the line
-    """A problem and where it is, from 0."""
-
-    def __init__(self, problem: str, at: int) -> None:
-        super().__init__(problem)
-        self.problem = problem
-        self.at = at
-
-
-class _Line:
+class _Line(Cursor):
     """A cursor over one line."""
 
     __slots__ = (
-        *("assigns", "at", "comments", "delete", "dialect", "names", "o_name", "o_word"),
-        *("percent", "rules", "text", "words"),
+        *("comments", "delete", "dialect", "names", "o_arguments", "o_name", "o_word", "percent"),
+        "words",
     )
 
     def __init__(self, text: bytes, dialect: Dialect) -> None:
-        self.text = text
+        super().__init__(text, dialect.text)
         self.dialect = dialect
-        self.rules = dialect.text
-        self.at = 0
         self.words: list[Word] = []
         self.comments: list[tuple[int, int]] = []
-        self.assigns: list[str] = []
+        self.o_arguments: list[bytes] = []
         self.names: list[Name] = []
         self.o_word: str | None = None
         self.o_name = ""
         self.delete = False
         self.percent = False
-
-    def skip(self) -> bytes:
-        """Pass over blanks; the next byte, empty at the end."""
-        self.at = _BLANKS.match(self.text, self.at).end()  # type: ignore[union-attr]
-        return self.text[self.at : self.at + 1]
 
     def comment(self) -> None:
         """Pass over the comment that begins here."""
@@ -83,100 +57,15 @@ class _Line:
             end = text.find(b")", begin)
             strict = self.rules.parentheses == "comment"
             if end < 0 and strict:
-                raise _Odd("comment is not closed", begin)
+                raise Odd("comment is not closed", begin)
             if strict and text.find(b"(", begin + 1, end) >= 0:
-                raise _Odd("comment within a comment", text.find(b"(", begin + 1))
+                raise Odd("comment within a comment", text.find(b"(", begin + 1))
             self.at = end + 1 if end >= 0 else len(text)
         else:
             self.at = len(text)
         if self.rules.python and _ACTIVE.match(text, begin + 1):
-            raise _Odd("comment runs Python", begin)
+            raise Odd("comment runs Python", begin)
         self.comments.append((begin, self.at))
-
-    def number(self) -> float | None:
-        """Read the number that begins here; None for an expression."""
-        begin = self.at
-        byte = self.skip()
-        if byte in (b"+", b"-"):
-            after = _BLANKS.match(self.text, self.at + 1).end()  # type: ignore[union-attr]
-            if self.text[after : after + 1] in (b"#", b"["):
-                self.at = after
-                byte = self.text[after : after + 1]
-        if byte in (b"#", b"[") or byte.isalpha():
-            if self.rules.variables != "#":
-                raise _Odd("a number is missing", begin)
-            self.operand()
-            return None
-        pattern = _NUMBER if self.rules.blanks == "anywhere" else _CLOSED_NUMBER
-        match = pattern.match(self.text, self.at)
-        assert match is not None
-        digits = match[0].replace(b" ", b"").replace(b"\t", b"")
-        if not _SHAPE.fullmatch(digits):
-            shown = digits.decode("latin-1")
-            what = f"'{shown}' is not a number" if shown else "a number is missing"
-            raise _Odd(what, begin)
-        value = float(digits)
-        if not abs(value) <= LARGEST:
-            raise _Odd(f"'{digits.decode()}' is beyond any machine", begin)
-        self.at = match.start() + len(match[0].rstrip(b" \t"))
-        return value
-
-    def operand(self) -> None:
-        """Pass over ``#...``, ``[...]`` or ``function[...]``."""
-        while (byte := self.skip()) == b"#":
-            self.at += 1
-        if byte == b"[":
-            self.bracket()
-        elif byte == b"<":
-            end = self.text.find(b">", self.at)
-            if end < 0:
-                raise _Odd("name is not closed", self.at)
-            self.at = end + 1
-        elif byte.isdigit():
-            match = _UNSIGNED.match(self.text, self.at)
-            assert match is not None
-            self.at = match.end()
-        elif match := _OPERATOR_TEXT.match(self.text, self.at):
-            name = match[1].replace(b" ", b"").replace(b"\t", b"").upper()
-            if name not in _FUNCTIONS:
-                raise _Odd("function is not known", self.at)
-            self.at = match.end()
-            self.bracket()
-            if name == b"ATAN" and self.skip() == b"/":
-                self.at += 1
-                self.skip()
-                self.bracket()
-        else:
-            raise _Odd("a number is missing", self.at)
-
-    def bracket(self) -> None:
-        """Pass over an expression in square brackets."""
-        text, begin = self.text, self.at
-        if text[begin : begin + 1] != b"[":
-            raise _Odd("expression expected", begin)
-        depth = 0
-        for at in range(begin, len(text)):
-            byte = text[at]
-            depth += (byte == 0x5B) - (byte == 0x5D)
-            if byte in b"(;":
-                break
-            if depth == 0:
-                self.at = at + 1
-                return
-        raise _Odd("expression is not closed", begin)
-
-    def assignment(self) -> None:
-        """Pass over ``#target = value``."""
-        self.at += 1
-        begin = self.at
-        self.operand()
-        name = self.text[begin : self.at].strip(b" \t")
-        known = name.isdigit() or (name.startswith(b"<") and name.endswith(b">"))
-        self.assigns.append(name.decode("latin-1") if known else "")
-        if self.skip() != b"=":
-            raise _Odd("assignment without =", self.at)
-        self.at += 1
-        self.number()
 
     def flow(self) -> None:
         """Pass over an O-word: its name, its keyword, and whatever belongs to that."""
@@ -191,34 +80,38 @@ class _Line:
         self.o_word = match[0].decode().lower()
         self.at = match.end()
         if self.o_word and self.rules.o_word == "program":
-            raise _Odd("text after the number of a program", match.start())
+            raise Odd("text after the number of a program", match.start())
         while byte := self.skip():
             if byte in b"(;":
                 self.comment()
             elif byte == b"[":
+                begin = self.at
                 self.bracket()
+                self.o_arguments.append(self.text[begin : self.at])
             else:
-                raise _Odd("text after an O-word", self.at)
+                raise Odd("text after an O-word", self.at)
 
     def word(self) -> None:
         """Take one word."""
         begin = self.at
         letter = self.text[begin : begin + 1].decode().upper()
         if letter == "N" and (self.words or self.comments or self.names):
-            raise _Odd("N stands behind something else", begin)
+            raise Odd("N stands behind something else", begin)
         match = _WORD.match(self.text, begin)
         function = ""
-        if match and _SHAPE.fullmatch(match[2]):  # the usual case, made quick
+        if match and SHAPE.fullmatch(match[2]):  # the usual case, made quick
             self.at = match.end(2)
             value: float | None = float(match[2])
             if not -LARGEST <= value <= LARGEST:  # type: ignore[operator]
-                raise _Odd(f"'{match[2].decode()}' is beyond any machine", begin + 1)
+                raise Odd(f"'{match[2].decode()}' is beyond any machine", begin + 1)
         else:
             self.at = begin + 1
             if self.rules.equals and self._equals(letter):
                 if letter == "R" and self.rules.variables == "R":
                     self.assigns.append(self.text[begin : self.at].split(b"=")[0].decode().upper())
+                    at = self.at
                     self._value()
+                    self.assigned.append(self.text[at : self.at])
                     return
                 function = self._function()
                 value = self._value()
@@ -227,7 +120,7 @@ class _Line:
             else:
                 value = self.number()
         if letter == "N" and (value is None or not self.text[begin + 1 :].lstrip()[:1].isdigit()):
-            raise _Odd("N without a plain number", begin)
+            raise Odd("N without a plain number", begin)
         text = self.text[begin : self.at]
         whole = value is not None and b"." not in text
         self.words.append(Word(letter, value, begin, self.at, text, whole, function))
@@ -236,11 +129,11 @@ class _Line:
         """Pass over an index and ``=``, where that stands here: the 1 of ``T1=5``."""
         match = _INDEX.match(self.text, self.at)
         assert match is not None
-        after = _BLANKS.match(self.text, match.end()).end()  # type: ignore[union-attr]
+        after = BLANKS.match(self.text, match.end()).end()  # type: ignore[union-attr]
         if self.text[after : after + 1] != b"=":
             return False
         if match[0] and letter not in "TSMDHR" and self.rules.variables == "R":
-            raise _Odd("axis with a number: not known here", self.at)
+            raise Odd("axis with a number: not known here", self.at)
         self.at = after + 1
         self.skip()
         return True
@@ -256,22 +149,22 @@ class _Line:
 
     def _value(self) -> float | None:
         """Read what follows ``=``: a number, or an expression up to the next blank."""
-        match = _CLOSED_NUMBER.match(self.text, self.at)
+        match = CLOSED_NUMBER.match(self.text, self.at)
         assert match is not None
         after = self.text[match.end() : match.end() + 1]
         ends = not after or after in b" \t;)" or after.isalpha()
-        if ends and _SHAPE.fullmatch(match[0]):
+        if ends and SHAPE.fullmatch(match[0]):
             return self.number()
         match = _TO_BLANK.match(self.text, self.at)
         assert match is not None
         if not match[0]:
-            raise _Odd("a value is missing", self.at)
+            raise Odd("a value is missing", self.at)
         self.at = match.end() - (match[0].endswith(b")") and match[0].count(b"(") == 0)
         return None
 
     def _close(self) -> None:
         if self.skip() != b")":
-            raise _Odd("parenthesis is not closed", self.at)
+            raise Odd("parenthesis is not closed", self.at)
         self.at += 1
 
     def name(self) -> bool:
@@ -283,6 +176,8 @@ class _Line:
         name, begin = match[0].decode().upper(), self.at
         if self.dialect.one_command:
             self.at = len(self.text)  # all that follows belongs to the command
+        elif self.dialect.names.get(name) == "flow" and self.skip() != b":":
+            self.at = _TO_COMMENT.match(self.text, self.at).end()  # type: ignore[union-attr]
         elif self.skip() == b"(":
             self._arguments()
         elif self.text[self.at : self.at + 1] == b"=":
@@ -315,7 +210,7 @@ class _Line:
                 if depth == 0:
                     self.at = at + 1
                     return
-        raise _Odd("parenthesis is not closed", begin)
+        raise Odd("parenthesis is not closed", begin)
 
     def keyword(self) -> bool:
         """Take a keyword of program flow and all that follows it, if one stands here."""
@@ -347,13 +242,13 @@ class _Line:
         """Take a ``%``, with a name where the dialect gives it one."""
         rules, text = self.rules, self.text
         if rules.percent == "error":
-            raise _Odd("'%' has no meaning here", self.at)
+            raise Odd("'%' has no meaning here", self.at)
         if rules.percent == "lone":
             if text.strip(b" \t") != b"%":
-                raise _Odd("text on the line of %", self.at + 1)
+                raise Odd("text on the line of %", self.at + 1)
             self.at = len(text)
         elif any(word.letter != "N" for word in self.words):
-            raise _Odd("% behind other words", self.at)
+            raise Odd("% behind other words", self.at)
         else:
             self.at = _TO_BLANK.match(text, self.at).end()  # type: ignore[union-attr]
         self.percent = True
@@ -377,7 +272,7 @@ class _Line:
         elif byte == b";" and rules.semicolon == "end":
             self.at += 1
             if self.skip():
-                raise _Odd("text behind the end of the block", self.at)
+                raise Odd("text behind the end of the block", self.at)
         elif byte == b"#" and rules.variables == "#":
             self.assignment()
         elif byte == b"/" and self.delete_mark():
@@ -392,9 +287,9 @@ class _Line:
         elif rules.end and text.startswith(rules.end, self.at):
             self.at += len(rules.end)
             if self.skip() not in (b"", b";"):
-                raise _Odd("text behind the end of the block", self.at)
+                raise Odd("text behind the end of the block", self.at)
         else:
-            raise _Odd(f"'{byte.decode('latin-1')}' has no meaning here", self.at)
+            raise Odd(f"'{byte.decode('latin-1')}' has no meaning here", self.at)
 
 
 @lru_cache(maxsize=16)
@@ -427,11 +322,11 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     try:
         if len(text) > limit and text.strip(b" \t") != b"%":
             line.skip()
-            raise _Odd(f"line is longer than {limit} bytes", limit)
+            raise Odd(f"line is longer than {limit} bytes", limit)
         while line.skip():
             mark = line.at
             line.rest()
-    except _Odd as odd:
+    except Odd as odd:
         problem, column, rest = odd.problem, odd.at + 1, text[mark:]
     return Block(
         tuple(line.words),
@@ -441,6 +336,8 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
         line.o_name,
         line.percent,
         tuple(line.assigns),
+        tuple(line.assigned),
+        tuple(line.o_arguments),
         rest,
         problem,
         column,

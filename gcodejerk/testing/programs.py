@@ -13,10 +13,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import Program, Start, find_dialect
+from gcodejerk.nc import Program, Start
 from gcodejerk.nc.chunks import read_chunks
 from gcodejerk.nc.modal import MODES
-from gcodejerk.nc.program import Reader, follow
+from gcodejerk.nc.program import follow, open_reader
 
 Draw = st.DrawFn
 
@@ -43,8 +43,8 @@ def differences(data: bytes, start: Start | None = None, dialect: str = "linuxcn
     ends = []
     for fast in (True, False):
         try:
-            reader = Reader("<program>", find_dialect(dialect), start)
-            readings.append(follow(read_chunks(io.BytesIO(data), reader.name), reader, None, fast))
+            reader, file = open_reader(io.BytesIO(data), "<program>", dialect, start)
+            readings.append(follow(read_chunks(file, reader.name), reader, None, fast))
             ends.append(reader.state)
         except ProgramError as error:
             readings.append(str(error))

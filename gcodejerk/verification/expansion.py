@@ -18,7 +18,8 @@ from gcodejerk.nc import AXES, Block, Dialect, Start, find_dialect, parse_block
 from gcodejerk.nc.chunks import Chunk, read_chunks
 from gcodejerk.nc.dialect import PLANES
 from gcodejerk.nc.modal import State
-from gcodejerk.nc.program import Reader, read_chunk, split_lines
+from gcodejerk.nc.program import read_chunk, split_lines
+from gcodejerk.nc.reader import Reader
 from gcodejerk.verification.cycles import (
     CLOSE,
     HEIGHTS,
@@ -137,12 +138,12 @@ class _Walk:
         """Take one line of the original; whether the walk can go on."""
         state, reader = self.reader.state, self.reader
         here, motion, ended = list(state.position), state.motion, state.ended
-        odd, inside = reader.odd_count, reader.flow.inside
+        odd, inside = reader.odd_count, reader.inside
         reader.read_line(text, begin, number, terminator)
         state = reader.state
         bare = text.removesuffix(b"\r")
         block = parse_block(bare, self.dialect)
-        sure = odd == reader.odd_count and not (inside or reader.flow.inside)
+        sure = odd == reader.odd_count and not (inside or reader.inside)
         sure = sure and not (block.block_delete or block.assigns or block.o_word is not None)
         sure = sure and all(word.value is not None for word in block.words)
         if not ended:

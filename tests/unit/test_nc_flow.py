@@ -2,9 +2,8 @@
 
 import pytest
 
-from gcodejerk.nc import Start
+from gcodejerk.nc import Start, find_dialect
 from gcodejerk.nc.flow import Flow
-from gcodejerk.nc.program import find_dialect
 from gcodejerk.nc.start import initial_state
 
 MANY = 200_000

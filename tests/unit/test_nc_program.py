@@ -103,16 +103,17 @@ def test_increment_from_an_unknown_position_stays_unknown():
     assert end(b"T1 M6\nG91 G0 Z5\n") == [None, None, None]
 
 
-def test_loop_leaves_only_what_it_names_unknown():
+def test_loop_of_unknown_length_leaves_only_what_it_names_unknown():
     assert end(b"G1 X3 F100\nT1 G90\no1 while [#1]\nG21 #2=3\no1 endwhile\n") == [3, 0, 0]
-    text = b"o1 repeat [3]\nG17 G40 G90 G21 G0 X1\no1 endrepeat\n"
+    text = b"o1 repeat [#1]\nG17 G40 G90 G21 G0 X1\no1 endrepeat\n"
     assert end(text) == [None, 0, 0]
 
 
-def test_subprogram_body_changes_nothing_and_its_call_everything():
+def test_subprogram_runs_where_it_is_called():
     body = b"o1 sub\nG0 X5\no1 endsub\n"
     assert end(body) == [0, 0, 0]
-    assert end(body + b"o1 call\n") == [None, None, None]
+    assert end(body + b"o1 call\n") == [5, 0, 0]
+    assert end(b"o1 call\n") == [None, None, None]
 
 
 def test_block_delete_keeps_what_both_cases_share():

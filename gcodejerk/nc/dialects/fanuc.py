@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialect import Dialect, Drilling, Effect, Text, Writing, grouped
+from gcodejerk.nc.dialect import Arithmetic, Dialect, Drilling, Effect, Text, Writing, grouped
 
 CYCLES = frozenset({730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890})
 SYSTEMS = (540, 550, 560, 570, 580, 590)
+_FUNCTIONS = "ABS ACOS ASIN ATAN COS EXP FIX FUP LN ROUND SIN SQRT TAN"
 _JUMPS = ("GOTO", "IF", "THEN", "WHILE", "DO", "END", "SETVN", "POPEN", "PCLOS", "DPRNT", "BPRNT")
 
 _EFFECTS: dict[int, Effect] = {
@@ -53,6 +54,7 @@ FANUC = Dialect(
         leader=True,
         percent="lone",
         variables="#",
+        open_expressions=True,
         keywords=_JUMPS,
         blanks="between",
         line_limit=512,
@@ -120,9 +122,18 @@ FANUC = Dialect(
         670: ("modal macro", False),
     },
     whole_numbers="machine",
+    packed_repeats=True,
     other_m="positions",
     drilling=Drilling(
         CYCLES, frozenset({760, 870}), own_group=True, repeats="KL", missing="unknown"
+    ),
+    # Custom macro B: AND binds like *, OR and XOR like +. Local #1 to #33, common #100 to #999.
+    arithmetic=Arithmetic(
+        levels=(("*", "/", "MOD", "AND"), ("+", "-", "OR", "XOR")),
+        functions=frozenset(_FUNCTIONS.split()),
+        bits=True,
+        local=33,
+        system=1000,
     ),
     harmless=frozenset(
         {0, 90, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 930, 940, 950, 960, 970}

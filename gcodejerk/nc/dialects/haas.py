@@ -52,6 +52,7 @@ HAAS = replace(
         **dict.fromkeys((1410, 1430, 2340), ("tool centre point", True)),
     },
     m_groups={**FANUC.m_groups, 97: "stop", 96: "stop"},
+    packed_repeats=False,
     tool_cancelled_by_return=True,
     harmless=FANUC.harmless | {1030, 1870},
 )

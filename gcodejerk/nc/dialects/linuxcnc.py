@@ -7,11 +7,22 @@ Sources: its manual ("G-code overview" with the modal groups and the order of ex
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import PLANES, Dialect, Drilling, Text, Writing, code_names, grouped
+from gcodejerk.nc.dialect import (
+    PLANES,
+    Arithmetic,
+    Dialect,
+    Drilling,
+    Text,
+    Writing,
+    code_names,
+    grouped,
+)
 
 SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 CYCLES = frozenset({730, 740, 760, *range(810, 900, 10)})
 CYCLE_NAMES = code_names(*(f"G{code // 10}" for code in CYCLES))
+_FUNCTIONS = "ABS ACOS ASIN ATAN COS EXP FIX FUP LN ROUND SIN SQRT TAN"
+FUNCTIONS = frozenset(_FUNCTIONS.split())
 
 LINUXCNC = Dialect(
     name="linuxcnc",
@@ -114,6 +125,24 @@ LINUXCNC = Dialect(
     diameter_codes=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),
     drilling=Drilling(CYCLES, frozenset({760}), own_group=False, repeats="L", missing="error"),
+    # "Expressions" and "Binary operators" of the manual; measured where it is silent: AND and OR
+    # bind alike, MOD is never negative, EQ and NE allow 0.0001.
+    arithmetic=Arithmetic(
+        levels=(
+            ("**",),
+            ("*", "/", "MOD"),
+            ("+", "-"),
+            ("EQ", "NE", "GT", "GE", "LT", "LE"),
+            ("AND", "OR", "XOR"),
+        ),
+        functions=FUNCTIONS | {"EXISTS"},
+        floor=True,
+        angles=True,
+        together=True,
+        exact=True,
+        local=30,
+        system=5000,
+    ),
     harmless=frozenset(
         {0, 40, 70, 80, 170, 171, 180, 181, 190, 191, 200, 210, 400, 610, 611, 640}
         | {900, 910, 901, 911, 930, 940, 950, 960, 970, 980, 990}

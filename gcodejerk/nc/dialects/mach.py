@@ -8,7 +8,8 @@ nothing is taken as known behind them.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import Dialect, Drilling, Text, Writing, grouped
+from gcodejerk.nc.dialect import Arithmetic, Dialect, Drilling, Text, Writing, grouped
+from gcodejerk.nc.dialects.linuxcnc import FUNCTIONS
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 CYCLES = frozenset({730, *range(810, 900, 10)})
@@ -82,6 +83,15 @@ MACH = Dialect(
     redrawn=frozenset({310, 320, 330, 760}),
     other_m="positions",
     drilling=Drilling(CYCLES, frozenset({870}), own_group=False, repeats="L", missing="unknown"),
+    # NIST RS274/NGC, which has no comparisons.
+    arithmetic=Arithmetic(
+        levels=(("**",), ("*", "/", "MOD"), ("+", "-", "AND", "OR", "XOR")),
+        functions=FUNCTIONS,
+        floor=True,
+        angles=True,
+        together=True,
+        system=1000,
+    ),
     harmless=frozenset(
         {0, 40, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 901, 911, 930, 940, 950}
         | {980, 990, 500, 690, 150}

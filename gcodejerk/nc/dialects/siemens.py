@@ -8,7 +8,7 @@ subprogram is such a name.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import Dialect, Effect, Text, Writing, grouped
+from gcodejerk.nc.dialect import Arithmetic, Dialect, Effect, Text, Writing, grouped
 
 SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 
@@ -35,6 +35,7 @@ _FLOW = (
     *("REPEATB", "UNTIL", "GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS", "CASE", "CALL", "PCALL"),
     *("EXTCALL", "ISOCALL", "PROC", "RET", "ENDPROC", "SETINT", "INIT", "START", "WAITE"),
 )
+_FUNCTIONS = "ABS COS LN EXP POT SIN SQRT TAN TRUNC"
 NAMES: dict[str, Effect] = {
     **dict.fromkeys(_SILENT, "none"),
     **dict.fromkeys(("TRANS", "ATRANS", "TRAFOOF"), "frames"),
@@ -117,6 +118,11 @@ SIEMENS = Dialect(
     tool_frame=frozenset("TD"),
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
+    arithmetic=Arithmetic(
+        levels=(("*", "/"), ("+", "-")),
+        functions=frozenset(_FUNCTIONS.split()),
+        brackets="()",
+    ),
     harmless=frozenset(
         {0, 90, 170, 180, 190, 400, 700, 710, 7000, 7100, 900, 910, 930, 940, 950, 600, 640}
         | {6410, 6420, 6430, 6440, 6450, 6010, 6020, 6030}

@@ -1,0 +1,304 @@
+"""Which block runs next: the main program in the order of the file, and what it enters.
+
+Rule: the file is read once, forwards. What may run more than once, or from elsewhere, is followed
+by `passes` (LinuxCNC's structures, which are collected until they are complete) or `calls`
+(subprograms that stand somewhere else in the file); where that is not possible, `Flow` forgets.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from gcodejerk.nc.block import Line
+from gcodejerk.nc.calls import Calls
+from gcodejerk.nc.dialect import Dialect
+from gcodejerk.nc.flow import Flow
+from gcodejerk.nc.jumps import is_target
+from gcodejerk.nc.modal import GROUP_FIELDS, MODES, State
+from gcodejerk.nc.passes import Passes
+from gcodejerk.nc.rapids import USES_FEED, RapidLog
+from gcodejerk.nc.runner import Finding, Runner
+from gcodejerk.nc.runs import can_run, run_plain
+from gcodejerk.nc.start import Start
+from gcodejerk.nc.structures import Collector, Node
+from gcodejerk.nc.tokenizer import parse_line
+from gcodejerk.nc.words import Lines
+
+_FILE_NAME = re.compile(rb"[ \t]*[A-Za-z_][\w-]*\.[A-Za-z]{1,5}[ \t]*(?:\([^()]*\)[ \t]*)?")
+
+
+class Reader:
+    """Follows a program line by line."""
+
+    def __init__(self, name: str, dialect: Dialect, start: Start) -> None:
+        self.name = name
+        self.dialect = dialect
+        self.runner = Runner(name, dialect, start)
+        self.flow = Flow()
+        self.passes = Passes(self.runner)
+        self.calls: Calls | None = None
+        self.blocks = 0
+        self.percent: int | None = None
+        """The line of the opening ``%``."""
+        self.insert_at = 0
+        self.started = False
+        """A line that is not blank has been read."""
+        self._structure = Collector()
+        self._targets: frozenset[int] | None = None
+        self._plain = True
+
+    @property
+    def state(self) -> State:
+        """The state in force."""
+        return self.runner.state
+
+    @property
+    def log(self) -> RapidLog:
+        """The rapids so far."""
+        return self.runner.log
+
+    @property
+    def odd_count(self) -> int:
+        """Lines so far that were not understood."""
+        return self.runner.odd_count
+
+    @property
+    def inside(self) -> bool:
+        """Whether the line belongs to a structure or a subprogram."""
+        return self.flow.inside or self.collecting
+
+    @property
+    def collecting(self) -> bool:
+        """Whether lines wait for the end of their structure."""
+        return bool(self._structure)
+
+    def refer(self, calls: Calls) -> None:
+        """Follow the jumps and calls that the file was found to make."""
+        outline = calls.outline
+        self.calls = calls
+        self._targets = outline.targets
+        self._plain = outline.plain
+        self.runner.executor.jumps_known = True
+        self.runner.call = calls.call
+        if outline.repeats:
+            self._forget_start(outline.groups)
+
+    def _forget_start(self, groups: frozenset[str] | None) -> None:
+        """Forget what the last line may leave to the first one, where the program repeats."""
+        state = self.state
+        kept = {name: getattr(state, name) for name in MODES}
+        state.forget()
+        if groups is not None:
+            stated = {GROUP_FIELDS.get(group, group.replace(" ", "_")) for group in groups}
+            stated |= {"unit"} if "units" in groups else set()
+            for name, value in kept.items():
+                if name not in stated:
+                    state.put(name, value)
+
+    def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
+        """Take one line the careful way; text without its LF."""
+        if text.endswith(b"\r"):
+            text = text[:-1]
+            terminator = 2 if terminator else 3
+        line = Line(text, begin, number, terminator, parse_line(text, self.dialect))
+        block = line.block
+        if self._structure:
+            self._collect(line)
+        elif block.percent:
+            self._percent(line)
+        elif (
+            block.words or block.assigns or block.names or block.problem or block.o_word is not None
+        ):
+            self._read_block(line)
+        else:
+            if text.startswith(b";$") and not self.blocks and terminator:
+                # ;$PATH= belongs to the head of a Siemens program
+                self.insert_at = line.end
+            self.started = self.started or bool(block.comments)
+
+    def _read_block(self, line: Line) -> None:
+        """Take a line that says something."""
+        block = line.block
+        first = not self.blocks
+        self.started = True
+        if block.problem is not None and self._is_name(line.text):
+            return
+        if first and block.o_word == "" and line.terminator:
+            self.insert_at = line.end  # the number of a program goes first
+        self._count(line)
+        follows = self.dialect.text.o_word == "flow" and not self.passes.exhausted
+        if follows and Collector.opens(block) and not self.flow.inside and not self.state.ended:
+            self._collect(line, counted=True)
+        else:
+            self._run(line, first)
+
+    def _count(self, line: Line) -> None:
+        block = line.block
+        self.blocks += bool(block.words or block.names or block.o_word is not None)
+        if block.problem is not None:
+            self.runner.odd(line, block.problem, block.column)
+
+    def _is_name(self, text: bytes) -> bool:
+        """Whether the first line is the name of the file."""
+        leader = self.dialect.text.leader and not self.blocks
+        return leader and _FILE_NAME.fullmatch(text) is not None
+
+    def can_run(self) -> bool:
+        """Whether the lines that follow may be taken as a run."""
+        alone = self._plain and not self.flow.inside and not self._structure
+        return self.dialect.quick and self.started and alone and can_run(self.state)
+
+    def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
+        """Take plain lines of a chunk as arrays; the first that was not taken."""
+        stop, certain = run_plain(self.state, self.log, lines, first, last, place, self.dialect)
+        self.blocks += int(np.count_nonzero(lines.letters[first:stop]))
+        if certain is not None:
+            self.runner.ask(certain)
+        return stop
+
+    def _run(self, line: Line, first: bool = False) -> None:
+        """Execute a line of the main program."""
+        runner, block = self.runner, line.block
+        if block.o_word is not None and block.problem is None:
+            self._o_word(line, first)
+            return
+        inside = self.flow.inside
+        if self.calls is not None:
+            self._follow_jumps(line)
+        executed = not runner.state.ended and (not inside or self.calls is None)
+        runner.left = self._leave if executed else _nothing
+        ended = runner.run(line, uncertain=inside)
+        if executed and self.calls is not None and line.number in self.log.visits.rows:
+            self.log.visits.spoil(line.number, line.number)
+        if ended is not None:
+            if ended is runner.state:
+                runner.executor.end()
+            self.flow.end_of_subprogram()
+        elif runner.state.ended:
+            self.flow.end_of_subprogram()
+
+    def _follow_jumps(self, line: Line) -> None:
+        """Forget everything where a jump may lead to; follow calls where the line runs."""
+        assert self.calls is not None
+        runner = self.runner
+        if self._targets is not None and is_target(line.block, self._targets):
+            runner.log.feed_event(USES_FEED)
+            runner.state.forget()
+            runner.state.ended = False
+        self.calls.main_line = line.number
+        runs = not runner.state.ended and not self.flow.inside
+        runner.executor.calls_followed = runs
+
+    def _leave(self) -> None:
+        """Programs run that are not followed."""
+        self.passes.lose()
+        if self.calls is not None:
+            self.calls.lose()
+
+    def _percent(self, line: Line) -> None:
+        """Take a lone %: the first one opens the program, the second one ends it."""
+        if not self.started or (self.dialect.text.leader and not self.blocks):
+            self.started = True
+            self.percent = line.number
+            self.insert_at = line.end
+        elif self.percent is not None:
+            self.runner.executor.end()
+        else:
+            self.runner.odd(line, "% in the middle of a program that did not begin with one", 1)
+            self.state.forget()
+            self.log.feed_event(USES_FEED)
+        if any(word.letter == "G" for word in line.block.words):
+            self._read_block(line)  # %NAME G71 * of Heidenhain
+
+    def _o_word(self, line: Line, first: bool) -> None:
+        """Take a line of program flow that stands alone."""
+        block = line.block
+        assert block.o_word is not None
+        calls = block.o_word == "call" and not self.state.ended
+        beside = block.words or block.assigns or block.block_delete
+        if calls and not beside and not self.flow.inside and not self.passes.exhausted:
+            self._pass(Node("call", "", line))
+            return
+        self.log.feed_event(USES_FEED)
+        if calls:
+            self.passes.lose()
+        for target in block.assigns:
+            if not target or target.isdigit():
+                self.state.offsets = {}
+        if block.assigns:
+            self.state.forget_variables()
+        self.runner.state = self.flow.apply(self.state, block.o_word, block.o_name, first)
+        if block.o_word == "" and not first:
+            self.state.ended = False  # what stands here may be called
+
+    def _collect(self, line: Line, counted: bool = False) -> None:
+        """Take a line of a structure; run the structure when it is complete."""
+        if not counted:
+            self._count(line)
+        try:
+            node = self._structure.add(line)
+        except ValueError:
+            self._replay()
+            return
+        if node is None:
+            return
+        lines = self._structure.take()
+        if node.kind == "sub":
+            self.passes.define(node)
+        else:
+            self._pass(node)
+        self.runner.enter_unreached(lines)
+
+    def _pass(self, node: Node) -> None:
+        """Run a structure, or a call."""
+        if not self.passes.run(node):
+            self.runner.executor.end()
+
+    def _replay(self) -> None:
+        """Take the lines of a structure that cannot be followed."""
+        for line in self._structure.take():
+            if line.block.percent:
+                self._percent(line)
+            elif line.block.o_word is not None or _says(line):
+                self._run(line)
+
+    def finish(self) -> None:
+        """Take the end of the file."""
+        if self._structure:
+            self._replay()
+        if self.calls is not None:
+            self.calls.finish()
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Collect what the user should know."""
+        runner = self.runner
+        found = list(runner.odd_lines)
+        if runner.odd_count > len(found):
+            found.append(
+                Finding(None, f"{runner.odd_count - len(found)} more lines not understood")
+            )
+        if runner.asked_unit is not None:
+            found.append(
+                Finding(runner.asked_unit, "no G20 or G21 before the first rapid: unit is assumed")
+            )
+        if runner.asked_distance is not None:
+            found.append(
+                Finding(
+                    runner.asked_distance, "no G90 or G91 before the first rapid: G90 is assumed"
+                )
+            )
+        if not self.state.ended:
+            found.append(Finding(None, "program ends without M2, M30 or a closing %"))
+        return tuple(found)
+
+
+def _says(line: Line) -> bool:
+    """Whether a line holds more than comments."""
+    block = line.block
+    return bool(block.words or block.assigns or block.names or block.problem)
+
+
+def _nothing() -> None:
+    """Nothing runs here."""

@@ -1,0 +1,104 @@
+"""Expressions against LinuxCNC's own interpreter: what we compute is what it computes."""
+
+import math
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from gcodejerk.nc import DIALECTS
+from gcodejerk.nc.expressions import evaluate
+
+RULES = DIALECTS["linuxcnc"].arithmetic
+KNOWN = {"1": 3.5, "2": -2.0, "3": 0.0, "4": 1.0, "<A>": 7.25}
+HEAD = "#1=3.5 #2=-2 #3=0 #4=1 #<a>=7.25\nG21 G90 G0\n"
+OPERATORS = [
+    *("**", "*", "/", "MOD", "+", "-"),
+    *("EQ", "NE", "GT", "GE", "LT", "LE", "AND", "OR", "XOR"),
+]
+FUNCTIONS = sorted(RULES.functions - {"ATAN", "EXISTS"})
+PER_FILE = 60
+
+pytestmark = [
+    pytest.mark.linuxcnc,
+    pytest.mark.skipif(
+        shutil.which("rs274") is None, reason="LinuxCNC's interpreter (linuxcnc-uspace) is absent"
+    ),
+]
+
+numbers = st.one_of(
+    st.integers(0, 9).map(str),
+    st.floats(0, 99, allow_nan=False).map(lambda v: f"{v:.3f}"),
+    st.sampled_from(
+        ["0.5", "-1.5", "2.5", "-3", "+4", ".25", "1.", "#1", "#2", "#3", "#<a>", "##4"]
+    ),
+)
+
+
+def bracketed(inner):
+    chain = st.lists(st.tuples(st.sampled_from(OPERATORS), inner), min_size=1, max_size=4)
+    sums = st.builds(
+        lambda first, rest: f"[{first}" + "".join(f" {op} {x}" for op, x in rest) + "]",
+        inner,
+        chain,
+    )
+    calls = st.builds(
+        lambda name, x: f"{name}{x if x.startswith('[') else f'[{x}]'}",
+        st.sampled_from(FUNCTIONS),
+        inner,
+    )
+    turns = st.builds(lambda a, b: f"ATAN[{a}]/[{b}]", inner, inner)
+    return st.one_of(sums, sums, calls, turns, sums.map(lambda text: "-" + text))
+
+
+expressions = st.recursive(numbers, bracketed, max_leaves=12).map(lambda text: f"[{text}]")
+
+
+def interpret(path):
+    """X after every line that moves, and the refusal."""
+    table = path.with_name("tools.tbl")
+    table.write_text("T1 P1 Z0 D5\n")
+    command = ["/usr/bin/python3", str(Path(__file__).with_name("oracle.py")), str(path)]
+    command += ["--tool-table", str(table)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=20)
+    rows = [row.split() for row in done.stdout.splitlines() if " TRAVERSE " in row]
+    return {int(row[0]): float(row[2]) for row in rows}, done.stderr.strip()
+
+
+def computed(text):
+    return evaluate(text.encode(), KNOWN, RULES)
+
+
+# without shrinking: each try costs a run of the interpreter
+@settings(
+    max_examples=25,
+    deadline=None,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+@given(st.lists(expressions, min_size=PER_FILE, max_size=PER_FILE))
+def test_drawn_expressions_have_the_interpreters_value(tmp_path_factory, drawn):
+    drawn = [text for text in drawn if len(text) < 200]
+    ours = [(text, computed(text)) for text in drawn]
+    # A line that the interpreter refuses ends the program: those that we take for unknown stay out.
+    known = [(text, value) for text, value in ours if abs(value) < 1e6]
+    folder = tmp_path_factory.mktemp("expressions")
+    path = folder / "part.ngc"
+    path.write_text(HEAD + "".join(f"X{text}\n" for text, _ in known) + "M2\n")
+    ends, refusal = interpret(path)
+    assert not refusal, (refusal, known)
+    assert len(known) > len(drawn) // 4
+    for line, (text, value) in enumerate(known, HEAD.count("\n") + 1):
+        assert ends[line] == pytest.approx(value, abs=1e-6, rel=1e-9), text
+
+
+@pytest.mark.parametrize("text", ["[1/0]", "SQRT[-1]", "LN[0]", "ASIN[2]", "[-8 ** .5]", "[1+]"])
+def test_what_the_interpreter_refuses_is_unknown(tmp_path, text):
+    path = tmp_path / "part.ngc"
+    path.write_text(f"{HEAD}X{text}\nM2\n")
+    _, refusal = interpret(path)
+    assert refusal
+    assert math.isnan(computed(text))

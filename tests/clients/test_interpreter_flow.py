@@ -1,0 +1,207 @@
+"""Loops, branches, subprograms and variables against LinuxCNC's own interpreter.
+
+For every rapid that we are certain of, start and end agree with the interpreter on every pass, and
+so does every position that we claim to know behind a line. Variables of which we know nothing are
+set in the file of parameters that the interpreter alone reads.
+"""
+
+import io
+import math
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from gcodejerk.nc import AXES, CERTAIN, Start, read_program, trace
+
+HERE = Path(__file__).resolve().parent
+STARTUP = "G17 G21 G40 G49 G54 G64 G90 G94 G97"
+AT_ZERO = Start(
+    positions=dict.fromkeys(AXES, 0.0), offsets={"G54": dict.fromkeys(AXES, 0.0)}, startup=STARTUP
+)
+TOLERANCE = 1e-6
+
+pytestmark = [
+    pytest.mark.linuxcnc,
+    pytest.mark.skipif(
+        shutil.which("rs274") is None, reason="LinuxCNC's interpreter (linuxcnc-uspace) is absent"
+    ),
+]
+
+
+def interpret(path):
+    """Moves: (line, what, X Y Z), and the refusal."""
+    table = path.with_suffix(".tbl")
+    table.write_text("T1 P1 Z0 D5\n")
+    command = ["/usr/bin/python3", str(HERE / "oracle.py"), str(path), "--startup", STARTUP]
+    try:
+        done = subprocess.run(
+            [*command, "--tool-table", str(table)], capture_output=True, text=True, timeout=10
+        )
+    except subprocess.TimeoutExpired:
+        return [], "endless"
+    moves = []
+    for row in done.stdout.splitlines():
+        line, what, *values = row.split()
+        if what in ("TRAVERSE", "FEED"):
+            moves.append((int(line), what, tuple(map(float, values[:3]))))
+    return moves, done.stderr.strip()
+
+
+def disagreements(data, moves, refused, start):
+    """What we claim and the interpreter does not do; how many rapids we are certain of."""
+    wrong = []
+    after = {line: positions for line, positions, _ in trace(io.BytesIO(data), start=start)}
+    rapids = read_program(io.BytesIO(data), start=start).rapids
+    assert list(rapids.line) == sorted(set(rapids.line)), "one row per rapid, in the file's order"
+    certain = {int(rapids.line[i]): i for i in range(len(rapids)) if rapids.reason[i] == CERTAIN}
+    at = (0.0, 0.0, 0.0)
+    for line, what, to in moves:
+        for axis, name in enumerate("XYZ"):
+            known = after[line][axis]
+            if not math.isnan(known) and abs(known - to[axis]) > TOLERANCE:
+                wrong.append(f"line {line} ends at {name}{to[axis]}, read as {known}")
+        if line in certain:
+            i = certain[line]
+            if what != "TRAVERSE":
+                wrong.append(f"line {line} is {what}, read as a rapid")
+            for axis, name in enumerate("XYZ"):
+                for claim, real in ((rapids.start[i, axis], at), (rapids.target[i, axis], to)):
+                    if not math.isnan(claim) and abs(claim - real[axis]) > TOLERANCE:
+                        wrong.append(f"line {line}: {name}{real[axis]}, read as {claim}")
+        at = to
+    return wrong, len(certain)
+
+
+numbers = st.integers(-5, 9).map(str)
+unknown = st.sampled_from(["#31", "#32", "#<_frob>"])
+variables = st.sampled_from(["#1", "#2", "#<a>", "#<_b>", "#40"])
+operands = st.one_of(numbers, numbers, variables, variables)
+operators = st.sampled_from(["+", "-", "*"])
+values = st.one_of(
+    operands, st.builds(lambda a, o, b: f"[{a} {o} {b}]", operands, operators, operands)
+)
+comparisons = st.sampled_from(["LT", "GT", "EQ", "NE", "LE", "GE"])
+
+
+@st.composite
+def flows(draw):
+    """Draw a program: subprograms, then a main program that calls them, in loops and branches."""
+    labels = iter(range(100, 10000))
+    lines = ["#<_b>=3 #40=2 #1=1 #2=2 #<a>=4"]
+    subs = []
+
+    def condition():
+        if draw(st.integers(0, 3)) == 0:
+            # Read as unknown: nothing in the file sets it for certain.
+            return f"[#33 {draw(comparisons)} {draw(numbers)}]"
+        return f"[{draw(operands)} {draw(comparisons)} {draw(operands)}]"
+
+    def body(depth, loop=None, inside=False):
+        out = []
+        for _ in range(draw(st.integers(1, 4))):
+            out += statement(depth, loop, inside)
+        return out
+
+    def statement(depth, loop, inside):
+        kind = draw(st.integers(0, 17 if depth < 3 else 9))
+        if kind <= 4:
+            axes = draw(st.lists(st.sampled_from("XYZ"), min_size=1, max_size=2, unique=True))
+            code = draw(st.sampled_from(["G0 ", "G0 ", "G0 ", "", "G1 "]))
+            number = numbers if draw(st.integers(0, 2)) else values
+            return [code + " ".join(axis + draw(number) for axis in axes)]
+        if kind == 5:
+            return [draw(st.sampled_from(["G90", "G91", "G90", "G0", "G1", "F200", "G0 X0 Y0 Z0"]))]
+        if kind <= 7:
+            return [f"{draw(variables)}={draw(values)}"]
+        if kind == 8 and subs:
+            arguments = "".join(f" [{draw(operands)}]" for _ in range(draw(st.integers(0, 2))))
+            return [f"o{draw(st.sampled_from(subs))} call{arguments}"]
+        if kind <= 9:
+            if loop and draw(st.booleans()):
+                word = draw(st.sampled_from(["break", "continue"]))
+                return wrapped(f"o{loop} {word}")
+            if inside and draw(st.booleans()):
+                return wrapped(f"o{inside} return")
+            return ["/G0 X3"] if draw(st.booleans()) else ["G90 G0 X1 Y1"]
+        label = next(labels)
+        if kind <= 12:
+            out = [f"o{label} if {condition()}", *body(depth + 1, loop, inside)]
+            if draw(st.booleans()):
+                out += [f"o{label} elseif {condition()}", *body(depth + 1, loop, inside)]
+            if draw(st.booleans()):
+                out += [f"o{label} else", *body(depth + 1, loop, inside)]
+            return [*out, f"o{label} endif"]
+        if kind <= 14:
+            count = draw(st.sampled_from(["[0]", "[1]", "[2]", "[3]", "[#<_b>]", "[#34]"]))
+            return [
+                f"o{label} repeat {count}",
+                *body(depth + 1, label, inside),
+                f"o{label} endrepeat",
+            ]
+        # A loop ends for certain: a counter of its own.
+        counter = f"#{200 + label}" if draw(st.booleans()) else f"#<n{label}>"
+        first = f"{counter}=0" if draw(st.integers(0, 2)) else f"{counter}=[#35 * 0]"
+        test = f"[{counter} LT {draw(st.integers(1, 3))}]"
+        step = f"{counter}=[{counter} + 1]"
+        if kind == 15:
+            return [
+                first,
+                f"o{label} do",
+                step,
+                *body(depth + 1, label, inside),
+                f"o{label} while {test}",
+            ]
+        return [
+            first,
+            f"o{label} while {test}",
+            step,
+            *body(depth + 1, label, inside),
+            f"o{label} endwhile",
+        ]
+
+    def wrapped(jump):
+        label = next(labels)
+        return [f"o{label} if {condition()}", jump, f"o{label} endif"]
+
+    for _ in range(draw(st.integers(0, 3))):
+        label = next(labels)
+        lines += [f"o{label} sub", "#<a>=#1", *body(1, None, label), f"o{label} endsub"]
+        subs.append(label)
+    lines += ["F100", *body(0), *body(0), *body(0), "G0 X1", "M2"]
+    return lines
+
+
+def write(folder, k, lines):
+    """Two files: with the unknown variables set to values, as the interpreter runs them."""
+    path = folder / f"{k}.ngc"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+# without shrinking: each try costs many runs of the interpreter
+@settings(
+    max_examples=6,
+    deadline=None,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+@given(st.lists(st.tuples(flows(), st.tuples(*[st.integers(-2, 4)] * 3)), min_size=12, max_size=12))
+def test_drawn_flow_is_read_as_the_interpreter_runs_it(tmp_path_factory, drawn):
+    folder = tmp_path_factory.mktemp("flow")
+    paths, programs = [], []
+    for k, (lines, hidden) in enumerate(drawn):
+        settings_line = " ".join(f"#{33 + n}={value}" for n, value in enumerate(hidden))
+        paths.append(write(folder, k, [settings_line, *lines]))
+        # We read the same program without that line: for us the variables are unknown.
+        programs.append(("(unknown)\n" + "\n".join(lines) + "\n").encode())
+    with ThreadPoolExecutor(2) as pool:
+        results = list(pool.map(interpret, paths))
+    for data, (moves, refusal) in zip(programs, results, strict=True):
+        for start in (Start(startup=STARTUP), AT_ZERO):
+            wrong, _ = disagreements(data, moves, refusal, start)
+            assert not wrong, f"{data.decode()}\n{wrong}\n{refusal}"
