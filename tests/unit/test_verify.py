@@ -176,7 +176,7 @@ DAMAGE = {
     "kept line changed": ("G1 X2 (cut)", "G1 X3 (cut)", Kind.CHANGED),
     "kept comment changed": ("(part 7)", "(part 8)", Kind.CHANGED),
     "kept blank added": ("G1 X2 (cut)", "G1 X2  (cut)", Kind.CHANGED),
-    "kept line end changed": ("#1=#90\n", "#1=5\r\n", Kind.LINE_END),
+    "kept line end changed": ("#1=#90\n", "#1=#90\r\n", Kind.LINE_END),
     "kept line dropped": ("#1=#90\n", "", Kind.CHANGED),
     "kept line doubled": ("#1=#90\n", "#1=#90\n#1=#90\n", Kind.CHANGED),
     "kept lines swapped": ("#1=#90\nG0 X#1\n", "G0 X#1\n#1=#90\n", Kind.CHANGED),
