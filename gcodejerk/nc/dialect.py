@@ -151,8 +151,6 @@ class Writing:
     comment: tuple[bytes, bytes] = (b"(", b")")
     standstill: bytes = b"G4 P0"
     """A block that waits until the machine stands."""
-    measured: bool = False
-    """Streams in this form were played by the controller itself, and compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,12 +197,8 @@ class Dialect:
     """G code -> name of a rotation, scaling, mirroring or polar frame, and whether it begins."""
     increments: Mapping[str, str] = field(default_factory=dict)
     """Address of increments -> its axis, for example U -> X."""
-    increment_functions: bool = False
-    """``X=IC(5)`` is an increment and ``X=AC(5)`` is not, whatever mode is in force."""
     whole_numbers: Literal["units", "machine"] = "units"
     """Is X100 100 mm? It is; or a parameter of the machine decides."""
-    diameter_codes: bool = False
-    """A program may state whether X is a diameter."""
     feed_of_mixed: bool = False
     """What F means where linear and rotary axes move together is known: it is the speed of the
     linear ones."""

@@ -122,7 +122,6 @@ LINUXCNC = Dialect(
     centres_of_plane=True,
     feed_of_mixed=True,
     paths={610: 61, 611: 62, 640: 64},
-    diameter_codes=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),
     drilling=Drilling(CYCLES, frozenset({760}), own_group=False, repeats="L", missing="error"),
     # "Expressions" and "Binary operators" of the manual; measured where it is silent: AND and OR
@@ -149,5 +148,5 @@ LINUXCNC = Dialect(
     ),
     harmless_m=frozenset({0, 1, 2, 30, 60, 3, 4, 5, 7, 8, 9, 48, 49, 50, 51, 52, 53}),
     quick=True,
-    writing=Writing((b"(", b")"), b"G4 P0", measured=True),
+    writing=Writing((b"(", b")"), b"G4 P0"),
 )
