@@ -52,28 +52,32 @@ COMMENTS = tuple(
 )
 CODE = (
     _code("siemens", rb"^%_N_", "a program name %_N_"),
-    _code("siemens", rb"\b(MSG|MCALL|CYCLE\d+|HOLES[12]|POCKET\d)\b", "a Siemens cycle or MSG"),
-    _code("siemens", rb"\b(DIAMON|DIAMOF|DIAM90|TRANS|ATRANS|AROT|GOTOF|GOTOB|SUPA|LIMS)\b",
+    _code("siemens", rb"(?<![A-Z_])(MSG|MCALL|CYCLE\d+|HOLES[12]|POCKET\d)\b",
+          "a Siemens cycle or MSG"),
+    _code("siemens", rb"(?<![A-Z_])(DIAMON|DIAMOF|DIAM90|A?TRANS|AROT|GOTOF|GOTOB|SUPA|LIMS)\b",
           "a Siemens word"),
     _code("siemens", rb"^\s*DEF\s+(REAL|INT|BOOL|STRING)", "a Siemens declaration"),
-    _code("siemens", rb"\bG(64[1-5]|50[5-9]|5[1-9]\d)\b", "a Siemens G code"),
+    _code("siemens", rb"(?<![A-Z_])G(64[1-5]|50[5-9]|5[1-9]\d)\b", "a Siemens G code"),
     _code("heidenhain-iso", rb"^\s*%\S+\s+G7[01]\s*\*", "a program head %NAME G71 *"),
     _code("heidenhain-iso", rb"^\s*N?\d*\s*G[0-9].*\*\s*$", "blocks that end with *", sure=False),
     _code("linuxcnc", rb"^\s*(N\d+\s*)?o\s*(<[^>]+>|\d+|\[[^\]]*\])\s*"
           rb"(sub|endsub|call|if|else|endif|while|endwhile|do|repeat|endrepeat|return)\b",
           "O-words of LinuxCNC"),
     _code("linuxcnc", rb"#<[^>]+>", "a variable with a name"),
-    _code("linuxcnc", rb"\bG(5\.2|5\.3|33\.1|38\.[2-5]|43\.2|92\.3)(?!\d)", "a LinuxCNC G code"),
-    _code("linuxcnc", rb"\bM6[2-8]\b", "M62 to M68"),
-    _code("fanuc", rb"\bG(5\.1|54\.1|68\.2|43\.4|43\.5|10\.6)(?!\d)", "a Fanuc G code"),
-    _code("fanuc", rb"\b(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)", "Fanuc macro flow", sure=False),
-    _code("haas", rb"\bG(187|103|150|154)(?!\d)", "a Haas G code"),
-    _code("haas", rb"\bM97\b", "M97"),
-    _code("fanuc-lathe-a", rb"\bG28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
-    _code("fanuc-lathe-a", rb"\bG7[0-6]\s*(P\d+\s*Q|U)", "a turning cycle"),
-    _code("fanuc-lathe-a", rb"\bG50\s*S\d", "G50 S of lathes"),
+    _code("linuxcnc", rb"(?<![A-Z_])G(5\.2|5\.3|33\.1|38\.[2-5]|43\.2|92\.3)(?!\d)",
+          "a LinuxCNC G code"),
+    _code("linuxcnc", rb"(?<![A-Z_])M6[2-8]\b", "M62 to M68"),
+    _code("fanuc", rb"(?<![A-Z_])G(5\.1|54\.1|68\.2|43\.4|43\.5|10\.6)(?!\d)", "a Fanuc G code"),
+    _code("fanuc", rb"(?<![A-Z_])(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)",
+          "Fanuc macro flow", sure=False),
+    _code("haas", rb"(?<![A-Z_])G(187|103|150|154)(?!\d)", "a Haas G code"),
+    _code("haas", rb"(?<![A-Z_])M97\b", "M97"),
+    _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
+    _code("fanuc-lathe-a", rb"(?<![A-Z_])G7[0-6]\s*(P\d+\s*Q|U)", "a turning cycle"),
+    _code("fanuc-lathe-a", rb"(?<![A-Z_])G50\s*S\d", "G50 S of lathes"),
     _code("grbl", rb"^\s*\$(\$|#|G|I|N|X|H|C|J=|\d+=)", "a $ command of grbl"),
-    _code("marlin", rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False),
+    *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
+      for name in ("marlin", "klipper")),
     _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
           rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
 )  # fmt: skip
@@ -131,6 +135,13 @@ def detect_dialect(head: bytes, name: str) -> tuple[Dialect, str]:
     if len(chosen) == 1:
         ((dialect, why),) = chosen.items()
         return DIALECTS[dialect], why
+    if not chosen and _O_PROGRAM.search(code):
+        raise ProgramError(
+            "the program has a number (O...), as fanuc, haas and mach have: which of them it is "
+            "cannot be told",
+            "state it: --dialect, or the machine file's dialect",
+            Place(name),
+        )
     if not chosen:
         raise ProgramError(
             f"the dialect cannot be told from the program (dialect: {AUTO})",

@@ -23,7 +23,6 @@ SHARED = Path(__file__).resolve().parents[2].parent / "shared"
         (b"; generated for Klipper\nG0 X1\n", "klipper"),
         (b"SET_VELOCITY_LIMIT ACCEL=3000\nG0 X1\n", "klipper"),
         (b"; FLAVOR:Marlin\nG0 X1\n", "marlin"),
-        (b"M82\nM104 S200\nG0 X1\n", "marlin"),
         (b"%_N_PART_MPF\n;$PATH=/_N_MPF_DIR\nG0 X1\n", "siemens"),
         (b'N30 MSG("ROUGH")\nG0 X1\n', "siemens"),
         (b"%PART G71 *\nN10 G00 X+1*\n", "heidenhain-iso"),
@@ -32,6 +31,8 @@ SHARED = Path(__file__).resolve().parents[2].parent / "shared"
         (b"%\nO1000\nG5.1 Q1\nG0 X1.\n", "fanuc"),
         (b"%\nO1000\nG28 U0 W0\nG50 S2500\nG0 X1.\n", "fanuc-lathe-a"),
         (b"(FANUC)\nG28 U0 W0\n", "fanuc-lathe-a"),
+        (b"%\nO1\nN10G90G5.1Q1\nN70IF[#101GT10.]GOTO100\n", "fanuc"),
+        (b'N30MSG("A")\nG0X1\n', "siemens"),
         (b"(Post Processor: mach3_mach4_post)\nG0 X1\n", "mach"),
     ],
 )
@@ -45,7 +46,8 @@ def test_the_dialect_is_found(text, dialect):
     ("text", "words"),
     [
         (b"G21 G90\nG0 X1\nM30\n", "cannot be told"),
-        (b"%\nO1000\nG21 G90\nG0 X1.\nM30\n%\n", "cannot be told"),
+        (b"%\nO1000\nG21 G90\nG0 X1.\nM30\n%\n", "fanuc, haas and mach"),
+        (b"M82\nM104 S200\nG0 X1\n", "klipper: printer codes"),
         (b"(FANUC OR SIEMENS)\nG0 X1\n", "several dialects"),
         (b"0 BEGIN PGM PART MM\n1 L X+1 FMAX\n", "Klartext"),
         (b"(O1000 SUB)\nG0 X1\n", "cannot be told"),
