@@ -9,6 +9,7 @@ import io
 import math
 import shutil
 import subprocess
+from bisect import bisect_right
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,7 +17,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import AXES, CERTAIN, Start, read_program, trace
+from gcodejerk.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 STARTUP = "G17 G21 G40 G49 G54 G64 G90 G94 G97"
@@ -206,3 +209,51 @@ def test_drawn_flow_is_read_as_the_interpreter_runs_it(tmp_path_factory, drawn):
         for start in (Start(startup=STARTUP), AT_ZERO):
             wrong, _ = disagreements(data, moves, refusal, start)
             assert not wrong, f"{data.decode()}\n{wrong}\n{refusal}"
+
+
+def ends(moves, spans):
+    """Where each move ends, the points of a stream taken together."""
+    found, before = [], None
+    for line, _, to in moves:
+        row = next((row for first, last, row in spans if first <= line <= last), None)
+        if row is not None and row == before:
+            found[-1] = to
+        else:
+            found.append(to)
+        before = row
+    return found
+
+
+@settings(
+    max_examples=2,
+    deadline=None,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+@given(st.lists(flows(), min_size=12, max_size=12))
+def test_drawn_flow_moves_alike_before_and_after(tmp_path_factory, drawn):
+    folder = tmp_path_factory.mktemp("processed")
+    machine = Machine.load(find_machine("vmc"))
+    planned = 0
+    for k, lines in enumerate(drawn):
+        path = write(folder, k, ["#33=1 #34=2 #35=3", "G21 G90 G94 G64 F100", *lines])
+        moves, refusal = interpret(path)
+        if refusal or not moves:
+            continue
+        result = process(path.read_bytes(), machine, controller="linuxcnc")
+        planned += result.planned
+        after = folder / f"{k}.after.ngc"
+        after.write_bytes(result.output)
+        starts = [0]
+        for text in result.output.splitlines(keepends=True):
+            starts.append(starts[-1] + len(text))
+        spans = [
+            (bisect_right(starts, begin), bisect_right(starts, end - 1), row)
+            for begin, end, row in result.edits.tolist()
+            if row >= 0
+        ]
+        again, refusal = interpret(after)
+        assert not refusal, (refusal, result.output.decode())
+        reached, wanted = ends(again, spans), ends(moves, [])
+        assert reached == [pytest.approx(to, abs=TOLERANCE) for to in wanted], path.read_text()
+    assert planned > 10

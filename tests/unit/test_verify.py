@@ -76,13 +76,13 @@ BACK = stream({"Z": "0"}, {"Z": "-1"}, relative=True)
 
 ORIGINAL = (
     "%\n(part 7)\nG21 G90 G94 G64 P0.01\nF600\nG0 X0 Z0\nN10 G0 Z1. M8 (up)\nX0.8 Z1.6\n"
-    "G1 X2 (cut)\n#1=5\nG0 X#1\nG0 X0\nG91 G0 Z-1\nG90 G1 Z0\nM2\n%\n"
+    "G1 X2 (cut)\n#1=#9\nG0 X#1\nG0 X0\nG91 G0 Z-1\nG90 G1 Z0\nM2\n%\n"
 )
 PROCESSED = (
     "%\n(gcodejerk stamp 0.1.0 0123abcd Mill)\n(part 7)\nG21 G90 G94 G64 P0.01\nF600\nG0 X0 Z0\n"
     f"(gcodejerk: N10 G0 Z1. M8)\nN10 G0  M8 (up)\nG4 P0\n{UP}G0 F600.\n"
     f"(gcodejerk: X0.8 Z1.6)\n{ACROSS}G0 F600.0\n"
-    "G1 X2 (cut)\n#1=5\nG0 X#1\nG0 X0\n"
+    "G1 X2 (cut)\n#1=#9\nG0 X#1\nG0 X0\n"
     f"(gcodejerk: G91 G0 Z-1)\nG91 G0\nG4 P0\n{BACK}G0 F600.\n"
     "G90 G1 Z0\nM2\n%\n"
 )
@@ -176,10 +176,10 @@ DAMAGE = {
     "kept line changed": ("G1 X2 (cut)", "G1 X3 (cut)", Kind.CHANGED),
     "kept comment changed": ("(part 7)", "(part 8)", Kind.CHANGED),
     "kept blank added": ("G1 X2 (cut)", "G1 X2  (cut)", Kind.CHANGED),
-    "kept line end changed": ("#1=5\n", "#1=5\r\n", Kind.LINE_END),
-    "kept line dropped": ("#1=5\n", "", Kind.CHANGED),
-    "kept line doubled": ("#1=5\n", "#1=5\n#1=5\n", Kind.CHANGED),
-    "kept lines swapped": ("#1=5\nG0 X#1\n", "G0 X#1\n#1=5\n", Kind.CHANGED),
+    "kept line end changed": ("#1=#9\n", "#1=#9\r\n", Kind.LINE_END),
+    "kept line dropped": ("#1=#9\n", "", Kind.CHANGED),
+    "kept line doubled": ("#1=#9\n", "#1=#9\n#1=#9\n", Kind.CHANGED),
+    "kept lines swapped": ("#1=#9\nG0 X#1\n", "G0 X#1\n#1=#9\n", Kind.CHANGED),
     "kept rapid changed": ("G0 X0\n(gc", "G0 X1\n(gc", Kind.CHANGED),
     "file cut at a line": ("M2\n%\n", "", Kind.MISSING),
     "file cut in a line": ("M2\n%\n", "M", Kind.CHANGED),
