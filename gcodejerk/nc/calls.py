@@ -19,7 +19,7 @@ from gcodejerk.nc.rapids import USES_FEED
 from gcodejerk.nc.runner import Runner
 
 ALL = 100_000
-"""Executed lines of subprograms, over the whole program."""
+"""Executed lines of subprograms, over the whole program; also lines of them that are kept."""
 MOST_CALLS = 4
 """Calls within calls."""
 _PACKED = 10_000
@@ -35,7 +35,7 @@ class Calls:
         self.runner, self.outline, self._read = runner, outline, read
         self._bodies: dict[int, list[Line] | None] = {}
         """By the line that they begin in."""
-        self._spent = 0
+        self._spent = self._kept = 0
         self._depth = 0
         self._lost = False
         self.main_line = 0
@@ -66,6 +66,9 @@ class Calls:
             runner.log.feed_event(USES_FEED)
             runner.state.forget()
             return True
+        if call.m == 97:
+            # It may also be run into from the line in front of it, which then is at rest or not.
+            runner.log.visits.spoil(body[0].number, body[0].number)
         self._depth += 1
         goes_on = self._repeat(body, found[1])
         self._depth -= 1
@@ -94,7 +97,9 @@ class Calls:
     def _body(self, mark: Mark) -> list[Line] | None:
         """Lines of a subprogram."""
         if mark.line not in self._bodies:
-            self._bodies[mark.line] = self._read(mark)
+            body = self._read(mark) if self._kept < ALL else None
+            self._kept += len(body or ())
+            self._bodies[mark.line] = body
         return self._bodies[mark.line]
 
     def _repeat(self, body: list[Line], count: int) -> bool:
@@ -131,7 +136,7 @@ class Calls:
                 runner.state = runner.state.copy()
                 runner.state.forget()
                 alive = True
-            if not alive or (k == 0 and block.o_word is not None):
+            if not alive or (k == 0 and block.o_word is not None and block.problem is None):
                 continue
             self._spent += 1
             if self._spent > ALL:

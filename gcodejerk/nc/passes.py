@@ -22,6 +22,8 @@ EXACT = 50_000
 """Executed lines, over the whole program, up to which conditions are followed."""
 ALL = 100_000
 """Executed lines at all."""
+MOST_KEPT = 100_000
+"""Lines of subprograms that are kept."""
 MOST_CALLS = 9
 """Calls within calls; LinuxCNC has ten levels."""
 PASSES = 3
@@ -56,7 +58,7 @@ class Passes:
     def __init__(self, runner: Runner) -> None:
         self.runner = runner
         self._subs: dict[str, Node | None] = {}
-        self._spent = 0
+        self._spent = self._kept = 0
         self._depth = 0
         self._lost = False
 
@@ -67,7 +69,9 @@ class Passes:
 
     def define(self, sub: Node) -> None:
         """Keep a subprogram; a second one of its name is an error of the program."""
-        self._subs[sub.name] = None if sub.name in self._subs else sub
+        self._kept += sub.last - sub.line.number
+        known = sub.name in self._subs or self._kept > MOST_KEPT
+        self._subs[sub.name] = None if known else sub
         if self._lost:
             self.runner.log.visits.spoil(sub.line.number, sub.last)
 

@@ -57,9 +57,14 @@ class Visits:
     def finish(self) -> list[Row]:
         """All rapids."""
         found = []
+        spoiled = sorted(self._spoiled)
+        at, until = 0, 0
         for line, row in sorted(self.rows.items()):
+            while at < len(spoiled) and spoiled[at][0] <= line:
+                until = max(until, spoiled[at][1])
+                at += 1
             if row is not None:
-                if row["reason"] == CERTAIN and any(a <= line <= b for a, b in self._spoiled):
+                if row["reason"] == CERTAIN and line <= until:
                     row["reason"] = SUBPROGRAM
                 found.append(row)
         return found
