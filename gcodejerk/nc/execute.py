@@ -397,7 +397,8 @@ class Executor:
     def _plane_axes(self) -> list[int]:
         """List the axes that cutter compensation may displace."""
         plane = self.state.plane
-        letters = "XYZUVW" if plane is None else PLANES[plane][:2]
+        # Heidenhain's G20 is a plane that nothing here knows.
+        letters = PLANES[plane][:2] if plane in PLANES else "XYZUVW"
         return [AXES.index(letter) for letter in letters]
 
 
