@@ -412,6 +412,7 @@ class Executor:
     def _plane_axes(self) -> list[int]:
         """List the axes that cutter compensation may displace."""
         plane = self.state.plane
+        # Heidenhain's G20 is a plane that nothing here knows.
         letters = PLANES[plane][:2] if plane in PLANES else "XYZUVW"
         return [AXES.index(letter) for letter in letters]
 

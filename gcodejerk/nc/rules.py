@@ -107,7 +107,9 @@ def _arc_complete(values: dict[str, float], plane: int | None) -> bool:
     """Whether an arc has a centre or a radius, and no word of another plane, if that is given."""
     centres = [letter for letter in "IJK" if letter in values]
     if "R" in values:
-        return not centres and (plane is None or any(axis in values for axis in PLANES[plane][:2]))
+        return not centres and (
+            plane not in PLANES or any(axis in values for axis in PLANES[plane][:2])
+        )
     if not centres or plane is None:
         return bool(centres)
     allowed = ARC_CENTRES.get(plane)

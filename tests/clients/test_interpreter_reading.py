@@ -312,6 +312,21 @@ CASES = [
     b"F100 G0 Z10\nG91 G98 G81 X1 Y1 Z-5 R-3 L2\nX3\nX2 R3\nX2\nG80\nG0 X1\nM2\n",
     b"F100 G0 Z10\nG99 G81 X1 Y1 Z-5 R2\nG91\nX5\nG90 X7\nG80\nG0 X9\nM2\n",
     b"F100 G0 Z10\nG98 G81 X1 Y1 Z-5 R-6\nG0 X3\nM2\n",
+    b"o1 call\nG0 X1\nM2\no1 sub\nG0 X5\no1 endsub\n",
+    b"o1 sub\nG0 X#1 Y#2 Z#30\no1 endsub\no1 call [3]\nG0 Z1\nM2\n",
+    b"#1=7 #<a>=3\no1 sub\n#1=9 #31=4 #<a>=8\no1 endsub\no1 call [3]\nG0 X#1 Y#31 Z#<a>\nM2\n",
+    b"o1 sub\nG0 X1\no1 return [5]\nG0 X2\no1 endsub [7]\no1 call\nG0 X#<_value>\nM2\n",
+    b"o1 repeat [2.6]\nG91 G0 X1\no1 endrepeat\no2 repeat [-1]\nX1\no2 endrepeat\nY1\nM2\n",
+    b"o1 sub\nG91\nM73\nG21\nG90\no1 endsub\no1 call\nG0 X1\nX1\nM2\n",
+    b"o1 if [1]\no2 sub\nG0 X1\no2 endsub\no1 endif\no2 call\nG0 Y1\nM2\n",
+    b"o1 sub\nG0 X1\nM2\no1 endsub\no1 call\nG0 X2\nM2\n",
+    b"o1 sub\nG0 X1\no1 endsub\no1 sub\nG0 X2\no1 endsub\no1 call\nM2\n",
+    b"#1=5 G0 X#1\n#1=6 #2=#1\nG0 X#1 Y#2\nX-#1 Y-[#1] Z+#1\nM2\n",
+    b"o1 sub\no2 if [#1 GT 3]\nG0 X#1\no1 return\no2 endif\no1 call [#1+1]\nY#1\no1 endsub\n"
+    b"o1 call [0]\nG0 Z1\nM2\n",
+    b"o<a b> sub\nG0 X#1\no<AB> endsub\no<ab> call [1+1] [3]\nG0 Y1\nM2\n",
+    b"o1 sub\nT2 M6\nG43\nG0 Z5\no1 endsub\no1 call\nG0 X1\no1 call\nG0 Z1\nM2\n",
+    b"o1 while [#5420 LT 3]\nG91 G0 X1\no1 endwhile\nG90 G0 Y1\nM2\n",
 ]
 
 

@@ -295,3 +295,9 @@ def test_chunks_cut_anywhere_give_the_same_rapids(monkeypatch):
     parts = read(data).rapids
     for name in ("line", "begin", "end", "terminator", "reason", "target", "feed_needed"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(parts, name))
+
+
+def test_plane_that_has_no_axes_here_is_no_bug():
+    text = b"%X G71 *\nG20 G90 *\nG2 X1 Y1 R5 *\nG0 X1 *\nG41 X2 *\nG0 Y5 *\n"
+    rapids = read(text, dialect="heidenhain-iso").rapids
+    assert not (rapids.reason == CERTAIN).any()
