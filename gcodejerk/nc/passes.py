@@ -61,6 +61,8 @@ class Passes:
         self._spent = self._kept = 0
         self._depth = 0
         self._lost = False
+        self._broken = False
+        """A ``break`` has run: LinuxCNC 2.9 then ends a later ``do`` after its first pass."""
 
     @property
     def exhausted(self) -> bool:
@@ -146,6 +148,7 @@ class Passes:
             return {RETURN: state}
         if node.kind in ("break", "continue"):
             self._count()
+            self._broken |= node.kind == "break"
             return {f"{node.kind} {node.name}": state}
         if node.kind == "repeat":
             return self._repeat(node, state)
@@ -239,7 +242,7 @@ class Passes:
                 value = self._known(node.condition, current)
                 if value == 0.0:
                     break
-                if value is None:
+                if value is None or self._broken:
                     leave = _either(leave, current.copy())
                     _add(exits, self._settle(node, current, test_first))
                     current = exits.pop(NEXT, None)

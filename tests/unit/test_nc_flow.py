@@ -195,3 +195,13 @@ def test_nested_loops_of_unknown_length_end():
     text = b"".join(b"o%d while [#31 GT 0]\n#%d=[#%d+1]\n" % (k, k, k) for k in range(1, depth))
     text += b"G91 G0 X1\n" + b"".join(b"o%d endwhile\n" % k for k in range(depth - 1, 0, -1))
     assert end(text + b"G90 G0 Y3\n")[0] is None
+
+
+def test_a_break_makes_the_passes_of_a_later_do_unknown():
+    # LinuxCNC 2.9 remembers the break, and ends the next do after one pass: measured.
+    text = (
+        b"#1=0\no1 while [#1 LT 3]\n#1=[#1+1]\no2 if [#1 EQ 1]\no1 break\no2 endif\no1 endwhile\n"
+    )
+    loop = b"#2=0\no3 do\n#2=[#2+1]\nG0 X#2\no3 while [#2 LT 3]\nG0 Y1\n"
+    assert end(text + loop) == [None, 1, 0]
+    assert end(loop) == [3, 1, 0]
