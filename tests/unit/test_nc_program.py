@@ -294,3 +294,21 @@ def test_chunks_cut_anywhere_give_the_same_rapids(monkeypatch):
     parts = read(data).rapids
     for name in ("line", "begin", "end", "terminator", "reason", "target", "feed_needed"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(parts, name))
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        # K0 stores the cycle and drills nothing; every position that follows drills.
+        b"G81 X1. Y1. Z-5. R2. F100 K0\n",
+        b"G81 X1. Y1. Z-5. R9.\nG20\n",
+        b"G81 X1. Y1. Z5. R2.\n",
+        b"/G81 X1. Y1. Z-5. R2.\n",
+        b"G81 X1. Y1. Z-5. R2.\nX1. X2.\n",
+    ],
+)
+def test_a_cycle_that_may_be_in_force_makes_no_position_a_rapid(lines):
+    data = b"G21 G90 G17 G94 G64 F100\nG0 X0. Y0. Z9.\n" + lines + b"X5. Y5.\nX6.\nX7. Y9.\nM30\n"
+    rapids = read_program(io.BytesIO(data), dialect="fanuc", start=Start()).rapids
+    later = rapids.line > 2 + lines.count(b"\n")
+    assert not (later & (rapids.reason == CERTAIN)).any()
