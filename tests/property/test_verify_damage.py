@@ -6,6 +6,7 @@ once more with the sum put right by this file, so that what the other checks not
 """
 
 import hashlib
+import random
 import re
 from dataclasses import replace
 
@@ -20,7 +21,7 @@ from gcodejerk.verification import verify
 
 SETTINGS = settings(
     deadline=None,
-    max_examples=2,
+    max_examples=1,
     # Which damage was missed matters, not the smallest program for it.
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
     suppress_health_check=list(HealthCheck),
@@ -59,7 +60,9 @@ def calm_programs(draw, dialect):
     else:
         lines = list(words.head)
         axes, incremental, stated = words.axes, words.incremental and not words.stated, words.stated
-        between = ["G1 X2.5 F90", "M5", words.comments[0]]
+        # Rapids of printers run at F: at a low one, a point less is no more than rounding.
+        feed = "F3000" if stated else "F90"
+        between = [f"G1 X2.5 {feed}", "M5", words.comments[0]]
     for _ in range(draw(st.integers(2, 4))):
         named = draw(st.lists(st.sampled_from(axes), min_size=1, max_size=3, unique=True))
         mode = draw(st.sampled_from(["G90 ", "G91 ", ""])) if incremental else ""
@@ -276,7 +279,7 @@ DAMAGE = {
     "G61.1 for G61": lambda t, p, e: _of(t, t.tails, rb"G61(?!\.)", b"G61.1"),
     "G95 left behind": lambda t, p, e: t.sub(e, rb"G0", b"G0 G95"),
     "G91 left behind": lambda t, p, e: t.sub(
-        e, rb"G0", b"G0 G90" if t.incremental(p) else b"G0 G91"
+        e, rb"G0", b"G0 G90" if t.incremental(e) else b"G0 G91"
     ),
     "both distance modes": lambda t, p, e: t.sub(e, rb"G0", b"G0 G91 G90"),
     "plane changed": lambda t, p, e: t.sub(e, rb"G0", b"G0 G19"),
@@ -390,33 +393,46 @@ APPLIED = set()
 """Kinds of damage that some drawn program of this run had room for."""
 
 
-@pytest.mark.parametrize("dialect", DIALECTS)
-@SETTINGS
-@given(st.data(), st.randoms(use_true_random=False))
-def test_every_damage_is_noticed(dialect, data, pick):
-    program, machine = data.draw(calm_programs(dialect)), machine_for(dialect)
-    controller = dialect.split("-")[0]
+def missed(dialect, program, pick):
+    """Kinds of damage to a processed program that nobody notices."""
+    machine, controller = machine_for(dialect), dialect.split("-")[0]
     output = process(program, machine, verify=False, controller=controller, dialect=dialect).output
     assume(b"gcodejerk stamp" in output)
     text = Damaged(program, output, dialect)
     assume(text.inner and text.tails and text.kept)
     assert verify(program, output, machine, dialect=dialect).ok
-    missed = []
+    out = []
     for name, damage in DAMAGE.items():
         damaged = damage(text, pick.choice(text.inner), pick.choice(text.tails))
         if damaged is None or damaged == output:
             continue
         APPLIED.add(name)
         if verify(program, damaged, machine, dialect=dialect, most=1).ok:
-            missed.append(f"{name}, by the sum too")
+            out.append(f"{name}, by the sum too")
         if name not in SUM_ALONE:
             whole = with_its_sum(damaged)
             if verify(program, whole, machine, dialect=dialect, most=1).ok:
-                missed.append(name)
-    assert not missed
+                out.append(name)
+    return out
 
 
-def test_every_kind_of_damage_was_done():
-    if len(APPLIED) < 50:
-        pytest.skip("the drawn programs were not run in this process")
+@pytest.mark.parametrize("dialect", DIALECTS)
+@SETTINGS
+@given(st.data(), st.randoms(use_true_random=False))
+def test_every_damage_is_noticed(dialect, data, pick):
+    assert missed(dialect, data.draw(calm_programs(dialect)), pick) == []
+
+
+def test_every_kind_of_damage_is_done_to_programs_that_have_room_for_all():
+    moves = (
+        "N7 G0 X12.5 Y-7. M8\n(cut)\nG1 X2.5 F33.\nG0 Z3.4 M1\nG91 G0 X3.3\nN9 G90 G1 Z1. F20.\nM2\n"
+    )
+    APPLIED.clear()
+    for dialect, head in (
+        ("linuxcnc", "G21 G90 G94 G61\nF60\nG0 X0 Y0 Z0\n"),
+        ("linuxcnc", "G21 G90 G93 G61.1\nG0 X0 Y0 Z0\n"),
+        ("fanuc", "G21 G17 G40 G90 G94 G64\nG0 X0. Y0. Z0. F200.\n"),
+    ):
+        program = (head + moves).replace("F33.", "F33." if "G93" not in head else "F2.").encode()
+        assert missed(dialect, program, random.Random(3)) == []
     assert set(DAMAGE) == APPLIED
