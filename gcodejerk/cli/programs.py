@@ -263,7 +263,8 @@ def verify(
         cycles = f"{written} cycles written out, " if expand_cycles else ""
         print(
             f"{processed}: is {original} with {cycles}{found.rewritten} of its {found.rapids} "
-            "rapids re-timed and nothing else changed"
+            "rapids re-timed and nothing else changed; "
+            f"{found.confirmed} of {found.rewritten} confirmed by a second reading"
         )
         return
     more = " or more" if len(found.violations) >= most else ""

@@ -42,7 +42,8 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     """
     if state.plane is None or code in rules.unknown_ends:
         state.forget_positions()
-        state.put("cycle", None)
+        state.put("cycle", (code, NAN, NAN))
+        state.put("cycle_level", NAN)
         return True
     plane = PLANES[state.plane]
     first, second, along = (AXES.index(axis) for axis in plane)

@@ -199,6 +199,8 @@ class Dialect:
     """Address of increments -> its axis, for example U -> X."""
     whole_numbers: Literal["units", "machine"] = "units"
     """Is X100 100 mm? It is; or a parameter of the machine decides."""
+    diameter_codes: bool = False
+    """A program may state whether X is a diameter."""
     feed_of_mixed: bool = False
     """What F means where linear and rotary axes move together is known: it is the speed of the
     linear ones."""

@@ -221,7 +221,9 @@ class Executor:
         if unit != state.unit:
             for name in ("feed", "path_p", "path_q"):
                 state.put(name, NAN)
-            state.put("cycle", None)
+            if state.cycle is not None:
+                state.put("cycle", (state.cycle[0], NAN, NAN))
+                state.put("cycle_level", NAN)
         state.put("unit", unit)
         state.put("unit_stated", True)
 
@@ -340,6 +342,8 @@ class Executor:
                 step.fault = True
                 state.forget_positions()
                 state.put("cycle", None)
+                if dialect.drilling.own_group:
+                    state.lose_cycle()  # refused or not (K0): positions may drill from here on
             return
         step.rapid = motion == dialect.rapid
         if effect == "machine":

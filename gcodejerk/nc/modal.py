@@ -158,6 +158,11 @@ class State:
         if self.touched is not None:
             self.touched.add("#")
 
+    def lose_cycle(self) -> None:
+        """No longer know whether a cycle is in force: a position may be a hole or a move."""
+        self.put("cycle", None)
+        self.put("motion", None)
+
     def forget_positions(self, axes: Iterable[int] = range(len(AXES))) -> None:
         """Forget the positions of these axes."""
         for axis in axes:
@@ -216,6 +221,8 @@ class State:
                 self.forget_variables()
             elif name.startswith("#"):
                 self.set_variable(name[1:], NAN)
+            elif name == "cycle":
+                self.lose_cycle()
             else:
                 self.put(name, None)
 
@@ -273,7 +280,7 @@ def join(before: State, after: State) -> State:
     if before.rotated != after.rotated:
         joined.put("rotated", None)
     if before.cycle != after.cycle:
-        joined.put("cycle", None)
+        joined.lose_cycle()
     names = before.transforms.keys() | after.transforms.keys()
     both = {n: (before.transforms.get(n, False), after.transforms.get(n, False)) for n in names}
     joined.put("transforms", {n: a if a == b else None for n, (a, b) in both.items()})

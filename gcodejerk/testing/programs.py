@@ -13,10 +13,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import Program, Start
+from gcodejerk.nc import Program, Start, find_dialect
 from gcodejerk.nc.chunks import read_chunks
 from gcodejerk.nc.modal import MODES
 from gcodejerk.nc.program import follow, open_reader
+from gcodejerk.testing.vocabulary import VOCABULARIES, draw_lines
 
 Draw = st.DrawFn
 
@@ -177,20 +178,33 @@ def programs(draw: Draw, dialect: str = "linuxcnc") -> bytes:
     draw : callable
         Given by hypothesis.
     dialect : str, optional
-        How they are written; so far ``linuxcnc``.
+        How they are written: one of those in which streams can be written.
 
     Returns
     -------
     bytes
-        A program that ends with M2 or between two lines of ``%``.
+        A program that ends with M2 or M30, or between two lines of ``%``.
 
     Examples
     --------
     >>> isinstance(programs(), st.SearchStrategy)
     True
     """
-    if dialect != "linuxcnc":
-        raise ProgramError(f"no programs are drawn for '{dialect}'", "choose linuxcnc")
+    newline = draw(st.sampled_from([b"\n", b"\n", b"\r\n"]))
+    if dialect == "linuxcnc":
+        lines = _linuxcnc_lines(draw)
+    elif dialect in VOCABULARIES:
+        lines = _other_lines(draw, dialect)
+    else:
+        raise ProgramError(
+            f"no programs are drawn for '{dialect}'",
+            f"choose one of: linuxcnc, {', '.join(VOCABULARIES)}",
+        )
+    return newline.join(lines) + (newline if draw(st.booleans()) else b"")
+
+
+def _linuxcnc_lines(draw: Draw) -> list[bytes]:
+    """Draw the lines of a program for LinuxCNC."""
     blocks = [["G21", "G90", "G17", "G94", "F300"]] if draw(st.booleans()) else [["F300"]]
     for _ in range(draw(st.integers(1, 8))):
         kind = draw(st.integers(0, 9))
@@ -210,7 +224,22 @@ def programs(draw: Draw, dialect: str = "linuxcnc") -> bytes:
     lines = [
         _line(draw, words, 10 * (k + 1) if numbered else None) for k, words in enumerate(blocks)
     ]
-    end = draw(st.sampled_from([b"M2", b"M30"]))
-    newline = draw(st.sampled_from([b"\n", b"\n", b"\r\n"]))
-    lines = [b"%", *lines, end, b"%"] if draw(st.booleans()) else [*lines, end]
-    return newline.join(lines) + (newline if draw(st.booleans()) else b"")
+    lines.append(draw(st.sampled_from([b"M2", b"M30"])))
+    return [b"%", *lines, b"%"] if draw(st.booleans()) else lines
+
+
+def _other_lines(draw: Draw, dialect: str) -> list[bytes]:
+    """Draw the lines of a program in another dialect, with numbers and what they end with."""
+    rules, words = find_dialect(dialect).text, VOCABULARIES[dialect]
+    lines = draw_lines(draw, words)
+    if draw(st.booleans()):
+        first = 1 if lines[0].startswith("O") else 0
+        numbered = [f"N{10 * k} {line}" for k, line in enumerate(lines[first:], 1)]
+        if rules.delete == "first":
+            numbered = [
+                line if mark.startswith("/") else number
+                for number, mark, line in zip(numbered, lines[first:], lines[first:], strict=True)
+            ]
+        lines = [*lines[:first], *numbered]
+    out = [line.encode() for line in lines]
+    return [b"%", *out, b"%"] if rules.percent == "lone" and draw(st.booleans()) else out

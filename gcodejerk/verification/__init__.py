@@ -2,7 +2,9 @@
 
 It reads both files from their bytes, with means of its own: how a stream was planned or written
 it does not know and cannot ask (`tests/unit/test_layers.py`). What it shares with the writing
-side is `nc`, which says where the rapids are and what is in force there.
+side is `nc`, which says where the rapids are and what is in force there; and that is not taken on
+trust: a second reader (`reading`, `sorting`, `known`, `tracking`), which shares nothing with `nc`
+but the dialects' tables, has to agree wherever it knows (`agreement`).
 
     verify(original, processed, machine)       -> Verification
     require(verification)                      raises VerifyError unless it is all right
@@ -25,6 +27,7 @@ from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
 from gcodejerk.start import program_start
+from gcodejerk.verification.agreement import confirm
 from gcodejerk.verification.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.findings import Findings, Kind, Verification, Violation, require
 from gcodejerk.verification.form import Stream
@@ -153,6 +156,8 @@ def verify_files(
     ProgramError
         The original cannot be a program.
     """
+    start = program_start(machine) if start is None else start
+    begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
     walk = Walk(Window(original), Window(processed), program, found)
@@ -161,7 +166,11 @@ def verify_files(
     for streams in _batches(_checked(walk, reader)):
         _judge(reader.paths(streams), program, machine, stride, found)
     walk.check_sum()
-    return Verification(len(program.rapids), walk.rewritten, walk.kept, found.sorted(), names)
+    original.seek(begin)
+    confirmed = confirm(original, program.dialect, start, program.rapids, walk.replaced, found)
+    return Verification(
+        len(program.rapids), walk.rewritten, walk.kept, found.sorted(), names, confirmed
+    )
 
 
 def verify_csv(
@@ -193,12 +202,18 @@ def verify_csv(
     ProgramError
         The original cannot be a program.
     """
+    start = program_start(machine) if start is None else start
+    begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
     reader = TableReader(table, program.rapids, machine, found)
     for paths in reader.paths():
         _judge(paths, program, machine, 1, found)
-    return Verification(len(program.rapids), reader.rewritten, 0, found.sorted(), names)
+    original.seek(begin)
+    confirmed = confirm(original, program.dialect, start, program.rapids, reader.replaced, found)
+    return Verification(
+        len(program.rapids), len(reader.replaced), 0, found.sorted(), names, confirmed
+    )
 
 
 def _read(
@@ -206,7 +221,7 @@ def _read(
     machine: Machine,
     name: str,
     dialect: str | Dialect | None,
-    start: Start | None,
+    start: Start,
 ) -> Program:
     """Read the original, then go back to its beginning."""
     begin = original.tell()
@@ -214,7 +229,7 @@ def _read(
         original,
         name=name,
         dialect=dialect or machine.dialect,
-        start=program_start(machine) if start is None else start,
+        start=start,
     )
     original.seek(begin)
     return program

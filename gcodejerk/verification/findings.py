@@ -46,6 +46,7 @@ class Kind(enum.StrEnum):
     RESIDUAL = "residual"
     TABLE = "table"
     CYCLE = "moves of a cycle"
+    READING = "second reading"
     SERIES = "cycle that had to be left to the controller"
 
 
@@ -73,6 +74,9 @@ class Verification:
     """Lines of the original that are in the processed file as they were."""
     violations: tuple[Violation, ...]
     names: tuple[str, str] = ("<original>", "<processed>")
+    confirmed: int = 0
+    """Rewritten rapids of which a second reading of the original, which shares nothing with the
+    first, says the same; of the others it does not know."""
 
     @property
     def ok(self) -> bool:

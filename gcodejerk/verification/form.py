@@ -34,6 +34,8 @@ _WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
 _WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
 _IS_POINT = re.compile(rb"[ \t]*G0?1(?![0-9.])")
 _COMMENT = re.compile(rb"(?:\(gcodejerk: ([ -'*-~]*)\)|; gcodejerk: ([ -'*-~]*))")
+# Zero is zero with a decimal point and without.
+_WHOLE = re.compile(rb"[A-FH-Z][ \t]*+[-+]?+0*+[1-9][0-9]*+(?!\.)")
 _EXACT = Context(prec=200)
 
 
@@ -338,9 +340,17 @@ class StreamReader:
             if len(stream.rest) > PIECE:
                 self.complain(Kind.FORM, "stream is endless")
                 return None
+            self._points_in(line)
             self.next()
+        self._points_in(stream.text)
         self.modes.motion, self.modes.feed = 1, None
         return stream
+
+    def _points_in(self, text: bytes) -> None:
+        """Where X12 may be 12 steps of the control, every length has its decimal point."""
+        if self.dialect.whole_numbers == "machine" and (match := _WHOLE.search(text)):
+            shown = match[0].decode("latin-1")
+            self.complain(Kind.FORM, f"{shown} has no decimal point: the control may scale it")
 
     def _tail(self) -> bool:
         stops = [(w.letter, w.value) for w in self.block.words if _is_stop(w.letter, w.value)]
@@ -351,6 +361,7 @@ class StreamReader:
             self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
             return False
         self._compare(Modes.after(self.rapids, self.i))
+        self._same_scale(line)
         self.last(more=bool(stops))
         if stops:
             line = self.window.peek_line().rstrip(b"\r\n")
@@ -361,6 +372,14 @@ class StreamReader:
                 return False
             self.last(more=False)
         return True
+
+    def _same_scale(self, line: bytes) -> None:
+        """F is restored as it was written: with a decimal point or without."""
+        whole = _WHOLE.search(line) is not None
+        machine = self.dialect.whole_numbers == "machine"
+        if machine and b"F" in line and whole != bool(self.rapids.feed_whole[self.i]):
+            how = "without" if whole else "with"
+            self.complain(Kind.FEED_RESTORED, f"F is restored {how} a decimal point")
 
     def _compare(self, wanted: Modes) -> None:
         """Compare what is in force after the stream with what was after the block."""

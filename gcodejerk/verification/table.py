@@ -39,7 +39,8 @@ class TableReader:
         """Of the next row, in the table."""
         self.at = 0
         """Rapids before this one are done."""
-        self.rewritten = 0
+        self.replaced: list[int] = []
+        """Indices of the rapids that have rows."""
 
     def paths(self) -> Iterator[Paths]:
         """Read the table, many rapids at a time."""
@@ -87,7 +88,7 @@ class TableReader:
                 continue
             self.at = i + 1
             good[k] = self._frame(rows[begin[k] : end[k]], i, int(first[k]))
-        self.rewritten += int(np.count_nonzero(good))
+        self.replaced += index[good].tolist()
         if not good.any():
             return
         keep = np.repeat(good, end - begin)

@@ -32,12 +32,18 @@ class Walk:
         self.at = 0
         """Place in the original, in bytes."""
         self.kept = 0
-        self.rewritten = 0
+        self.replaced: list[int] = []
+        """Indices of the rapids that have a stream."""
         self.block = b""
         """Text of the block whose stream was found last."""
         self.dialect = find_dialect(program.dialect)
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
+
+    @property
+    def rewritten(self) -> int:
+        """How many rapids have a stream."""
+        return len(self.replaced)
 
     def streams(self) -> Iterator[Stream]:
         """Find the streams, in the order of the file."""
@@ -67,7 +73,7 @@ class Walk:
                 stream = reader.read()
                 if stream is None:
                     return
-                self.rewritten += 1
+                self.replaced.append(i)
                 self.block = text
                 yield stream
             self.original.skip(len(block))

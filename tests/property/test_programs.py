@@ -7,7 +7,8 @@ from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import CERTAIN, REASONS, read_program
+from gcodejerk.nc import CERTAIN, REASONS, Start, read_program
+from gcodejerk.nc.dialects import DIALECTS
 from gcodejerk.reasons import Reason
 from gcodejerk.testing.programs import programs
 
@@ -63,8 +64,21 @@ def test_drawn_programs_are_varied(condition):
 
 
 def test_a_dialect_that_is_not_drawn_is_refused():
-    with pytest.raises(ProgramError, match="fanuc"):
-        find(programs(dialect="fanuc"), lambda data: True)
+    with pytest.raises(ProgramError, match="heidenhain"):
+        find(programs(dialect="heidenhain-iso"), lambda data: True)
+
+
+WRITTEN = sorted(name for name, dialect in DIALECTS.items() if dialect.writing is not None)
+
+
+@pytest.mark.parametrize("dialect", WRITTEN)
+def test_programs_are_drawn_for_every_dialect_that_has_streams(dialect):
+    start = Start(decimal_point="calculator", diameter="lathe" in dialect)
+
+    def holds(data):
+        return CERTAIN in read_program(io.BytesIO(data), dialect=dialect, start=start).rapids.reason
+
+    assert find(programs(dialect), holds, settings=ANY)
 
 
 @given(st.data())

@@ -43,6 +43,8 @@ NEVER = {
     "emit": {"verification", "report"},
 }
 """What the picture alone would allow, or what matters enough to be said twice."""
+SECOND_READER = ("reading", "sorting", "known", "tracking")
+"""Modules of `verification` that read programs without the help of `nc`, but for its tables."""
 FOREIGN = {
     "yaml": {"machine"},
     "typer": {"cli"},
@@ -135,6 +137,18 @@ def test_imports_point_left(path):
 )
 def test_the_picture_forbids_what_it_is_there_to_forbid(importer, imported):
     assert not allowed(importer, imported)
+
+
+@pytest.mark.parametrize("name", SECOND_READER)
+def test_the_second_reader_shares_nothing_with_the_first_but_the_tables(name):
+    own = {f"gcodejerk.verification.{other}" for other in SECOND_READER}
+    may = own | {"gcodejerk.nc.dialect", "gcodejerk.units"}
+    modules = {
+        found
+        for found in imports(ROOT / "verification" / f"{name}.py")
+        if found.startswith("gcodejerk")
+    }
+    assert all(any(f"{found}.".startswith(f"{one}.") for one in may) for found in modules), modules
 
 
 def test_imports_are_found_however_they_are_written(tmp_path, monkeypatch):

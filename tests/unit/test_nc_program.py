@@ -301,3 +301,21 @@ def test_plane_that_has_no_axes_here_is_no_bug():
     text = b"%X G71 *\nG20 G90 *\nG2 X1 Y1 R5 *\nG0 X1 *\nG41 X2 *\nG0 Y5 *\n"
     rapids = read(text, dialect="heidenhain-iso").rapids
     assert not (rapids.reason == CERTAIN).any()
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        # K0 stores the cycle and drills nothing; every position that follows drills.
+        b"G81 X1. Y1. Z-5. R2. F100 K0\n",
+        b"G81 X1. Y1. Z-5. R9.\nG20\n",
+        b"G81 X1. Y1. Z5. R2.\n",
+        b"/G81 X1. Y1. Z-5. R2.\n",
+        b"G81 X1. Y1. Z-5. R2.\nX1. X2.\n",
+    ],
+)
+def test_a_cycle_that_may_be_in_force_makes_no_position_a_rapid(lines):
+    data = b"G21 G90 G17 G94 G64 F100\nG0 X0. Y0. Z9.\n" + lines + b"X5. Y5.\nX6.\nX7. Y9.\nM30\n"
+    rapids = read_program(io.BytesIO(data), dialect="fanuc", start=Start()).rapids
+    later = rapids.line > 2 + lines.count(b"\n")
+    assert not (later & (rapids.reason == CERTAIN)).any()

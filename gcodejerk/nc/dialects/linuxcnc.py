@@ -122,6 +122,7 @@ LINUXCNC = Dialect(
     centres_of_plane=True,
     feed_of_mixed=True,
     paths={610: 61, 611: 62, 640: 64},
+    diameter_codes=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),
     drilling=Drilling(CYCLES, frozenset({760}), own_group=False, repeats="L", missing="error"),
     # "Expressions" and "Binary operators" of the manual; measured where it is silent: AND and OR

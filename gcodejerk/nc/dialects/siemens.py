@@ -113,6 +113,7 @@ SIEMENS = Dialect(
     units={700: True, 710: False, 7000: True, 7100: False},
     feed_modes={930: 93, 940: 94, 950: 95},
     paths={600: 61, 640: 64, 6410: 64, 6420: 64, 6430: 64, 6440: 64, 6450: 64},
+    diameter_codes=True,
     tool_frame=frozenset("TD"),
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),

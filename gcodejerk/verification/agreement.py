@@ -1,0 +1,217 @@
+"""Whether the second reading agrees with what `nc` says of each rewritten rapid.
+
+Everything else that is verified rests on where `nc` believes a rapid to start and end, and on what
+it believes to be in force. Here the original is read once more (`reading`, `tracking`).
+
+Rule: where the second reading knows, it must agree, or the file is refused. Where it does not know,
+it says so by a number and nothing is refused: `nc` follows more than it does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any, BinaryIO
+
+from gcodejerk.nc import AXES, Dialect, Rapids, Start, find_dialect
+from gcodejerk.units import MM_PER_INCH
+from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.known import Facts
+from gcodejerk.verification.reading import Line, Text, jumps_back, pieces
+from gcodejerk.verification.tracking import Sighting, Tracker
+
+NEAR = 1e-6
+"""Two sums of the same numbers may differ by this much. [mm] or [deg]"""
+
+
+def confirm(
+    original: BinaryIO,
+    dialect: Dialect | str,
+    start: Start,
+    rapids: Rapids,
+    rewritten: Iterable[int],
+    found: Findings,
+) -> int:
+    """Read the original a second time and compare.
+
+    Parameters
+    ----------
+    original : BinaryIO
+        Seekable; read from where it stands to its end.
+    dialect : Dialect or str
+        How it is written.
+    start : Start
+        What it may assume when it starts.
+    rapids : Rapids
+        What `nc` says.
+    rewritten : iterable of int
+        Indices of the rapids that were replaced, ascending.
+    found : Findings
+        Where they disagree.
+
+    Returns
+    -------
+    int
+        How many of them the second reading confirms.
+    """
+    index = list(rewritten)
+    if not index:
+        return 0
+    confirmed = 0
+    lines = rapids.line[index].tolist()
+    for k, seen in sightings(original, find_dialect(dialect), start, lines):
+        i = index[k]
+        problem = _disagreement(seen, rapids, i)
+        if problem:
+            found.add(
+                Kind.READING,
+                None,
+                int(rapids.line[i]),
+                f"a second reading of the program does not agree: {problem}",
+                "leave this rapid alone, and report the program: one of two readings is wrong",
+            )
+        else:
+            confirmed += _is_known(seen, rapids, i)
+    return confirmed
+
+
+def sightings(
+    original: BinaryIO, dialect: Dialect, start: Start, lines: list[int]
+) -> Iterator[tuple[int, Sighting]]:
+    """What the second reading sees in these lines.
+
+    Parameters
+    ----------
+    original : BinaryIO
+        Seekable; read from where it stands to its end.
+    dialect : Dialect
+        How it is written.
+    start : Start
+        What it may assume when it starts.
+    lines : list of int
+        Ascending, counted from 1.
+
+    Yields
+    ------
+    k : int
+        Index into `lines`.
+    seen : Sighting
+    """
+    begin = original.tell()
+    doubt = jumps_back(original, dialect)
+    original.seek(begin)
+    decimals = dialect.whole_numbers == "machine" and start.decimal_point != "calculator"
+    text = Text(dialect, decimals)
+    tracker = _begin(text, dialect, start)
+    tracker.doubt = doubt
+    number, wanted, following = 1, iter([*lines, math.inf]), 0
+    line: float = next(wanted)
+    for data in pieces(original):
+        at, size = 0, len(data)
+        while at < size:
+            run = None
+            if tracker.may_run:
+                run = text.take_run(data, at, stated=not tracker.feeding)
+            if run is not None:
+                tracker.run(run[0])
+                number, at = number + run[0].lines, run[1]
+                while line < number:
+                    yield following, Sighting(against="it moves with feed")
+                    line, following = next(wanted), following + 1
+                continue
+            end = data.find(b"\n", at)
+            end = size if end < 0 else end
+            bare = data[at:end]
+            bare = bare[:-1] if bare.endswith(b"\r") else bare
+            seen = tracker.follow(text.read(bare, not tracker.begun))
+            if number == line:
+                yield following, seen
+                line, following = next(wanted), following + 1
+            number, at = number + 1, end + 1
+
+
+def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
+    """A tracker in the state that programs start in."""
+    tracker = Tracker(
+        dialect,
+        Facts(
+            start.positions,
+            start.offsets,
+            start.tool_lengths,
+            start.inch,
+            start.diameter,
+            start.decimal_point,
+        ),
+    )
+    codes = text.read(start.startup.encode("latin-1", "replace"), first=False)
+    for words in [[word] for word in codes.words] if dialect.one_command else [codes.words]:
+        tracker.follow(Line(words=words))
+    tracker.place()
+    return tracker
+
+
+def _disagreement(seen: Sighting, rapids: Rapids, i: int) -> str:
+    """In what the two readings differ; empty where they do not."""
+    if seen.against:
+        return f"this rapid had to be left alone, since {seen.against}"
+    if not seen.modes:
+        return ""
+    if seen.sure and seen.axes != int(rapids.words[i]):
+        return f"the block names {_names(seen.axes)}, not {_names(int(rapids.words[i]))}"
+    for what, places, other in (
+        ("starts", seen.start, rapids.start[i]),
+        ("ends", seen.end, rapids.target[i]),
+    ):
+        for k, place in enumerate(places):
+            if seen.axes >> k & 1 and abs(place - other[k]) > NEAR * max(1.0, abs(place) / 1e3):
+                return f"{AXES[k]} {what} at {place:.6g}, not at {float(other[k]):.6g} [mm or deg]"
+    for name, told in _told(rapids, i).items():
+        mine = seen.modes[name]
+        known = mine is not None and mine == mine and told is not None and told == told
+        if known and not math.isclose(mine, told, rel_tol=1e-12):
+            return f"{name} is {mine:g}, not {told:g}"
+    return _tolerances(seen, rapids, i)
+
+
+def _tolerances(seen: Sighting, rapids: Rapids, i: int) -> str:
+    """P and Q of G64, which may be absent."""
+    if seen.modes["path"] is None or not rapids.path[i]:
+        return ""
+    for letter, told in (("P", float(rapids.path_p[i])), ("Q", float(rapids.path_q[i]))):
+        mine = seen.modes[letter]
+        if mine != told and (mine == mine or told == told):
+            return f"G64 has {letter} {mine:g}, not {told:g}"
+    return ""
+
+
+def _told(rapids: Rapids, i: int) -> dict[str, Any]:
+    """What `nc` says is in force behind a rapid; None and NaN where it does not know."""
+    feed = float(rapids.feed[i])
+    return {
+        "unit": MM_PER_INCH if rapids.inch[i] else 1.0,
+        "incremental": bool(rapids.incremental[i]),
+        "diameter": bool(rapids.diameter[i]) if int(rapids.words[i]) & 1 else None,
+        "feed mode": int(rapids.feed_mode[i]) or None,
+        "F": feed,
+        "F without a point": bool(rapids.feed_whole[i]) if feed == feed else None,
+        "path": int(rapids.path[i]) or None,
+        "speed": float(rapids.speed[i]),
+    }
+
+
+def _is_known(seen: Sighting, rapids: Rapids, i: int) -> bool:
+    """Whether the second reading knows all that `nc` says of a rapid."""
+    if not seen.sure:
+        return False
+    named = [k for k in range(len(AXES)) if seen.axes >> k & 1]
+    if any(math.isnan(seen.start[k]) or math.isnan(seen.end[k]) for k in named):
+        return False
+    for name, told in _told(rapids, i).items():
+        mine = seen.modes[name]
+        if told is not None and told == told and (mine is None or mine != mine):
+            return False
+    return True
+
+
+def _names(axes: int) -> str:
+    return ", ".join(axis for k, axis in enumerate(AXES) if axes >> k & 1) or "no axis"

@@ -1,0 +1,215 @@
+"""What the second reading knows between two lines, and how it forgets.
+
+Rule 1: a NaN, or None, is "not known", and it spreads.
+
+Rule 2: three offsets lie between machine and program: that of the work system, that of G92 or G52,
+that of the tool. A change of one renames where an axis stands by as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Dialect, Effect
+from gcodejerk.units import MM_PER_INCH as INCH
+from gcodejerk.verification.reading import NAN
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What the machine file says of how programs start."""
+
+    positions: Mapping[str, float] = field(default_factory=dict)
+    offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    tool_lengths: Mapping[int, float] = field(default_factory=dict)
+    inch: bool = False
+    diameter: bool = False
+    decimal_point: str | None = None
+
+
+class Known:
+    """The state of the second reading."""
+
+    def __init__(self, dialect: Dialect, facts: Facts) -> None:
+        self.dialect, self.facts = dialect, facts
+        written = set(dialect.groups.values())
+        modes = dict(dialect.defaults)
+        self.fixed = {group: code for group, code in modes.items() if group not in written}
+        self.g: dict[str, int | None] = dict(modes)
+        """Modal group -> code in force."""
+        self.feed_mode: int | None = self.mode_of(modes.get("feed mode"))
+        self.path: int | None = dialect.paths.get(modes.get("path", -1))
+        self.p = self.q = self.feed = NAN
+        self.feed_whole = False
+        self.unit: float | None = INCH if facts.inch else 1.0
+        self.diameter: bool | None = facts.diameter
+        self.turns = facts.diameter
+        size = len(AXES)
+        self.at = [NAN] * size
+        told = bool(facts.positions or facts.offsets)
+        self.system, self.g92, self.tool = [NAN] * size, [0.0 if told else NAN] * size, [NAN] * size
+        self.tool = list(self.g92)
+        self.systems = {_system(name): values for name, values in facts.offsets.items()}
+        self.lengths = dict(facts.tool_lengths)
+        self.selected: tuple[int, int] | None = None
+        if "system" in modes:
+            self.selected = (modes["system"], 0)
+            self.system = self.offsets_of(self.selected)
+        self.cycle: int | None = None
+        self.level = self.r = NAN
+        self.frames: dict[str, bool | None] = {}
+        """Rotations and their kin: whether in force."""
+        self.ended = False
+        self.opened = False
+        """A ``%`` began the program."""
+        self.begun = False
+        """A block has been read."""
+        self.started = False
+        """So has a line that is not blank."""
+        self.depth = 0
+        self.doubt = False
+        """Nothing can be confirmed any more: subprograms, jumps."""
+        self.contour: float | None = None
+
+    def mode_of(self, code: int | None) -> int | None:
+        """93, 94 or 95 by its code."""
+        return None if code is None else self.dialect.feed_modes.get(code, code // 10)
+
+    def offsets_of(self, selected: tuple[int, int]) -> list[float]:
+        """What the machine file says of a work system."""
+        known = self.systems.get(selected)
+        return [NAN] * len(AXES) if known is None else [known.get(a, NAN) for a in AXES]
+
+    def place(self) -> None:
+        """Stand where the machine file says programs start; after the startup codes."""
+        if self.g.get("tool length") is not None:
+            self.tool = [0.0] * len(AXES)
+        self.at = [self.facts.positions.get(axis, NAN) for axis in AXES]
+        self.begun = self.started = False
+
+    def copy(self) -> Known:
+        """Make an independent copy."""
+        other = object.__new__(Known)
+        for name, value in vars(self).items():
+            setattr(other, name, value.copy() if isinstance(value, dict | list) else value)
+        return other
+
+    def join(self, other: Known) -> None:
+        """Keep what both agree on: either may hold."""
+        in_doubt = self.cycle != other.cycle
+        for name, theirs in vars(other).items():
+            mine = getattr(self, name)
+            if name in ("g", "frames"):
+                keys = mine.keys() | theirs.keys()
+                none = None if name == "g" else False
+                both = {k: (mine.get(k, none), theirs.get(k, none)) for k in keys}
+                setattr(self, name, {k: a if a == b else None for k, (a, b) in both.items()})
+            elif isinstance(mine, list):
+                pairs = zip(mine, theirs, strict=True)
+                setattr(self, name, [a if a == b else NAN for a, b in pairs])
+            elif name in ("systems", "lengths"):
+                setattr(self, name, {k: v for k, v in mine.items() if theirs.get(k) == v})
+            elif name in ("p", "q"):
+                if mine != theirs and (mine == mine or theirs == theirs):
+                    self.path = None
+            elif name in ("feed", "level", "r"):
+                setattr(self, name, mine if mine == theirs else NAN)
+            elif name in ("doubt", "turns"):
+                setattr(self, name, mine or theirs)
+            elif name in ("feed_mode", "path", "unit", "diameter", "selected", "cycle"):
+                setattr(self, name, mine if mine == theirs else None)
+        if in_doubt:
+            self.g["motion"] = None
+
+    def lose(self, axes: str = AXES) -> None:
+        """Lose positions."""
+        for axis in axes:
+            self.at[AXES.index(axis)] = NAN
+
+    def forget(self) -> None:
+        """Lose everything but what no code can change."""
+        self.lose()
+        self.g = {**dict.fromkeys(self.g), **self.fixed}
+        if "feed mode" not in self.fixed:
+            self.feed_mode = None
+        if "path" not in self.fixed:
+            self.path = None
+        self.p = self.q = self.feed = self.level = self.r = NAN
+        self.unit, self.selected, self.cycle = None, None, None
+        if self.turns:
+            self.diameter = None
+        self.lose_offsets()
+        self.systems, self.lengths = {}, {}
+        self.frames = dict.fromkeys(self.frames)
+
+    def lose_offsets(self) -> None:
+        """Lose what lies between machine and program coordinates."""
+        size = len(AXES)
+        self.system, self.g92, self.tool = [NAN] * size, [NAN] * size, [NAN] * size
+
+    def scale(self, axis: str) -> float:
+        """Mm or deg for 1 of an axis word."""
+        if axis not in LINEAR:
+            return 1.0
+        if self.unit is None or (axis == "X" and self.diameter is None):
+            return NAN
+        return self.unit / 2.0 if axis == "X" and self.diameter else self.unit
+
+    def rename(self, before: list[float], after: list[float]) -> list[float]:
+        """Give where the axes stand its name under another offset."""
+        for k, (old, new) in enumerate(zip(before, after, strict=True)):
+            if old != new:
+                self.at[k] += old - new
+        return after
+
+    def lengthen(self, code: int, number: float) -> None:
+        """Put a tool length in force: that of the machine file under an H number, or none."""
+        length = self.lengths.get(int(number), NAN) if number == number else NAN
+        length = 0.0 if code == 490 else length if code == 430 else NAN
+        after = [length if axis == "Z" else 0.0 for axis in AXES]
+        self.tool = self.rename(self.tool, after if length == length else [NAN] * len(AXES))
+
+    def select(self, code: int, number: float) -> None:
+        """Select a work system."""
+        selected = (code, int(number)) if number == number else None
+        if selected is None or selected != self.selected:
+            known = [NAN] * len(AXES) if selected is None else self.offsets_of(selected)
+            self.system = self.rename(self.system, known)
+        self.selected = selected
+
+    def shift(self, kinds: set[Effect], values: Mapping[str, float]) -> None:
+        """G92 and its kin, G52, G10."""
+        if "set" in kinds:
+            for k, axis in enumerate(AXES):
+                if axis in values:
+                    named = values[axis] * self.scale(axis)
+                    self.g92[k] += self.at[k] - named
+                    self.at[k] = named
+            if self.frames:
+                self.lose()
+        elif "clear" in kinds:
+            self.g92 = self.rename(self.g92, [0.0] * len(AXES))
+        else:
+            self.lose()
+            self.g92 = [NAN] * len(AXES)
+            if "table" in kinds:
+                self.systems, self.lengths = {}, {}
+                self.lose_offsets()
+                if "R" in values:
+                    self.frames["rotation"] = None
+
+    def turned(self) -> bool:
+        """Whether a rotation or its kin is, or may be, in force."""
+        return any(on is not False for on in self.frames.values())
+
+    def in_plane(self) -> str:
+        """Axes that cutter compensation may displace."""
+        plane = self.g.get("plane")
+        return "XYZUVW" if plane is None else "".join(PLANES[plane][:2])
+
+
+def _system(name: str) -> tuple[int, int]:
+    """Key of a work system by its name in a machine file: ``G54``, ``G54.1 P3``."""
+    code, _, number = name.upper().partition("P")
+    return (541, int(number)) if number else (round(float(code.strip()[1:]) * 10), 0)

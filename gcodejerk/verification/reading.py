@@ -1,0 +1,288 @@
+"""A second reading of a program's text, for the proof alone: lines into words, cuts into runs.
+
+What `nc` says of a rapid is what everything else rests on, so somebody has to read the program
+once more, by other means. This module is regular expressions over lines and over pieces of a file;
+`tracking` follows what the words do, `agreement` compares. Of `nc` it knows the dialects' tables.
+
+Rule 1: what does not match is not understood, and says so. Nothing is repaired or guessed.
+
+Rule 2: a run is text of which only the last word of each axis counts: feed moves in absolute
+coordinates, one behind the other. It is passed in one match, however long it is.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import BinaryIO
+
+from gcodejerk.nc.dialect import AXES, Dialect, Effect
+
+PIECE = 1 << 20
+"""Bytes in memory at a time."""
+NAN = math.nan
+_BLANKS = b" \t"
+_NUMBER = rb"[-+]?+(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?![0-9.])"
+_WORD = re.compile(rb"([A-Z])[ \t]*(" + _NUMBER + rb"|[-+]?#)[ \t]*")
+_INDEX = rb"(?:[ \t]*[0-9]+|[ \t]*<[^<>]*>)"
+_VARIABLE = re.compile(rb"#(?:[ \t]*#)*" + _INDEX)
+_INNERMOST = re.compile(rb"\[[^\[\]]*\]")
+_CALL = re.compile(rb"[A-Z]{2,6}[ \t]*#(?:[ \t]*/[ \t]*#)?")
+_ASSIGNMENTS = re.compile(
+    rb"[ \t]*(?:N[ \t]*[0-9]+)?(?:[ \t]*(#[0-9]+|#[ \t]*<[^<>]*>)[ \t]*=[^=#;()]*)"
+)
+_TARGET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
+_PERCENT = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?%")
+_O_WORD = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?[O:][ \t]*(<[^<>]*>|[0-9]+)[ \t]*([A-Z0-9]*)")
+_FILE_NAME = re.compile(rb"[A-Z_][\w-]*\.[A-Z]{1,5}")
+_CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*$")
+_NAME = re.compile(rb"([A-Z_][A-Z_][A-Z0-9_]*)([ \t]*\((?:[^()\"]|\"[^\"]*\")*\))?")
+_PARAMETER = re.compile(rb"R[0-9]+[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;]*")
+_JUMPS = re.compile(rb"(?:GOTO|DO)[ \t]*[0-9#\[]|WHILE[ \t]*\[", re.IGNORECASE)
+_NAMED_JUMPS = re.compile(rb"\b(?:GOTO[FBCS]?|WHILE|REPEATB?|UNTIL|LOOP|FOR|CASE)\b", re.IGNORECASE)
+"""What may lead back to a line that was read before."""
+OFFSETS = 5161
+"""Parameters from this one on may be offsets and stored points."""
+
+
+@dataclass(slots=True)
+class Line:
+    """One line, as far as it is understood."""
+
+    words: list[tuple[str, float, bool]] = field(default_factory=list)
+    """Letter, number (NaN where it is computed), and whether it has no decimal point."""
+    deleted: bool = False
+    """The operator may skip it."""
+    understood: bool = True
+    effects: list[Effect] = field(default_factory=list)
+    """Of named words, the ones without any left out."""
+    percent: bool = False
+    flow: str | None = None
+    """Keyword of an O word, empty behind a bare number."""
+    blank: bool = False
+    offsets: bool = False
+    """An assignment that may change offsets."""
+
+
+@dataclass(slots=True)
+class Run:
+    """Feed moves one behind the other."""
+
+    lines: int
+    last: dict[str, float]
+    """Last number of each axis, and of F."""
+    feed_whole: bool
+    code: int | None
+    """The last motion code stated, times ten."""
+
+
+class Text:
+    """How a dialect's lines are read."""
+
+    def __init__(self, dialect: Dialect, decimals_matter: bool) -> None:
+        """Begin.
+
+        Parameters
+        ----------
+        dialect : Dialect
+            Its table.
+        decimals_matter : bool
+            A number without a decimal point is not what it says.
+        """
+        self.dialect = dialect
+        rules = dialect.text
+        parts = []
+        if rules.parentheses == "comment":
+            parts.append(rb"\([^()]*\)")
+        elif rules.parentheses == "open comment":
+            parts.append(rb"\([^)]*(?:\)|$)")
+        if rules.semicolon == "comment":
+            parts.append(rb";.*")
+        elif rules.semicolon == "end":
+            parts.append(rb";[ \t]*$")
+        if rules.slashes:
+            parts.append(rb"//.*")
+        if rules.end:
+            parts.append(re.escape(rules.end) + rb"[ \t]*$")
+        self.comments = re.compile(b"|".join(parts)) if parts else None
+        self.python = re.compile(rb"[(;][ \t]*py[ \t]*,", re.IGNORECASE) if rules.python else None
+        level = rb"[0-9]?" if rules.delete == "numbered" else b""
+        number = rb"(?:N[0-9]+[ \t]*)?" if rules.delete == "numbered" else b""
+        self.delete = re.compile(rb"[ \t]*" + number + rb"/" + level)
+        self.run, self.run_stated = self._runs(decimals_matter)
+
+    def _runs(self, decimals_matter: bool) -> tuple[re.Pattern[bytes], re.Pattern[bytes]]:
+        """Patterns of a run of feed moves; of the second, the first line states its code."""
+        rules, dialect = self.dialect.text, self.dialect
+        number = rb"[-+]?+(?:[0-9]++\.[0-9]*+|\.[0-9]++)" if decimals_matter else _NUMBER
+        letters = "".join(a for a in AXES if a in dialect.letters and a not in dialect.increments)
+        letters = "".join(a for a in letters if a not in dialect.tool_frame)
+        extra = "E" if dialect.one_command else "IJKR"
+        word = rb"(?:[" + (letters + extra).encode() + rb"][ \t]*+" + number + rb"[ \t]*+)"
+        feed = rb"(?:F[ \t]*+" + _NUMBER + rb"[ \t]*+)?+"
+        line_number = rb"[ \t]*+(?:N[ \t]*+[0-9]++[ \t]*+)?+"
+        arcs = b"".join(b"%d" % (code // 10) for code in dialect.arcs if code in (20, 30))
+        code = rb"G0?+[1" + arcs + rb"](?![0-9.])[ \t]*+"
+        comment = rb"(?:\((?![ \t]*[pP][yY])[^()\r\n]*+\)[ \t]*+)?+"
+        comment = b"" if rules.parentheses == "code" else comment
+        rest = word + rb"++" + feed + comment + rb"\r?+\n"
+        free = code if not dialect.modal_motion else rb"(?:" + code + rb")?+"
+        lines = rb"(?:" + line_number + free + rest + rb")"
+        stated = line_number + code + rest
+        return re.compile(lines + rb"{4,}+"), re.compile(stated + lines + rb"{3,}+")
+
+    def take_run(self, data: bytes, at: int, stated: bool) -> tuple[Run, int] | None:
+        """Take a run, if one begins here.
+
+        Parameters
+        ----------
+        data : bytes
+            Whole lines.
+        at : int
+            Begin of one of them.
+        stated : bool
+            The motion in force is no feed move, so the first line has to state one.
+        """
+        match = (self.run_stated if stated else self.run).match(data, at)
+        if match is None:
+            return None
+        text = match[0]
+        lines = text.count(b"\n")
+        if b"(" in text:
+            text = re.sub(rb"\([^()]*\)", b"", text)
+        last: dict[str, float] = {}
+        whole = False
+        for letter in AXES + "F":
+            place = text.rfind(letter.encode())
+            if place >= 0:
+                number = _WORD.match(text, place)
+                assert number is not None
+                last[letter] = float(number[2])
+                whole = whole or (letter == "F" and b"." not in number[2])
+        place = text.rfind(b"G")
+        code = None if place < 0 else int(text[place + 1 : place + 3].lstrip(b"0")[:1]) * 10
+        return Run(lines, last, whole, code), match.end()
+
+    def read(self, text: bytes, first: bool) -> Line:
+        """Read one line.
+
+        Parameters
+        ----------
+        text : bytes
+            Without its line end.
+        first : bool
+            No block stands in front of it.
+        """
+        rules, line = self.dialect.text, Line(blank=not text.strip())
+        if len(text) > rules.line_limit:
+            line.understood = False
+            return line
+        if self.python is not None and self.python.search(text):
+            line.understood = False
+            return line
+        if self.comments is not None:
+            text = self.comments.sub(b"\0", text)
+        text = text.strip(b" \t\0").upper()
+        if first and rules.leader and _FILE_NAME.fullmatch(text):
+            return line
+        if rules.delete == "ignored":
+            text = text.replace(b"/", b"")
+        elif b"/" in text and rules.delete != "none" and (mark := self.delete.match(text)):
+            line.deleted = True
+            text = text[mark.end() :]
+        if rules.checksum:
+            text = _CHECKSUM.sub(b"", text)
+        if rules.percent != "error" and _PERCENT.match(text):
+            line.percent = True
+            line.understood = text == b"%" or (rules.percent == "named" and b" " not in text)
+            return line
+        if rules.o_word != "error" and (match := _O_WORD.match(text)):
+            line.flow = match[2].decode()
+            return line
+        if rules.names:
+            text = self._names(text, line)
+        elif rules.keywords and any(word.encode() in text for word in rules.keywords):
+            line.flow = "JUMP"
+            return line
+        if rules.variables == "#" and (b"#" in text or b"[" in text):
+            text = self._expressions(text, line)
+        elif rules.variables == "R" and b"=" in text:
+            text = _PARAMETER.sub(b" ", text)
+            text = re.sub(rb"([A-Z])=(?=[-+]?[0-9.]+(?:[ \t]|$))", rb"\1", text)
+        if rules.blanks == "anywhere":
+            text = text.translate(None, _BLANKS)
+        self._words(text.replace(b"\0", b" "), line)
+        return line
+
+    @staticmethod
+    def _words(text: bytes, line: Line) -> None:
+        """Split what is left into words; blanks that were comments separate them."""
+        at, size = 0, len(text)
+        while at < size and text[at] in _BLANKS:
+            at += 1
+        while at < size:
+            match = _WORD.match(text, at)
+            if match is None:
+                line.understood = False
+                return
+            number = match[2]
+            value = NAN if number.endswith(b"#") else float(number)
+            line.words.append((match[1].decode(), value, b"." not in number))
+            at = match.end()
+
+    def _expressions(self, text: bytes, line: Line) -> bytes:
+        """Put ``#`` in the place of everything that is computed."""
+        targets = _TARGET.findall(text)
+        line.offsets = any(t.isdigit() and int(t) >= OFFSETS for t in targets)
+        for _ in range(len(text)):
+            text, count = _INNERMOST.subn(b"#0", text)
+            text, calls = _CALL.subn(b"#0", text) if b"[" not in text else (text, 0)
+            if not count + calls:
+                break
+        if b"=" in text:
+            # Values of a line are read before any is set: what follows an = belongs to it.
+            line.understood = bool(_ASSIGNMENTS.match(text)) and text.count(b"=") == len(targets)
+            return b""
+        return _VARIABLE.sub(b"#", text)
+
+    def _names(self, text: bytes, line: Line) -> bytes:
+        """Take out words that have names."""
+
+        def take(match: re.Match[bytes]) -> bytes:
+            effect = self.dialect.names.get(match[1].decode(), "flow")
+            if effect != "none":
+                line.effects.append(effect)
+            return b" "
+
+        if self.dialect.one_command:
+            match = _NAME.match(text)
+            if match is None:
+                return text
+            take(match)
+            return b""
+        return _NAME.sub(take, text)
+
+
+def pieces(file: BinaryIO) -> Iterator[bytes]:
+    """Whole lines of a file, some MB at a time; the last may lack its end."""
+    rest = b""
+    while piece := file.read(PIECE):
+        cut = piece.rfind(b"\n") + 1
+        if cut:
+            yield rest + piece[:cut]
+            rest = piece[cut:]
+        else:
+            rest += piece
+    if rest:
+        yield rest
+
+
+def jumps_back(file: BinaryIO, dialect: Dialect) -> bool:
+    """Whether a program may come to a line twice, by a jump rather than by an O word."""
+    named = dialect.text.names and not dialect.one_command
+    if not dialect.text.keywords and not named:
+        return False
+    jumps = _NAMED_JUMPS if named else _JUMPS
+    return any(jumps.search(piece) for piece in pieces(file))

@@ -1,0 +1,428 @@
+"""A second opinion on where a program goes: what its lines do, one after another.
+
+It is written from the dialects' tables alone, knows nothing of how `nc` follows a program, and
+follows less. What is in force and where the axes stand is in `known`.
+
+Rule: what is not followed (flow, calls, cycles in increments, names) makes unknown all that it
+might have changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from gcodejerk.nc.dialect import AXES, PLANES, Effect
+from gcodejerk.units import MM_PER_INCH as INCH
+from gcodejerk.units import SECONDS_PER_MINUTE
+from gcodejerk.verification.known import Known
+from gcodejerk.verification.reading import NAN, Line, Run
+from gcodejerk.verification.sorting import Sorted
+
+_FRAMES: frozenset[Effect] = frozenset(
+    {
+        *("return", "store", "machine", "system", "numbered system", "length", "set", "clear"),
+        *("restore", "local", "table", "frames", "home", "transform", "modal cycle"),
+    }
+)
+_MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
+"""Effects beside which the axis words are no straight move."""
+_QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
+_CALLS = (47, 96, 97, 98)
+_ENDS = (2, 17, 30, 99)
+
+
+@dataclass(slots=True)
+class Sighting:
+    """A line as the second reading sees it; None and NaN where it does not know."""
+
+    against: str | None = None
+    """Why the line is certainly no rapid that may be rewritten."""
+    sure: bool = False
+    """It is a rapid, by itself and in a known frame."""
+    start: list[float] = field(default_factory=list)
+    end: list[float] = field(default_factory=list)
+    axes: int = 0
+    """Bit k: a word for AXES[k]."""
+    modes: dict[str, Any] = field(default_factory=dict)
+    """In force behind it."""
+
+
+class Tracker(Known):
+    """Follows lines."""
+
+    @property
+    def feeding(self) -> bool:
+        """Whether lines without a code are feed moves whose last words say where they end."""
+        return self._plain and self.g.get("motion") in (10, *self.dialect.arcs)
+
+    @property
+    def _plain(self) -> bool:
+        return (
+            self.g.get("distance") == 900
+            and self.cycle is None
+            and not self.ended
+            and self.contour is None
+            and self.g.get("compensation") is not None
+            and not any(on is not False for on in self.frames.values())
+        )
+
+    @property
+    def may_run(self) -> bool:
+        """Whether a run may be taken that states its own motion."""
+        return self._plain
+
+    def run(self, run: Run) -> None:
+        """Follow a run of feed moves."""
+        self.begun = self.started = True
+        for letter, number in run.last.items():
+            if letter == "F":
+                self.feed, self.feed_whole = number, self._matters(run.feed_whole)
+            else:
+                self.at[AXES.index(letter)] = number * self.scale(letter)
+        if run.code is not None and self.dialect.modal_motion:
+            self.g["motion"] = run.code
+        if self.g.get("compensation") != 400:
+            self.lose(self.in_plane())
+
+    def _matters(self, whole: bool) -> bool:
+        return whole and self.dialect.whole_numbers == "machine"
+
+    def follow(self, line: Line) -> Sighting:
+        """Execute a line, and tell what it was."""
+        if line.percent:
+            self._percent(line)
+            return Sighting()
+        if line.flow is not None:
+            self._flow(line.flow)
+            return Sighting()
+        if line.offsets:
+            self.systems = {}
+        if line.understood and not line.words and not line.effects:
+            self.started = self.started or not line.blank
+            return Sighting()
+        self.begun = self.started = True
+        if not line.deleted:
+            return self._execute(line)
+        before = self.copy()
+        self._execute(line)
+        if self.ended and not before.ended:
+            vars(self).update(vars(before))
+        else:
+            self.join(before)
+        return Sighting(against="the operator may skip it")
+
+    def _percent(self, line: Line) -> None:
+        if not line.understood:
+            self.forget()
+        elif not self.started or (self.dialect.text.leader and not self.begun):
+            self.opened = self.started = True
+        elif self.opened:
+            self.ended = True
+        else:
+            self.forget()
+            self.doubt = True
+
+    def _flow(self, keyword: str) -> None:
+        first, self.begun, self.started = not self.begun, True, True
+        if not keyword:
+            if not first:
+                self.doubt = True
+                self.forget()
+            return
+        if keyword in ("SUB", "IF", "WHILE", "REPEAT", "DO"):
+            self.depth += 1
+        elif keyword in ("ENDSUB", "ENDIF", "ENDWHILE", "ENDREPEAT"):
+            self.depth -= 1
+        elif keyword == "JUMP":
+            self.doubt = True
+        # `do` is closed by `while`: told apart by nobody here, so what follows stays in doubt.
+        self.doubt = self.doubt or keyword == "DO" or self.depth < 0
+        self._unknown_call()
+
+    def _unknown_call(self) -> None:
+        self.forget()
+        if self.dialect.diameter_codes:
+            self.diameter = None
+
+    def _execute(self, line: Line) -> Sighting:
+        """Execute words, the modal ones in front of the motion."""
+        dialect = self.dialect
+        if not line.understood or any(effect not in _QUIET for effect in line.effects):
+            return self._lost(line)
+        if self.contour is not None:
+            self._in_contour(line)
+            return Sighting()
+        block = Sorted()
+        if not block.sort(line, dialect, self.unit == INCH, self.facts.decimal_point):
+            return self._lost(line)
+        if not dialect.modal_motion:
+            self.g["motion"] = None
+        for effect in line.effects:
+            self._turning(effect)
+        seen = self._run_block(block)
+        if line.effects and seen.sure:
+            seen.sure = False
+        return seen
+
+    def _lost(self, line: Line) -> Sighting:
+        """A line that is not understood."""
+        if any(effect in ("transform", "modal cycle") for effect in line.effects):
+            self.frames["a named frame"] = None
+        self.forget()
+        return Sighting()
+
+    def _in_contour(self, line: Line) -> None:
+        self.lose()
+        self.g["motion"], self.feed = None, NAN
+        if any(letter == "N" and number == self.contour for letter, number, _ in line.words):
+            self.contour = None
+
+    def _turning(self, effect: Effect) -> None:
+        self.turns = True
+        self.diameter = None if effect == "either" else effect == "diameter"
+
+    def _run_block(self, block: Sorted) -> Sighting:
+        dialect, g, values = self.dialect, block.g, block.values
+        effects = {code: dialect.effect(code) for code in g.values()}
+        kinds = set(effects.values())
+        against = self._ban(kinds)
+        if "feed mode" in g:
+            mode = self.mode_of(g["feed mode"])
+            if mode != self.feed_mode:
+                self.feed = NAN
+            self.feed_mode = mode
+        taken = "words" in kinds or (dialect.one_command and not g)
+        if "F" in values and not taken:
+            self.feed, self.feed_whole = values["F"], self._matters(block.feed_whole)
+        ends = self._machine_codes(block)
+        if not dialect.tool_frame.isdisjoint(values):
+            self.tool = [NAN] * len(AXES)
+            self.lose()
+            against = against or "it changes the tool's offset"
+        self._modes(g, values)
+        for code, effect in effects.items():
+            self._effect(effect, code, values)
+        motion = g.get("motion")
+        seen = Sighting(against=against, axes=block.axes)
+        if kinds & _MOVES or (dialect.one_command and not g and not block.m):
+            if motion is not None:
+                self._motion(motion)
+            if dialect.one_command and not g and block.axes:
+                self.lose()
+            if "cycle" in kinds and "non-modal" in g and g["non-modal"] in dialect.contours:
+                self.contour = values.get("Q", NAN) if "P" in values else None
+            seen.against = seen.against or "its words are for something else than a move"
+        elif block.axes or motion is not None or "cycle" in g or kinds & _FRAMES:
+            self._move(block, kinds, seen)
+        else:
+            seen.against = seen.against or "it names no axis"
+        seen.end = list(self.at)
+        seen.modes = self._in_force()
+        if ends:
+            self.forget()
+            self.ended = True
+        return seen
+
+    def _in_force(self) -> dict[str, Any]:
+        distance = self.g.get("distance")
+        feed_mode = self.feed_mode
+        return {
+            "unit": self.unit,
+            "speed": self.feed * (self.unit or NAN) / SECONDS_PER_MINUTE,
+            "incremental": None if distance is None else distance == 910,
+            "diameter": self.diameter,
+            "feed mode": feed_mode,
+            "F": self.feed,
+            "F without a point": self.feed_whole if self.feed == self.feed else None,
+            "path": self.path,
+            "P": self.p,
+            "Q": self.q,
+        }
+
+    def _ban(self, kinds: set[Effect]) -> str | None:
+        """Why no rapid may be rewritten here, whatever the block says."""
+        if self.ended:
+            return "the program has ended before it"
+        if kinds & _FRAMES:
+            return "a coordinate frame changes in it"
+        return None
+
+    def _machine_codes(self, block: Sorted) -> bool:
+        """Execute M codes; whether the program ends behind the block."""
+        ends = False
+        for m in block.m:
+            group = self.dialect.m_groups.get(m)
+            if group == "stop" and m in _ENDS:
+                ends = True
+            elif m in _CALLS:
+                self._unknown_call()
+            elif group is None and self.dialect.other_m == "unknown":
+                self.forget()
+            elif group in (None, "tool", "user"):
+                self.lose()
+            elif group == "state":
+                self.forget()
+        return ends
+
+    def _modes(self, g: dict[str, int], values: dict[str, float]) -> None:
+        dialect = self.dialect
+        if "distance" in g and self.g.get("distance") != g["distance"]:
+            self.level = self.r = NAN
+        for group, code in g.items():
+            if group not in ("motion", "non-modal", "cycle"):
+                self.g[group] = code
+            if code in dialect.transforms:
+                name, on = dialect.transforms[code]
+                if on or self.frames.get(name, False) is not False:
+                    self.lose()
+                self.frames[name] = on
+        if "units" in g:
+            unit = INCH if dialect.units[g["units"]] else 1.0
+            if unit != self.unit:
+                self.feed = self.p = self.q = self.level = self.r = NAN
+            self.unit = unit
+        if "path" in g:
+            self.path = dialect.paths.get(g["path"])
+            self.p = values.get("P", NAN) if g["path"] == 640 else NAN
+            self.q = values.get("Q", NAN) if g["path"] == 640 else NAN
+
+    def _effect(self, effect: Effect, code: int, values: dict[str, float]) -> None:
+        """What a code does besides, before anything moves."""
+        if effect in _QUIET:
+            self._turning(effect)
+        elif effect == "length":
+            self.lengthen(code, values.get("H", NAN))
+        elif effect in ("system", "numbered system"):
+            number = values.get("P", NAN) if effect == "numbered system" else 0.0
+            self.select(code if effect == "system" else 541, number)
+        elif effect == "frames":
+            self.lose_offsets()
+            self.lose()
+        elif effect in ("transform", "modal cycle"):
+            self.frames["a frame"] = True
+            self.lose()
+        elif effect == "cycle":
+            self.lose()
+            self.g["motion"], self.feed = None, NAN
+        elif effect == "home":
+            self.lose()
+        elif effect == "flow":
+            self._unknown_call()
+
+    def _motion(self, code: int) -> None:
+        self.g["motion"] = code
+        if code not in self.dialect.cycles:
+            self.cycle = None
+
+    def _move(self, block: Sorted, kinds: set[Effect], seen: Sighting) -> None:
+        """Move the axes, or whatever the block makes of its axis words."""
+        dialect, g, values = self.dialect, block.g, block.values
+        seen.start = list(self.at)
+        motion = g.get("motion")
+        if motion is not None:
+            self._motion(motion)
+        if "return" in kinds:
+            if dialect.tool_cancelled_by_return:
+                self.tool = [NAN] * len(AXES)
+                self.lose()
+            self.lose("".join(a for k, a in enumerate(AXES) if block.axes >> k & 1) or AXES)
+            return
+        if kinds & {"set", "clear", "restore", "local", "table"}:
+            self.shift(kinds, block.values)
+            return
+        if g.get("tool length") not in (None, 430, 490) and block.axes:
+            return
+        code = g.get("cycle")
+        if code is not None and code not in dialect.cycles:
+            self.cycle, code = None, None
+        if not dialect.drilling.own_group and self.g.get("motion") in dialect.cycles:
+            code = self.g["motion"]
+        code = code or self.cycle
+        if code is not None:
+            seen.against = seen.against or "it belongs to a canned cycle"
+            self._drill(code, block)
+            return
+        if not block.axes:
+            seen.against = seen.against or "it names no axis"
+            return
+        motion = self.g.get("motion")
+        if motion is None or motion == 800:
+            self.lose()
+            return
+        if motion != dialect.rapid:
+            seen.against = seen.against or f"it moves with G{motion // 10}"
+        if "machine" in kinds:
+            for k, axis in enumerate(AXES):
+                if axis in values:
+                    there = values[axis] * self.scale(axis)
+                    there -= self.system[k] + self.g92[k] + self.tool[k]
+                    known = self.g.get("distance") != 910 and not self.turned()
+                    self.at[k] = there if known else NAN
+        elif motion in dialect.redrawn:
+            self.lose(self.in_plane())
+            self.lose("".join(a for k, a in enumerate(AXES) if block.axes >> k & 1))
+        else:
+            self._go(block)
+        self._judge(block, seen)
+
+    def _go(self, block: Sorted) -> None:
+        """To where the words say."""
+        distance = self.g.get("distance")
+        for k, axis in enumerate(AXES):
+            if axis in block.increments:
+                self.at[k] += block.increments[axis] * self.scale(axis)
+            elif axis in block.values:
+                there = block.values[axis] * self.scale(axis)
+                if distance == 910:
+                    there += self.at[k]
+                self.at[k] = NAN if distance is None else there
+
+    def _judge(self, block: Sorted, seen: Sighting) -> None:
+        """Whether the move was a rapid in a known frame."""
+        compensation = self.g.get("compensation")
+        if compensation != 400:
+            self.lose(self.in_plane())
+            if compensation is not None:
+                seen.against = seen.against or "cutter compensation is active"
+        if self.turned():
+            self.lose()
+            if True in self.frames.values():
+                seen.against = seen.against or "a rotation, scaling or mirroring is active"
+        known = compensation == 400 and not self.turned() and self.depth == 0 and not self.doubt
+        seen.sure = known and seen.against is None
+        if self.depth or self.doubt:
+            seen.against = None
+
+    def _drill(self, code: int, block: Sorted) -> None:
+        """Where a block of a drilling cycle ends, if it is one that is followed."""
+        values, drilling = block.values, self.dialect.drilling
+        plane = self.g.get("plane")
+        if self.g.get("motion") == 800 or plane is None or code == 760:
+            self.lose()
+            self.cycle = code
+            self.level = self.r = NAN
+            return
+        first, second, along = PLANES[plane]
+        k = AXES.index(along)
+        if self.cycle is None:
+            self.level, self.r = self.at[k], NAN
+        elif self.cycle != code:
+            self.r = NAN
+        self.cycle = code
+        self.r = values["R"] * self.scale(along) if "R" in values else self.r
+        if not block.axes:
+            return
+        repeats = [values[letter] for letter in drilling.repeats if letter in values]
+        if self.g.get("distance") != 900 or any(n != 1.0 for n in repeats) or block.increments:
+            self.lose()
+            self.level = self.r = NAN
+            return
+        for axis in (first, second):
+            if axis in values:
+                self.at[AXES.index(axis)] = values[axis] * self.scale(axis)
+        retract = self.g.get("retract")
+        top = max(self.level, self.r) if self.level == self.level and self.r == self.r else NAN
+        self.at[k] = self.r if retract == 990 else top if retract == 980 else NAN
+        if self.turned() or self.g.get("compensation") != 400:
+            self.lose()

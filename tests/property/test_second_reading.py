@@ -1,0 +1,259 @@
+"""The second reading against the first: no false alarm, and every mistake of the first noticed.
+
+The first reading's results are falsified here, rapid by rapid, as a mistake in `nc` would falsify
+them; what the programs say is not touched.
+"""
+
+import io
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from gcodejerk.nc import AXES, CERTAIN, Start, read_program
+from gcodejerk.nc.dialects import DIALECTS
+from gcodejerk.testing.cycles import cycle_programs
+from gcodejerk.testing.programs import programs
+from gcodejerk.verification.agreement import confirm
+from gcodejerk.verification.findings import Findings
+
+WRITTEN = sorted(name for name, dialect in DIALECTS.items() if dialect.writing is not None)
+CALM = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+KNOWN = dict.fromkeys("XYZABC", 0.0)
+
+
+def start_of(dialect, known=True):
+    return Start(
+        positions=KNOWN if known else {},
+        offsets={"G54": KNOWN, "G55": dict.fromkeys("XYZ", 7.0)} if known else {},
+        tool_lengths={1: 12.5},
+        decimal_point="calculator",
+        diameter="lathe" in dialect,
+    )
+
+
+def read(data, dialect, start):
+    return read_program(io.BytesIO(data), dialect=dialect, start=start).rapids
+
+
+def judge(data, dialect, start, rapids, rows=None):
+    """Violations and how many rapids are confirmed."""
+    rows = np.flatnonzero(rapids.reason == CERTAIN) if rows is None else rows
+    found = Findings(100)
+    confirmed = confirm(io.BytesIO(data), dialect, start, rapids, rows, found)
+    return found.violations, confirmed
+
+
+@pytest.mark.parametrize("dialect", WRITTEN)
+@CALM
+@given(st.data(), st.booleans())
+def test_the_second_reading_agrees_with_the_first(dialect, data, known):
+    program, start = data.draw(programs(dialect)), start_of(dialect, known)
+    violations, _ = judge(program, dialect, start, read(program, dialect, start))
+    assert not violations
+
+
+@CALM
+@given(cycle_programs())
+def test_the_second_reading_agrees_behind_drilling_cycles(data):
+    start = start_of("linuxcnc")
+    violations, _ = judge(data, "linuxcnc", start, read(data, "linuxcnc", start))
+    assert not violations
+
+
+PROGRAM = b"""G21 G90 G94 G17 G40 G98 G64 P0.02 F300.
+G0 X0. Y0. Z5.
+G0 X10. Y5.
+X20. M8
+G81 X1. Y1. Z-5. R2. F100
+X3. Y2.
+G80
+G0 X30. Y1.
+G91 G0 X2. Z1.
+G90 G1 X3. F120
+G3 X5. Y3. I1. J1.
+G0 X7. Y7.
+G20
+G0 X2. Y1. F7.
+G21 G93
+G0 X2. Y9.
+G94 F50
+G61
+G0 X4. Y1.
+G0 X4. Z1.
+M2
+"""
+"""Of each rapid that is falsified below there is one at least; line numbers count from 1."""
+
+
+def _shifted(name, axis="X", by=1e-4):
+    def change(rapids, i):
+        getattr(rapids, name)[i, AXES.index(axis)] += by
+
+    return change
+
+
+def _put(name, value):
+    def change(rapids, i):
+        getattr(rapids, name)[i] = value(rapids, i) if callable(value) else value
+
+    return change
+
+
+def _absolute(rapids, i):
+    """G90 taken where G91 is in force."""
+    rapids.incremental[i] = False
+    rapids.target[i] = np.where(np.isnan(rapids.start[i]), rapids.target[i], 0.0)
+    rapids.target[i, 0], rapids.target[i, 2] = 2.0, 1.0
+
+
+def _millimetres(rapids, i):
+    rapids.inch[i] = False
+    for column in (rapids.start, rapids.target):
+        column[i] /= 25.4
+
+
+# What nc might believe wrongly, of the rapid in a line of PROGRAM.
+MISTAKES = {
+    "a start shifted by one step": (3, _shifted("start")),
+    "an end shifted by one step": (3, _shifted("target", "Y")),
+    "the start of an axis taken from another": (4, _shifted("start", by=-5.0)),
+    "a wrong end of a cycle": (20, _shifted("start", "Z", 3.0)),
+    "a wrong end of an arc": (12, _shifted("start", "Y", 1.0)),
+    "a move forgotten": (12, _shifted("start", "X", -2.0)),
+    "G90 taken for G91": (3, _put("incremental", True)),
+    "G91 taken for G90": (9, _absolute),
+    "inches taken for mm": (14, _millimetres),
+    "mm taken for inches": (3, _put("inch", True)),
+    "radius taken for diameter": (3, _put("diameter", True)),
+    "another F": (3, _put("feed", 303.0)),
+    "F of another unit": (14, _put("feed", 7.0 * 25.4)),
+    "F that a cycle changed": (8, _put("feed", 300.0)),
+    "G94 taken for G93": (16, _put("feed_mode", 94)),
+    "G93 taken for G94": (3, _put("feed_mode", 93)),
+    "G64 taken for G61": (19, _put("path", 64)),
+    "G61 taken for G64": (3, _put("path", 61)),
+    "a tolerance lost": (3, _put("path_p", np.nan)),
+    "another tolerance": (3, _put("path_p", 0.05)),
+    "an axis word overlooked": (3, _put("words", 1)),
+    "an axis word invented": (4, _put("words", 3)),
+}
+NO_RAPIDS = {
+    "a feed move": b"G1 X5. F10\n",
+    "a modal feed move": b"G1 X5. F10\nX6.\n",
+    "a feed move within many": b"G1 X5. F10\nX6.\nX7.\nX8.\nX9.\nX4.\n",
+    "an arc": b"G2 X5. Y0. I2.5 J0.\n",
+    "a hole": b"G81 X5. Z-1. R1. F10\nX6.\n",
+    "a machine coordinate": b"G53 G0 X5.\n",
+    "a return": b"G28 X5.\n",
+    "a rapid under compensation": b"G41 D1\nG0 X5.\n",
+    "a rapid that may be skipped": b"/G0 X5.\n",
+    "a rapid behind the end": b"M2\nG0 X5.\n",
+    "a dwell": b"G4 P1\n",
+    "an offset": b"G92 X5.\n",
+    "a rapid in another system": b"G55 G0 X5.\n",
+    "a comment": b"(G0 X5.)\nG0\n",
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_every_mistake_of_the_first_reading_is_noticed(name):
+    line, change = MISTAKES[name]
+    start = replace(start_of("linuxcnc"), offsets={})
+    rapids = read(PROGRAM, "linuxcnc", start)
+    rows = np.flatnonzero(rapids.reason == CERTAIN)
+    assert judge(PROGRAM, "linuxcnc", start, rapids) == ([], len(rows))
+    i = int(np.flatnonzero(rapids.line == line)[0])
+    assert rapids.reason[i] == CERTAIN
+    change(rapids, i)
+    violations, _ = judge(PROGRAM, "linuxcnc", start, rapids)
+    assert [v.original_line for v in violations] == [line]
+
+
+def moved_to(rapids, i, line):
+    """The rapids, one of them said to stand in another line, with an end that is not known."""
+    moved = replace(rapids, **{f.name: getattr(rapids, f.name).copy() for f in fields(rapids)})
+    moved.line[i] = line
+    return moved
+
+
+@pytest.mark.parametrize("name", NO_RAPIDS)
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
+def test_what_is_no_rapid_is_never_taken_for_one(name, dialect):
+    head = b"G21 G90 G94 G17 G40 G64 F300.\nG0 X0. Y0. Z5.\nX1.\n"
+    data = head + NO_RAPIDS[name]
+    start = start_of(dialect)
+    rapids = read(data, dialect, start)
+    moved = moved_to(rapids, 1, 1 + data.rstrip().count(b"\n"))
+    violations, confirmed = judge(data, dialect, start, moved, [1])
+    assert (len(violations), confirmed) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        b"o100 sub\nG0 X5.\nG0 X6.\no100 endsub\n",
+        b"o100 while [#1 LT 5]\nG90 G21 G0 X5.\nG0 X6.\no100 endwhile\n",
+        b"#1=5\nG0 X#1\nG0 X6.\n",
+        b"G0 X[1+2]\nG0 X6.\n",
+        b"o100 call\nG0 X6.\n",
+        b"M98 P5\nG0 X6.\n",
+        b"o7\nG0 X6.\n",
+        b"G10 L2 P1 R30\nG90 G0 X5.\nG0 X6.\n",
+        b"(py, x)\nG0 X6.\n",
+    ],
+)
+def test_what_is_not_followed_is_neither_confirmed_nor_refused(lines):
+    head = b"G21 G90 G94 G17 G40 G64 F300.\nG0 X0. Y0. Z5.\nX1.\n"
+    data, start = head + lines, start_of("linuxcnc")
+    last = 1 + max(k for k, line in enumerate(data.splitlines()) if line == b"G0 X6.")
+    moved = moved_to(read(data, "linuxcnc", start), 1, last)
+    moved.target[1, 0] = 6.0
+    assert judge(data, "linuxcnc", start, moved, [1]) == ([], 0)
+
+
+SHARED = Path(__file__).resolve().parents[2].parent / "shared"
+"""Dialect of each real file, by a piece of its name."""
+REAL = {
+    **{"hosts/nc/*__fanuc*": "fanuc", "hosts/nc/*__grbl*": "grbl", "hosts/nc/*__marlin*": "marlin"},
+    **{"hosts/nc/*__linuxcnc*": "linuxcnc", "hosts/nc/*__mach3*": "mach"},
+    **{"hosts/nc/*__uccnc*": "mach", "hosts/nc/*__centroid*": "mach", "corpus/cncjs*": "grbl"},
+    **{"corpus/easy_gcode_plot__[!T]*": "fanuc", "corpus/easy_gcode_plot__TEST_G*": "fanuc"},
+    **{"corpus/*TEST_TURN*": "fanuc-lathe-a", "corpus/*mach3*": "mach"},
+    **{"corpus/*reprap*": "marlin", "corpus/gEdit__f*": "fanuc", "corpus/*.MPF": "siemens"},
+}
+EXAMPLES = Path("/usr/share/linuxcnc/ncfiles")
+
+
+@pytest.mark.parametrize("pattern", REAL)
+def test_the_second_reading_agrees_on_real_files(pattern):
+    if not SHARED.is_dir():
+        pytest.skip("no ../shared beside the repository")
+    dialect = REAL[pattern]
+    start = replace(start_of(dialect), offsets={}, positions={}, startup="")
+    certain = agreed = 0
+    for path in sorted(SHARED.glob(pattern)):
+        data = path.read_bytes()
+        rapids = read(data, dialect, start)
+        violations, confirmed = judge(data, dialect, start, rapids)
+        assert not violations, path.name
+        certain += int(np.count_nonzero(rapids.reason == CERTAIN))
+        agreed += confirmed
+    assert agreed == certain
+
+
+@pytest.mark.skipif(not EXAMPLES.is_dir(), reason="LinuxCNC's examples are not installed")
+def test_the_second_reading_agrees_on_the_examples_of_linuxcnc():
+    start = replace(start_of("linuxcnc"), offsets={}, positions={})
+    certain = agreed = 0
+    for path in sorted(EXAMPLES.rglob("*.ngc")):
+        data = path.read_bytes()
+        rapids = read(data, "linuxcnc", start)
+        violations, confirmed = judge(data, "linuxcnc", start, rapids)
+        assert not violations, path.name
+        certain += int(np.count_nonzero(rapids.reason == CERTAIN))
+        agreed += confirmed
+    assert agreed >= 0.9 * certain
