@@ -11,7 +11,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from hypothesis import HealthCheck, Phase, assume, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.machine import Machine, find_machine
@@ -89,7 +89,8 @@ class Text:
         self.lines = output.splitlines(keepends=True)
         originals = data.splitlines(keepends=True)
         self.points, self.tails, self.comments, inside = [], [], [], False
-        self.stamp = next(n for n, line in enumerate(self.lines) if b"gcodejerk stamp" in line)
+        stamps = (n for n, line in enumerate(self.lines) if b"gcodejerk stamp" in line)
+        self.stamp = next(stamps, None)
         for n, line in enumerate(self.lines):
             bare = line.rstrip()
             if bare.startswith(COMMENTS):
@@ -397,9 +398,9 @@ def missed(dialect, program, pick):
     """Kinds of damage to a processed program that nobody notices."""
     machine, controller = machine_for(dialect), dialect.split("-")[0]
     output = process(program, machine, verify=False, controller=controller, dialect=dialect).output
-    assume(b"gcodejerk stamp" in output)
     text = Damaged(program, output, dialect)
-    assume(text.inner and text.tails and text.kept)
+    if not (text.inner and text.tails and text.kept):
+        return []
     assert verify(program, output, machine, dialect=dialect).ok
     out = []
     for name, damage in DAMAGE.items():
@@ -424,9 +425,7 @@ def test_every_damage_is_noticed(dialect, data, pick):
 
 
 def test_every_kind_of_damage_is_done_to_programs_that_have_room_for_all():
-    moves = (
-        "N7 G0 X12.5 Y-7. M8\n(cut)\nG1 X2.5 F33.\nG0 Z3.4 M1\nG91 G0 X3.3\nN9 G90 G1 Z1. F20.\nM2\n"
-    )
+    moves = "N7 G0 X12.5 Y-7. M8\n(cut)\nG1 X2.5 F33.\nG0 Z3.4 M1\nG91 G0 X3.3\nN9 G90 G1 Z1. F20.\nM2\n"
     APPLIED.clear()
     for dialect, head in (
         ("linuxcnc", "G21 G90 G94 G61\nF60\nG0 X0 Y0 Z0\n"),
