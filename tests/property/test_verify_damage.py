@@ -11,7 +11,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from hypothesis import HealthCheck, Phase, assume, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.machine import Machine, find_machine
@@ -89,7 +89,8 @@ class Text:
         self.lines = output.splitlines(keepends=True)
         originals = data.splitlines(keepends=True)
         self.points, self.tails, self.comments, inside = [], [], [], False
-        self.stamp = next(n for n, line in enumerate(self.lines) if b"gcodejerk stamp" in line)
+        stamps = (n for n, line in enumerate(self.lines) if b"gcodejerk stamp" in line)
+        self.stamp = next(stamps, None)
         for n, line in enumerate(self.lines):
             bare = line.rstrip()
             if bare.startswith(COMMENTS):
@@ -397,9 +398,9 @@ def missed(dialect, program, pick):
     """Kinds of damage to a processed program that nobody notices."""
     machine, controller = machine_for(dialect), dialect.split("-")[0]
     output = process(program, machine, verify=False, controller=controller, dialect=dialect).output
-    assume(b"gcodejerk stamp" in output)
     text = Damaged(program, output, dialect)
-    assume(text.inner and text.tails and text.kept)
+    if not (text.inner and text.tails and text.kept):
+        return []
     assert verify(program, output, machine, dialect=dialect).ok
     out = []
     for name, damage in DAMAGE.items():
@@ -432,6 +433,6 @@ def test_every_kind_of_damage_is_done_to_programs_that_have_room_for_all():
         ("linuxcnc", "G21 G90 G93 G61.1\nG0 X0 Y0 Z0\n"),
         ("fanuc", "G21 G17 G40 G90 G94 G64\nG0 X0. Y0. Z0. F200.\n"),
     ):
-        program = (head + moves).replace("F33.", "F33." if "G93" not in head else "F2.").encode()
+        program = (head + moves).encode()
         assert missed(dialect, program, random.Random(3)) == []
     assert set(DAMAGE) == APPLIED

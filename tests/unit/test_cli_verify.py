@@ -24,6 +24,7 @@ def test_what_process_wrote_is_accepted(run, processed):
     code, out = run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "vmc")
     assert code == 0
     assert "19 of its 26 rapids re-timed and nothing else changed" in out
+    assert "19 of 19 confirmed by a second reading" in out
 
 
 def test_the_original_is_the_original_with_nothing_re_timed(run):
