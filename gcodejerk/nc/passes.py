@@ -63,6 +63,10 @@ class Passes:
         self._lost = False
         self._broken = False
         """A ``break`` has run: LinuxCNC 2.9 then ends a later ``do`` after its first pass."""
+        self._repeats: list[Node] = []
+        """The ``repeat`` that run now, one within another."""
+        self._stale: set[int] = set()
+        """Those that were left in the middle: LinuxCNC 2.9 goes on with their count later."""
 
     @property
     def exhausted(self) -> bool:
@@ -143,6 +147,8 @@ class Passes:
             return self._branches(node, state)
         if node.kind == "call":
             return self._call(node, state)
+        if node.kind in ("return", "break", "continue"):
+            self._stale.update(map(id, self._repeats))
         if node.kind == "return":
             self._count()
             return {RETURN: state}
@@ -151,7 +157,11 @@ class Passes:
             self._broken |= node.kind == "break"
             return {f"{node.kind} {node.name}": state}
         if node.kind == "repeat":
-            return self._repeat(node, state)
+            self._repeats.append(node)
+            try:
+                return self._repeat(node, state)
+            finally:
+                self._repeats.pop()
         return self._loop(node, state)
 
     def _line(self, node: Node, state: State) -> Exits:
@@ -196,7 +206,7 @@ class Passes:
     def _repeat(self, node: Node, state: State) -> Exits:
         """Run ``repeat``."""
         count = self._known(node.condition, state)
-        if count is None or not count.is_integer():
+        if count is None or not count.is_integer() or id(node) in self._stale:
             return self._settle(node, state, test_first=True)
         exits: Exits = {}
         leave: State | None = None

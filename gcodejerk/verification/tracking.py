@@ -221,7 +221,7 @@ class Tracker(Known):
         seen.modes = self._in_force()
         if ends:
             self.forget()
-            self.ended = True
+            self.ended = self.depth == 0  # in a branch it may not run
         return seen
 
     def _in_force(self) -> dict[str, Any]:

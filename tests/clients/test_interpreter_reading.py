@@ -326,6 +326,10 @@ CASES = [
     b"o1 call [0]\nG0 Z1\nM2\n",
     b"o<a b> sub\nG0 X#1\no<AB> endsub\no<ab> call [1+1] [3]\nG0 Y1\nM2\n",
     b"o1 sub\nT2 M6\nG43\nG0 Z5\no1 endsub\no1 call\nG0 X1\no1 call\nG0 Z1\nM2\n",
+    # a repeat that a return leaves goes on later with the count that it had
+    b"o100 sub\no101 repeat [3]\n#1=[#1+1]\no103 if [#1 EQ 2]\no100 return\no103 endif\n"
+    b"G91 G0 X1\nG90\no101 endrepeat\no100 endsub\no100 call [0]\nG0 Y1\no100 call [10]\n"
+    b"G0 Z1\nM2\n",
     # a break is remembered by the interpreter, and ends a later do
     b"#1=0\no1 while [#1 LT 3]\n#1=[#1+1]\no2 if [#1 EQ 1]\no1 break\no2 endif\no1 endwhile\n"
     b"#2=0\no3 do\n#2=[#2+1]\nG0 X#2\no3 while [#2 LT 3]\nG0 Y1\nM2\n",

@@ -205,3 +205,11 @@ def test_a_break_makes_the_passes_of_a_later_do_unknown():
     loop = b"#2=0\no3 do\n#2=[#2+1]\nG0 X#2\no3 while [#2 LT 3]\nG0 Y1\n"
     assert end(text + loop) == [None, 1, 0]
     assert end(loop) == [3, 1, 0]
+
+
+def test_a_return_out_of_a_repeat_makes_its_later_passes_unknown():
+    # LinuxCNC 2.9 goes on with the count where it was left: measured.
+    text = b"o100 sub\no101 repeat [3]\n#1=[#1+1]\no103 if [#1 EQ 2]\no100 return\no103 endif\n"
+    text += b"G91 G0 X1\nG90\no101 endrepeat\no100 endsub\n"
+    assert end(text + b"o100 call [0]\n") == [1, 0, 0]
+    assert end(text + b"o100 call [0]\no100 call [10]\nY2\n") == [None, 2, 0]
