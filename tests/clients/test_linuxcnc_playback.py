@@ -22,6 +22,7 @@ import lcnc  # noqa: E402
 
 pytestmark = [
     pytest.mark.linuxcnc,
+    pytest.mark.playback,
     pytest.mark.skipif(
         shutil.which("linuxcnc") is None, reason="LinuxCNC (linuxcnc-uspace) is absent"
     ),
