@@ -169,7 +169,8 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     total = np.bincount(word_line, weights=_BIT_OF[letter], minlength=len(odd)).astype(np.uint32)
     ones = _ONES[total & 511] + _ONES[(total >> 9) & 511]
     odd |= (ones != np.bincount(word_line, minlength=len(odd))) | (total >= 1 << 18)
-    foreign = sum(bit for name, bit in BIT.items() if name not in dialect.letters + "GN")
+    own = set(dialect.letters) - set(dialect.increments) | set("GN")
+    foreign = sum(bit for name, bit in BIT.items() if name not in own)
     odd |= total & np.uint32(foreign) != 0
     crlf = source[line_end + (_PAD - 1)] == 0x0D
     crlf &= line_end > line_begin

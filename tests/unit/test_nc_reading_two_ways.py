@@ -64,3 +64,12 @@ def test_both_ways_agree_on_a_long_run_in_every_dialect(dialect):
     # Found by fuzzing: lines of linear and rotary axes together.
     lines = [b"G21 G90 G64", b"G0 A90 X0 Y0", b"G0 A-90 X1", b"G1 X5. F20", b"G0 X7", b"A5"] * 9
     assert differences(b"\n".join(lines) + b"\nM2\n", STARTS["nothing known"], dialect) == []
+
+
+@pytest.mark.parametrize("dialect", ["fanuc-lathe-a", "fanuc-lathe-b"])
+def test_both_ways_agree_on_long_runs_of_a_lathe(dialect):
+    # U and W are increments of X and Z for system A, and nothing for B: never axes of their own.
+    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G21 F0.1")
+    steps = b"U-1. W-1.\nG01 X30. F0.2\nG00 X40.\nZ1.\n" * 20
+    contour = b"G71 P10 Q20 U0.4 W0.1 F0.25\nN10 G00 X16.\n" + steps + b"N20 X44.\nG00 X60. Z5.\n"
+    assert differences(b"G00 X40. Z2.\n" + steps + contour + steps + b"M30\n", start, dialect) == []
