@@ -66,10 +66,12 @@ def test_both_ways_agree_on_a_long_run_in_every_dialect(dialect):
     assert differences(b"\n".join(lines) + b"\nM2\n", STARTS["nothing known"], dialect) == []
 
 
-@pytest.mark.parametrize("dialect", ["fanuc-lathe-a", "fanuc-lathe-b"])
-def test_both_ways_agree_on_long_runs_of_a_lathe(dialect):
+@pytest.mark.parametrize(
+    ("dialect", "modes"), [("fanuc-lathe-a", "G99"), ("fanuc-lathe-b", "G95 G90")]
+)
+def test_both_ways_agree_on_long_runs_of_a_lathe(dialect, modes):
     # U and W are increments of X and Z for system A, and nothing for B: never axes of their own.
-    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G21 F0.1")
+    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup=f"{modes} G21 F0.1")
     steps = b"U-1. W-1.\nG01 X30. F0.2\nG00 X40.\nZ1.\n" * 20
     contour = b"G71 P10 Q20 U0.4 W0.1 F0.25\nN10 G00 X16.\n" + steps + b"N20 X44.\nG00 X60. Z5.\n"
     assert differences(b"G00 X40. Z2.\n" + steps + contour + steps + b"M30\n", start, dialect) == []
