@@ -43,6 +43,8 @@ def program_start(machine: Machine) -> Start:
         tool_lengths=program.tool_lengths,
         startup=program.startup,
         decimal_point=program.decimal_point,
-        inch=machine.inch,
+        wraps={axis.name: axis.wrap for axis in machine.axes if axis.wrap is not None},
+        resume=program.resume_after_stop,
+        spindle=machine.spindle,
         diameter=any(axis.diameter for axis in machine.axes),
     )

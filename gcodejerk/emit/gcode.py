@@ -229,7 +229,7 @@ class _Frame:
         rest.append(self.text[at:])
         others = [w for w in self.block.words if w not in self.axis_words and w not in self.stops]
         if self.block.comments or any(not (w.letter == "G" and w.value == 0.0) for w in others):
-            out.append(b"".join(rest).rstrip(b" \t"))
+            out.append(b"".join(rest).rstrip(b" \t\r"))
         return out
 
     def _comment(self) -> bytes:

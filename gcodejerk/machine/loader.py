@@ -70,6 +70,13 @@ def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
                 f"axes.{name}.type is 'rotary', expected linear: {name} is measured in mm",
                 "call a rotary axis A, B or C",
             )
+        if "wrap" in axis and name not in checker.rotary:
+            checker.problems.add(
+                checker.place(("axes", name, "wrap")),
+                f"axes.{name}.wrap is {axis['wrap']!r}, but {name} is a linear axis, which does "
+                "not turn",
+                "leave wrap out",
+            )
         if axis.get("diameter") and name != "X":
             checker.problems.add(
                 checker.place(("axes", name, "diameter")),
@@ -162,6 +169,7 @@ def _machine(
         dialect=values.get("dialect", DIALECT_OF_CONTROLLER.get(controller, "auto")),
         interval=values["interval"],
         positioning=values["positioning"],
+        spindle=values.get("spindle"),
         axes=tuple(
             _axis(a, axes[a], a in checker.rotary, spectra.get(a)) for a in AXES if a in axes
         ),
@@ -179,6 +187,7 @@ def _axis(name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | 
     return Axis(
         name=name,
         rotary=rotary,
+        wrap=values.get("wrap", None if rotary else "none"),
         diameter=values["diameter"],
         resolution=values["resolution"],
         rapid=(rapid := _rapid(values["rapid"])),
@@ -222,4 +231,5 @@ def _program(values: dict[str, Any]) -> ProgramStart:
         },
         startup=values["startup"],
         decimal_point=values.get("decimal_point"),
+        resume_after_stop=values.get("resume_after_stop"),
     )

@@ -122,6 +122,9 @@ class Axis:
     """Modes that this axis alone excites; none where there is a spectrum."""
     spectrum: Spectrum | None = None
     """What was measured in place of modes."""
+    wrap: str | None = None
+    """How it goes to an absolute position, if it is rotary: ``none``, ``shortest`` or ``sign`` as
+    `gcodejerk.nc.Start` has them; None where the file does not say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +156,8 @@ class ProgramStart:
     """The codes in force, as a line of G-code; empty for the dialect's own."""
     decimal_point: str | None = None
     """What a number without a decimal point is: ``calculator``, ``standard``, None unknown."""
+    resume_after_stop: str | None = None
+    """Where the axes stand behind M0 and M1: ``same``, ``unknown``, None: as usual there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +183,8 @@ class Machine:
     """Structure modes, which several axes excite together."""
     design: Design
     program: ProgramStart
+    spindle: str | None = None
+    """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
     inch: bool = field(default=False, compare=False)
     """The file's lengths are inches."""
     source: str = field(default="<machine>", compare=False)

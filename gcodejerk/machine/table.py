@@ -224,6 +224,12 @@ _AXIS = Section(
     (
         Key("type", Choice(("linear", "rotary")),
             "Whether the axis slides [mm] or turns [deg]. Left out: A, B and C turn."),
+        Key("wrap", Choice(("none", "shortest", "sign")),
+            "How a rotary axis goes to an absolute position: none, through all angles like a "
+            "linear axis; shortest, the shorter way round (Fanuc 1008 and Haas with roll-over); "
+            "sign, forwards to a positive number and backwards to a negative one (LinuxCNC's "
+            "WRAPPED_ROTARY). Left out: unknown, and its absolute rapids are left alone.",
+            example="none"),
         Key("diameter", Flag(), "Programs give diameters of this axis (a lathe's X). "
             "This file gives radii all the same.", default=False),
         Key("resolution", Number("mm", above=0.0), "The smallest step that is written.",
@@ -280,6 +286,10 @@ _PROGRAM = Section(
             "3401, Haas setting 162): calculator 100 mm, standard 0.1 mm (100 least increments of "
             "0.001 mm or 0.0001 inch). Left out: unknown, and such rapids are left alone.",
             example="calculator"),
+        Key("resume_after_stop", Choice(("same", "unknown")),
+            "Where the axes stand when the program goes on behind M0 or M1: in the same place, or "
+            "wherever somebody has moved them by hand. Left out: same for linuxcnc, unknown "
+            "elsewhere.", example="unknown"),
         Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*", "G-code words"),
             "The codes in force when a program starts (LinuxCNC: RS274NGC_STARTUP_CODE).",
             default="", example='"G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"'),
@@ -302,6 +312,10 @@ MACHINE: Final = Section(
         Key("positioning", Choice(("linear", "independent")),
             "linear: G0 is a straight line, all axes together; independent: each axis on its own.",
             required=True),
+        Key("spindle", Choice(("mill", "laser", "plasma")),
+            "What M3 turns on. A beam is dark in G0 and burns in G1, so with laser and plasma "
+            "rapids are left alone while it is on. Left out: unknown where the dialect's controls "
+            "drive beams too (grbl, mach, marlin, klipper), a mill elsewhere.", example="mill"),
         Key("axes", Table(((_LETTERS, _AXIS),), _AXIS_NAMES, tuple(AXES), at_least=1),
             "The axes that the machine has.", required=True,
             example="{Z: {rapid: {velocity: 600, acceleration: 5000}}}"),

@@ -43,6 +43,7 @@ def machine_yaml(machine: Machine) -> str:
             "units: mm",
             f"interval: {_number(machine.interval)}",
             f"positioning: {machine.positioning}",
+            *([f"spindle: {machine.spindle}"] if machine.spindle is not None else []),
             "axes:",
             *(line for axis in machine.axes for line in _axis(axis)),
             *_modes(machine.modes, ""),
@@ -59,6 +60,11 @@ def machine_yaml(machine: Machine) -> str:
             *(
                 [f"  decimal_point: {program.decimal_point}"]
                 if program.decimal_point is not None
+                else []
+            ),
+            *(
+                [f"  resume_after_stop: {program.resume_after_stop}"]
+                if program.resume_after_stop is not None
                 else []
             ),
             "",
@@ -98,6 +104,8 @@ def _axis(axis: Axis) -> list[str]:
         f"    rapid: {_limits(axis.rapid)}",
         f"    limit: {_limits(axis.limit)}",
     ]
+    if axis.rotary and axis.wrap is not None:
+        lines.append(f"    wrap: {axis.wrap}")
     if axis.travel is not None:
         lines.append(f"    travel: [{', '.join(map(_number, axis.travel))}]")
     if axis.spectrum is not None:

@@ -22,10 +22,11 @@ LONGEST_LINE = 64 * 1024
 # Tab, LF, VT, FF and CR occur in text; 0x1A ended DOS files, DC1 and DC3 ran paper tapes.
 _BINARY = bytes(sorted(set(range(32)) - {9, 10, 11, 12, 13, 0x11, 0x13, 0x1A}))
 _CONTROL = re.compile(b"[" + re.escape(_BINARY) + b"]")
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+"""Of UTF-8: Windows editors write it; it is kept, and belongs to no line."""
 _MARKS = {
     b"\xff\xfe": "UTF-16",
     b"\xfe\xff": "UTF-16",
-    b"\xef\xbb\xbf": "UTF-8 with a byte order mark",
 }
 
 

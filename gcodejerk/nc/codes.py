@@ -33,6 +33,8 @@ class Codes:
     """Letter -> number, NaN for one that is not known; G, M and N left out."""
     unknown: bool = False
     """A code that is computed or that the dialect does not know."""
+    unknown_code: str = ""
+    """The first of these, as written."""
     fault: bool = False
     """The controller refuses the block."""
     expression: bool = False
@@ -44,6 +46,11 @@ class Codes:
     """Letter -> IC, AC and their kin."""
     increments: dict[str, float] = field(default_factory=dict)
     """Axis -> number of an address that is always an increment."""
+
+    def reject(self, text: bytes) -> None:
+        """Note a code that is not known."""
+        self.unknown = True
+        self.unknown_code = self.unknown_code or text.decode("latin-1")
 
     def moved(self) -> set[str]:
         """List the axes that words of the block name."""
@@ -85,7 +92,7 @@ def sort_words(
         if value is None:
             codes.expression = True
             if letter in "GM" or letter in dialect.calls:
-                codes.unknown = True
+                codes.reject(word.text)
                 continue
             rules = dialect.arithmetic
             known = before_block(block, variables, rules)
@@ -94,7 +101,7 @@ def sort_words(
             code = round(value * 10.0)
             group = dialect.groups.get(code) if abs(value * 10.0 - code) < 1e-3 else None
             if group is None:
-                codes.unknown = True
+                codes.reject(word.text)
             elif group not in codes.g:
                 codes.g[group] = code
             elif 800 in (code, codes.g[group]):
@@ -108,12 +115,13 @@ def sort_words(
             number = round(value)
             m_group = dialect.m_groups.get(number) if number == value else None
             if m_group is None:
-                codes.unknown |= dialect.other_m == "unknown" or number != value
+                if dialect.other_m == "unknown" or number != value:
+                    codes.reject(word.text)
             elif m_group in _GROUPED_M and any(dialect.m_groups.get(m) == m_group for m in codes.m):
                 codes.fault = True
             codes.m.append(number)
         elif letter in dialect.calls:
-            codes.unknown = True
+            codes.reject(word.text)
         elif letter in dialect.increments:
             axis = dialect.increments[letter]
             if axis in codes.increments or axis in values:

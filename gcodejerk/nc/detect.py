@@ -57,36 +57,41 @@ CODE = (
     _code("siemens", rb"(?<![A-Z_])(DIAMON|DIAMOF|DIAM90|A?TRANS|AROT|GOTOF|GOTOB|SUPA|LIMS)\b",
           "a Siemens word"),
     _code("siemens", rb"^\s*DEF\s+(REAL|INT|BOOL|STRING)", "a Siemens declaration"),
-    _code("siemens", rb"(?<![A-Z_])G(64[1-5]|50[5-9]|5[1-9]\d)\b", "a Siemens G code"),
+    _code("siemens", rb"(?<![A-Z_])G(64[1-5]|50[5-9]|5[1-9]\d)\b", "a Siemens G code", sure=False),
     _code("heidenhain-iso", rb"^\s*%\S+\s+G7[01]\s*\*", "a program head %NAME G71 *"),
     _code("heidenhain-iso", rb"^\s*N?\d*\s*G[0-9].*\*\s*$", "blocks that end with *", sure=False),
     _code("linuxcnc", rb"^\s*(N\d+\s*)?o\s*(<[^>]+>|\d+|\[[^\]]*\])\s*"
           rb"(sub|endsub|call|if|else|endif|while|endwhile|do|repeat|endrepeat|return)\b",
           "O-words of LinuxCNC"),
     _code("linuxcnc", rb"#<[^>]+>", "a variable with a name"),
-    _code("linuxcnc", rb"(?<![A-Z_])G(5\.2|5\.3|33\.1|38\.[2-5]|43\.2|92\.3)(?!\d)",
-          "a LinuxCNC G code"),
-    _code("linuxcnc", rb"(?<![A-Z_])M6[2-8]\b", "M62 to M68"),
-    _code("fanuc", rb"(?<![A-Z_])G(5\.1|54\.1|68\.2|43\.4|43\.5|10\.6)(?!\d)", "a Fanuc G code"),
+    _code("linuxcnc", rb"(?<![A-Z_])G(5\.2|5\.3|33\.1)(?!\d)", "a LinuxCNC G code"),
+    _code("fanuc", rb"(?<![A-Z_])G(5\.1\s*Q|68\.2|43\.[45]|10\.6)(?!\.)", "a Fanuc G code"),
+    *(_code(name, rb"(?<![A-Z_])G54\.1(?!\d)", "G54.1", sure=False) for name in ("fanuc", "mach")),
     _code("fanuc", rb"(?<![A-Z_])(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)",
           "Fanuc macro flow", sure=False),
-    _code("haas", rb"(?<![A-Z_])G(187|103|150|154)(?!\d)", "a Haas G code"),
-    _code("haas", rb"(?<![A-Z_])M97\b", "M97"),
-    _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
-    _code("fanuc-lathe-a", rb"(?<![A-Z_])G7[0-6]\s*(P\d+\s*Q|U)", "a turning cycle"),
-    _code("fanuc-lathe-a", rb"(?<![A-Z_])G50\s*S\d", "G50 S of lathes"),
+    _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
     _code("grbl", rb"^\s*\$(\$|#|G|I|N|X|H|C|J=|\d+=)", "a $ command of grbl"),
     *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
       for name in ("marlin", "klipper")),
     _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
           rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
 )  # fmt: skip
+_INCREMENTS = re.compile(rb"(?<![A-Z_#\[])[UW]\s*[-+]?[.\d]")
+LATHE = (
+    (re.compile(rb"(?<![A-Z_])T\d{4}(?!\d)"), "a tool with its offset, T0101"),
+    (re.compile(rb"(?<![A-Z_])G(50|92)\s*S\d"), "a limit of the spindle's speed, G50 S"),
+    (re.compile(rb"(?<![A-Z_])G96(?!\d)"), "constant surface speed, G96"),
+    (_INCREMENTS, "increments U and W"),
+    (re.compile(rb"^[^Y\n]*(?<![A-Z_])G7[1-6](?!\d)[^Y\n]*$", re.MULTILINE), "a turning cycle"),
+)
+"""What programs of lathes hold, and hardly any program of a mill that reads Fanuc's language."""
+_TURNING = re.compile(rb"\b(LATHE|TURN(?:ING)?|TURN POST)\b")
 _O_PROGRAM = re.compile(rb"^\s*[O:]\d+", re.MULTILINE)
 _KLARTEXT = re.compile(rb"^\s*\d+\s+BEGIN\s+PGM\b", re.MULTILINE)
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 
 
-def detect_dialect(head: bytes, name: str) -> tuple[Dialect, str]:
+def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect, str]:
     r"""Find the dialect of a program.
 
     Parameters
@@ -95,6 +100,8 @@ def detect_dialect(head: bytes, name: str) -> tuple[Dialect, str]:
         The beginning of the program.
     name : str
         For messages.
+    lathe : bool
+        The machine file is one of a lathe.
 
     Returns
     -------
@@ -132,6 +139,7 @@ def detect_dialect(head: bytes, name: str) -> tuple[Dialect, str]:
             into.setdefault(evidence.dialect, f"{evidence.why} (line {line})")
     _prefer(found, code)
     chosen = found or hints
+    _refuse_mills(chosen, code, comments, lathe, name)
     if len(chosen) == 1:
         ((dialect, why),) = chosen.items()
         return DIALECTS[dialect], why
@@ -156,11 +164,38 @@ def detect_dialect(head: bytes, name: str) -> tuple[Dialect, str]:
     )
 
 
+def _refuse_mills(
+    chosen: dict[str, str], code: bytes, comments: bytes, lathe: bool, name: str
+) -> None:
+    """Refuse to take a program for one of a mill that reads like one of a lathe.
+
+    In system A, G90 X40. Z-20. is a turning pass and X35. the next one; on a mill both are moves.
+    """
+    mills = [dialect for dialect in chosen if DIALECTS[dialect].lathe == "no"]
+    if not mills:
+        return
+    upper = code.upper()
+    why = "the machine's X is a diameter" if lathe else ""
+    if not why and not {"fanuc", "haas"}.isdisjoint(mills):
+        why = next((what for pattern, what in LATHE if pattern.search(upper)), "")
+        if not why and _TURNING.search(comments.upper()):
+            why = "a comment speaks of turning"
+    if why:
+        raise ProgramError(
+            f"the program could be of {mills[0]} ({chosen[mills[0]]}), but reads like one of a "
+            f"lathe ({why}), and which system of G codes the lathe has cannot be told",
+            "state it: --dialect fanuc-lathe-a or fanuc-lathe-b (or fanuc, haas for a mill), or "
+            "the machine file's dialect",
+            Place(name),
+        )
+
+
 def _prefer(found: dict[str, str], code: bytes) -> None:
     """Take out what the evidence of a more special dialect explains as well."""
-    if "haas" in found or "fanuc-lathe-a" in found:
-        found.pop("fanuc", None)  # they speak Fanuc's language with words of their own
-    if "fanuc" in found and re.search(rb"\bG50\s*S\d|\bG28\s*U", code):
-        found["fanuc-lathe-a"] = found.pop("fanuc")
+    if "fanuc" in found and "haas" not in found and _INCREMENTS.search(code.upper()):
+        why = f"{found.pop('fanuc')}, and U and W are increments in system A alone"
+        found["fanuc-lathe-a"] = why
+    if "haas" in found:
+        found.pop("fanuc", None)  # it speaks Fanuc's language with words of its own
     if "linuxcnc" in found and "mach" in found and _O_PROGRAM.search(code):
         found.pop("mach")

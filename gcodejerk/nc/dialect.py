@@ -49,6 +49,7 @@ Effect = Literal[
     "restore",  # puts them in force again
     "local",  # a further offset
     "table",  # writes data of tools or systems
+    "data",  # the same, and where L or P says so, parameters of the control
     "frames",  # changes a frame in a way that is not followed
     "cycle",  # moves, and leaves the modes as they were but for motion and F
     "modal cycle",  # every position that follows is one of a cycle, until called without
@@ -58,6 +59,8 @@ Effect = Literal[
     "diameter",  # X is a diameter from here on
     "radius",  # it is none
     "either",  # it is one or the other, depending on the word
+    "written",  # writes offsets, tool data or parameters of the control
+    "feed group",  # F means the speed of the axes that it names; of all, where it names none
 ]
 """What a code, or a name such as ``TRANS``, does besides changing its modal group."""
 
@@ -69,7 +72,8 @@ class Text:
     parentheses: Literal["comment", "open comment", "code"] = "comment"
     """A comment that has to close on its line; one that the line's end closes too; no comment."""
     semicolon: Literal["comment", "end", "error"] = "comment"
-    """A comment; the end of the block, behind which nothing may stand; neither."""
+    """A comment; the end of the block, behind which only text may stand that is no block of its
+    own; neither."""
     slashes: bool = False
     """``//`` begins a comment."""
     python: bool = False
@@ -98,6 +102,10 @@ class Text:
     """Blanks count nowhere, also within numbers; or they stand between words only."""
     checksum: bool = False
     """``*123`` may end a line."""
+    strings: bool = False
+    """A word may hold a name: ``T="DRILL 8.5"``."""
+    hexadecimal: bool = False
+    """A zero in front of an X begins a hexadecimal number: ``Y0X10`` is Y16."""
     end: bytes = b""
     """What ends every block."""
     line_limit: int = 512
@@ -142,6 +150,15 @@ class Arithmetic:
     of a tool change."""
     system: int = 0
     """From this number on variables belong to the control."""
+    offsets: int = 0
+    """From this number on a variable may hold offsets or other data of the control, so that who
+    sets it may rename where the axes stand; 0: no variable does."""
+    timers: frozenset[int] = frozenset()
+    """Those of them that hold no such thing."""
+    at_selection: bool = False
+    """What such a variable holds takes effect where a work system is selected, not before."""
+    feed: frozenset[str] = frozenset()
+    """Variables that read the F in force: ``4109``, ``<_feed>``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,12 +227,39 @@ class Dialect:
     """Addresses that change a tool's offset, and with it the frame: T on a lathe, D."""
     length_axes: str = AXES
     """Axes that a tool length may shift."""
+    length_moves: bool = False
+    """A change of the tool length may move the machine by itself, by a parameter, instead of
+    renaming where it stands."""
+    length_word: str = ""
+    """Address that chooses another tool length by itself while one is in force."""
+    p_selects: frozenset[int] = frozenset()
+    """Systems that a P may turn into another one: G54 P3 for G54.1 P3."""
+    bare_set: Literal["nothing", "zero", "unknown"] = "unknown"
+    """G92 without axis words: changes nothing; makes every position zero; nobody knows."""
+    incremental_set: bool = False
+    """G92 means the same in G91."""
+    lengths_only: frozenset[int] = frozenset()
+    """Codes for inch or mm that leave the unit of F as it was."""
+    bars: Mapping[int, tuple[str, bool | Literal["P"]]] = field(default_factory=dict)
+    """G code -> a name in `judge.BARS`, and whether it begins or ends; "P": it begins where P is
+    given and not 0."""
+    dark_rapids: bool = False
+    """The control also drives beams, which are dark in G0 and on in G1."""
+    beam_codes: frozenset[int] = frozenset()
+    """M codes that hardly any mill uses on these controls, and every laser does."""
+    same_after_stop: bool = False
+    """Nobody can move an axis while M0 or M1 waits, or the control takes that back."""
+    path_has_to_be_stated: bool = False
+    """Controls usually start in exact stop, by their machine data."""
+    lathe: Literal["no", "yes", "either"] = "no"
+    """Whether programs of lathes are written so, in which X is a diameter."""
     tool_cancelled_by_return: bool = False
     """G28 cancels the tool length."""
     packed_repeats: bool = False
     """M98 P31000 runs O1000 three times."""
     other_m: Literal["unknown", "positions"] = "unknown"
-    """An M code that is not listed: not understood, or a program of the builder's that may move."""
+    """An M code that is not listed: not understood, or a program of the builder's that may move,
+    and that may end in G90 and with the tool length cancelled, as those for tool changes do."""
     contours: frozenset[int] = frozenset()
     """Codes whose P and Q name the first and last block of a contour: those blocks do not run."""
     redrawn: frozenset[int] = frozenset()

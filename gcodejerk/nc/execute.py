@@ -9,41 +9,43 @@ out, and whatever they touched is unknown afterwards.
 
 from __future__ import annotations
 
+import math
+
 from gcodejerk.nc import frames
+from gcodejerk.nc.beams import shows_habits, uses_outputs
 from gcodejerk.nc.block import Block, Name
 from gcodejerk.nc.codes import Codes, sort_words
 from gcodejerk.nc.cycles import begin_cycle, run_cycle
-from gcodejerk.nc.dialect import AXES, PLANES, Dialect, Effect
+from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Dialect, Effect
 from gcodejerk.nc.judge import Call, Step, judge, looks_rapid
 from gcodejerk.nc.jumps import known_behind
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.rules import arc_words, is_complete, takes_axes
+from gcodejerk.nc.start import Start
 from gcodejerk.nc.tokenizer import CHECKSUM
-from gcodejerk.nc.variables import assign, assigned_values, forget_shared
+from gcodejerk.nc.variables import assign, assigned_values, forget_shared, reads_feed
 from gcodejerk.units import MM_PER_INCH
 
 _TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
 """Effects beside which the axis words of the block are no straight move."""
-_CALLS = frozenset({47, 96, 97, 98})
-"""M codes of the group "stop" that go on elsewhere."""
+_CALLS = frozenset({47, 96, 97, 98, 198})
+"""M codes that go on elsewhere, or may."""
+_ENDS = frozenset({2, 17, 30, 99})
+_STOPS = frozenset({0, 1, 60})
 _CALL_WORDS = frozenset("MNPL")
 
 
 class Executor:
     """Runs blocks against a state that it owns."""
 
-    def __init__(
-        self,
-        dialect: Dialect,
-        state: State,
-        lengths: dict[int, float],
-        decimal_point: str | None = None,
-    ) -> None:
+    def __init__(self, dialect: Dialect, state: State, start: Start) -> None:
         self.dialect = dialect
         self.state = state
-        self.lengths = lengths
-        self.decimal_point = decimal_point
+        self.lengths = dict(start.tool_lengths)
+        self.decimal_point = start.decimal_point
+        self._stays = start.resume == "same" or (start.resume is None and dialect.same_after_stop)
+        """Behind M0 and M1 the axes stand where they stood."""
         self._contour: float | None = None
         """N of the block that ends a contour, which a cycle runs by itself."""
         self.jumps_known = False
@@ -59,17 +61,17 @@ class Executor:
         inch = state.unit == MM_PER_INCH
         rules = self.dialect.arithmetic
         codes = sort_words(block, self.dialect, inch, self.decimal_point, state.variables)
-        step = Step(start=state.position.copy())
+        step = Step(start=state.position.copy(), beam=state.spindle != 5)
         for axis in codes.moved():
             step.words |= 1 << AXES.index(axis)
         values = assigned_values(block, state, rules) if block.assigns else []
         for target in block.assigns:
             self._assign(target)
-        step.unknown = codes.unknown and not codes.expression
+        step.unknown = codes.unknown_code if not codes.expression else ""
         before = state.motion
         ended = state.ended
         if self.calls_followed and {w.letter for w in block.words} <= _CALL_WORDS:
-            step.call = _call(codes)
+            step.call = _call(codes, self.dialect)
         if (
             codes.fault
             or block.problem is not None
@@ -81,9 +83,13 @@ class Executor:
             if block.assigns:
                 assign(block, values, state, rules)
             self._act(codes, step)
+        step.beam |= state.spindle != 5
+        if reads_feed(block, rules):
+            step.feed_event = USES_FEED
         contour = self._contour is not None
         if contour:
             self._leave_contour(block)
+        step.end = step.end or state.position.copy()
         if step.fault or codes.unknown:
             step.rapid = step.rapid or looks_rapid(block, codes, step, before, self.dialect)
         if step.rapid:
@@ -119,9 +125,17 @@ class Executor:
         step.feed_event = USES_FEED
 
     def _assign(self, target: str) -> None:
-        """Parameters from 5161 on hold reference points and offsets; an empty name may be any."""
-        if not target or (target.isdigit() and int(target) >= 5161):
+        """Set a variable: one of the control's may hold offsets; an empty name may be any."""
+        rules = self.dialect.arithmetic
+        if not rules.offsets or (target and not target.isdigit()):
+            return
+        number = int(target) if target else rules.offsets
+        if number < rules.offsets or number in rules.timers:
+            return
+        if rules.at_selection:
             self.state.offsets = {}
+        else:
+            frames.data_written(self.state, self.lengths)
 
     def _act(self, codes: Codes, step: Step) -> None:
         """Execute, in the fixed order."""
@@ -146,9 +160,12 @@ class Executor:
                 step.feed_event = GIVES_FEED
         for m in codes.m:
             self._miscellaneous(m, step)
+        if dialect.length_word in values and "tool length" not in g:
+            frames.tool_length(state, 0, values, {}, dialect)
         if not dialect.tool_frame.isdisjoint(values):
-            state.put("tool", [NAN] * len(AXES))
+            state.lose("tool")
             state.forget_positions()
+            frames.end_bar(state, "tool data written")
         if state.cycle is not None and g.get("distance", state.distance) != state.distance:
             # R and Z that stay in force across G90/G91 are read anew in a way not documented
             state.put("cycle", (state.cycle[0], NAN, NAN))
@@ -158,8 +175,14 @@ class Executor:
                 state.put(name, code)
             if code in dialect.transforms:
                 self._transform(*dialect.transforms[code])
+            if code in dialect.bars:
+                name, on = dialect.bars[code]
+                p = values.get("P", 0.0)
+                begins = (None if p != p else p != 0.0) if on == "P" else on
+                state.put("bars", {**state.bars, name: begins})
         if "units" in g:
-            self._units(MM_PER_INCH if dialect.units[g["units"]] else 1.0)
+            unit = MM_PER_INCH if dialect.units[g["units"]] else 1.0
+            self._units(unit, unit if g["units"] not in dialect.lengths_only else state.feed_unit)
         for code in g.values():
             self._effect(dialect.effect(code), code, values, step)
         effects = [self._named(name) for name in codes.names]
@@ -172,6 +195,8 @@ class Executor:
             for effect in effects:
                 if effect == "flow":
                     continue
+                if effect == "feed group":
+                    self._feed_group(codes.names)
                 self._effect(effect, 0, values, step)
                 words_taken |= effect in _TAKES_WORDS or effect in ("frames", "transform")
         if "path" in g:
@@ -190,9 +215,17 @@ class Executor:
                 state.forget_positions()  # words without a command: a build may take them for one
         else:
             self._move(codes, step)
+        feeds = bool(step.words) and state.motion != dialect.rapid
+        step.habit = shows_habits(codes, state, feeds, dialect)
+        step.outputs = uses_outputs(codes)
+        step.end = state.position.copy()
         for m in codes.m:
-            if m in (2, 17, 30, 99) and self.dialect.m_groups.get(m) == "stop":
+            if self.dialect.m_groups.get(m) != "stop":
+                continue
+            if m in _ENDS:
                 step.ends = True
+            elif m in _STOPS and not self._stays:
+                state.forget_positions()  # meanwhile somebody may have moved them by hand
 
     def _goes_on(self, codes: Codes, step: Step) -> bool:
         """Whether the block leads to the next one, and what it leaves known is certain."""
@@ -216,10 +249,19 @@ class Executor:
             return "flow"
         return self.dialect.names.get(name.name, "flow")
 
-    def _units(self, unit: float) -> None:
+    def _feed_group(self, names: list[Name]) -> None:
+        """FGROUP(X,Y): F is the speed of these axes alone; FGROUP() is all again."""
+        group = [n.arguments.strip(b"() \t") for n in names if self._named(n) == "feed group"]
+        self.state.put("bars", {**self.state.bars, "feed group": any(group)})
+
+    def _units(self, unit: float, feed_unit: float | None) -> None:
+        """Take a new unit of lengths, and of F."""
         state = self.state
+        if feed_unit != state.feed_unit:
+            state.put("feed", NAN)
+        state.put("feed_unit", feed_unit)
         if unit != state.unit:
-            for name in ("feed", "path_p", "path_q"):
+            for name in ("path_p", "path_q"):
                 state.put(name, NAN)
             if state.cycle is not None:
                 state.put("cycle", (state.cycle[0], NAN, NAN))
@@ -245,15 +287,20 @@ class Executor:
             state.put("turns", True)
             state.put("diameter", None)
         elif effect == "length":
-            frames.tool_length(state, code, values, self.lengths, self.dialect.length_axes)
+            frames.tool_length(state, code, values, self.lengths, self.dialect)
         elif effect == "system":
-            frames.select_system(state, code)
+            other = "P" in values and code in self.dialect.p_selects
+            frames.select_system(state, 0 if other else code)
         elif effect == "numbered system":
             number = values.get("P", NAN)
             frames.select_system(state, frames.numbered_system(number))
         elif effect == "frames":
             state.forget_frame()
             state.forget_positions()
+        elif effect == "written":
+            frames.data_written(state, self.lengths)
+        elif effect == "data":
+            frames.write_data(state, self.lengths, values)
         elif effect == "transform":
             self._transform("frame", on=True)
         elif effect == "modal cycle":
@@ -279,17 +326,41 @@ class Executor:
         """Execute an M code, the end of the program excepted."""
         state = self.state
         group = self.dialect.m_groups.get(m)
+        if m in (3, 4, 5) and group == "spindle":
+            state.put("spindle", m)
         if group is None or m == 6 or group == "user":
             # A tool change may go anywhere, and so may a program of the user's.
             state.forget_positions()
             forget_shared(state, self.dialect.arithmetic)
+            if self.dialect.other_m == "positions":
+                self._behind_macro()
+        elif m in (70, 72) and group == "state":
+            self._saved(m, step)
         elif m == 73 and group == "state":
             state.put("restores", True)
-        elif m == 72 and group == "state":
-            state.forget_modes()
-            state.forget_positions()
         elif m in _CALLS and step.call is None:
             self._leave(step)
+
+    def _saved(self, m: int, step: Step) -> None:
+        """M70 keeps F and the modes, M72 gives them back."""
+        step.feed_event = USES_FEED
+        if m == 72:
+            self.state.forget_modes()
+            self.state.forget_positions()
+
+    def _behind_macro(self) -> None:
+        """Forget what a builder's macro is known to leave changed.
+
+        It retracts with G91 G28 and ends in G90, it cancels the tool length, and it may end in G0
+        or in G1. That it leaves G91, or another work system, behind would stop every shop.
+        """
+        state = self.state
+        state.lose("tool")
+        state.put("motion", None)
+        if state.cycle is not None:
+            state.lose("cycle")
+        if state.distance == 910 and "distance" not in state.fixed:
+            state.put("distance", None)
 
     def _leave(self, step: Step) -> None:
         """Run a program that is not followed."""
@@ -314,8 +385,11 @@ class Executor:
         if effect == "return":
             self._return(codes, step)
             return
-        frames.change(state, effect, values, self.lengths)
-        if effect in ("table", "local", "set", "frames"):
+        if effect == "set":
+            frames.set_names(state, codes, dialect)
+        else:
+            frames.change(state, effect, values, self.lengths)
+        if effect in ("table", "local", "set", "frames", "data"):
             return
         if step.words and takes_axes(codes):
             return
@@ -343,7 +417,7 @@ class Executor:
                 state.forget_positions()
                 state.put("cycle", None)
                 if dialect.drilling.own_group:
-                    state.lose_cycle()  # refused or not (K0): positions may drill from here on
+                    state.lose("cycle")  # refused or not (K0): positions may drill from here on
             return
         step.rapid = motion == dialect.rapid
         if effect == "machine":
@@ -352,7 +426,7 @@ class Executor:
             state.forget_positions(self._plane_axes())
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         else:
-            self._straight(codes)
+            self._straight(codes, step)
         if state.compensation != 400:
             state.forget_positions(self._plane_axes())
         if any(on is not False for on in state.transforms.values()):
@@ -376,23 +450,37 @@ class Executor:
         state.put("cycle", None)
         return None
 
-    def _straight(self, codes: Codes) -> None:
+    def _straight(self, codes: Codes, step: Step) -> None:
         """Go to where the axis words say."""
         state, values = self.state, codes.values
         for axis, letter in enumerate(AXES):
             if letter in codes.increments:
-                step = codes.increments[letter] * state.scale(axis)
-                state.move(axis, state.position[axis] + step)
+                by = codes.increments[letter] * state.scale(axis)
+                state.move(axis, state.position[axis] + by)
             elif letter in values:
                 value = values[letter] * state.scale(axis)
                 function = codes.functions.get(letter)
                 if function == "IC" or (function is None and state.distance == 910):
                     value = state.position[axis] + value
                 elif function in (None, "AC") and (function or state.distance is not None):
-                    pass
+                    if letter not in LINEAR:
+                        value = self._turn(axis, value, step)
                 else:
                     value = NAN  # the shortest way, or this way round: the machine decides
                 state.move(axis, value)
+
+    def _turn(self, axis: int, angle: float, step: Step) -> float:
+        """Where a rotary axis stands behind an absolute word."""
+        stands = self.state.position[axis]
+        wrap = self.state.wraps[axis]
+        step.way_unknown |= wrap is None and stands != angle
+        if wrap in (None, "none"):
+            return angle
+        end = way_round(stands, angle, wrap)
+        step.way_unknown |= end != end
+        if end != stands and (wrap == "sign" or not 0.0 <= stands < 360.0 or end != angle):
+            step.turned |= 1 << axis
+        return end
 
     def _machine_move(self, values: dict[str, float]) -> None:
         """G53: the axis words are machine coordinates."""
@@ -400,13 +488,14 @@ class Executor:
         for axis, letter in enumerate(AXES):
             if letter in values:
                 at = values[letter] * state.scale(axis) - state.shift(axis)
-                state.move(axis, NAN if state.distance == 910 else at)
+                counts = letter not in LINEAR and state.wraps[axis] in ("shortest", "sign")
+                state.move(axis, NAN if counts or state.distance == 910 else at)
 
     def _return(self, codes: Codes, step: Step) -> None:
         """G28 and G30: to a stored point that the program does not tell."""
         step.rapid = True
         if self.dialect.tool_cancelled_by_return:
-            self.state.put("tool", [NAN] * len(AXES))
+            self.state.lose("tool")
             self.state.forget_positions()
         named = [AXES.index(axis) for axis in codes.moved()]
         self.state.forget_positions(named or range(len(AXES)))
@@ -421,11 +510,48 @@ class Executor:
         return [AXES.index(letter) for letter in letters]
 
 
-def _call(codes: Codes) -> Call | None:
+def way_round(stands: float, angle: float, wrap: str) -> float:
+    """Where a rotary axis ends that counts turns, behind an absolute word.
+
+    Parameters
+    ----------
+    stands : float
+        Where it stands. [deg]
+    angle : float
+        What the word says. [deg]
+    wrap : str
+        ``shortest``, or ``sign``: LinuxCNC's WRAPPED_ROTARY, which goes forwards to a positive
+        number and backwards to a negative one (interp_convert.cc, unwrap_rotary).
+
+    Returns
+    -------
+    float
+        NaN where half a turn has no shorter way round, or the number is not an angle. [deg]
+    """
+    if stands != stands:
+        # Somewhere on this angle; how many turns have been counted, nobody knows.
+        return angle if wrap == "shortest" else NAN
+    if wrap == "shortest":
+        way = (angle - stands + 180.0) % 360.0 - 180.0
+        if abs(abs(way) - 180.0) < 1e-6:
+            return NAN
+        return angle if abs(stands + way - angle) < 1e-9 else stands + way
+    if abs(angle) >= 360.0:
+        return NAN
+    backwards = math.copysign(1.0, angle) < 0.0
+    end = abs(angle) + math.floor(stands / 360.0) * 360.0
+    if backwards and end > stands:
+        return end - 360.0
+    return end + 360.0 if not backwards and end < stands else end
+
+
+def _call(codes: Codes, dialect: Dialect) -> Call | None:
     """Take a call out of a block that holds nothing else."""
     number, repeats = codes.values.get("P", NAN), codes.values.get("L", 1.0)
     if len(codes.m) != 1 or codes.m[0] not in (97, 98) or codes.fault:
         return None
     if not (number > 0.0 and number.is_integer() and repeats > 0.0 and repeats.is_integer()):
+        return None
+    if dialect.m_groups.get(codes.m[0]) != "stop":
         return None
     return Call(codes.m[0], int(number), int(repeats) if "L" in codes.values else None)

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gcodejerk.nc.dialect import AXES, Effect
+from gcodejerk.nc.codes import Codes
+from gcodejerk.nc.dialect import AXES, Dialect, Effect
 from gcodejerk.nc.modal import NAN, State
 
 Values = Mapping[str, float]
@@ -26,9 +27,9 @@ def _rename(state: State, field: str, after: list[float]) -> None:
 
 
 def tool_length(
-    state: State, code: int, values: Values, lengths: Mapping[int, float], axes: str
+    state: State, code: int, values: Values, lengths: Mapping[int, float], dialect: Dialect
 ) -> None:
-    """G43, G43.1, G43.2 and G49.
+    """G43, G43.1, G43.2 and G49; a code of 0 for a length that nobody knows.
 
     Parameters
     ----------
@@ -40,9 +41,12 @@ def tool_length(
         The block's numbers.
     lengths : mapping of int to float
         H number -> length along Z. [mm]
-    axes : str
-        Those that a length may shift in G17; elsewhere, or where the block names another, all may.
+    dialect : Dialect
+        Says which axes a length may shift in G17 (elsewhere, or where the block names another, all
+        may), and whether the control itself may move.
     """
+    axes = dialect.length_axes
+    end_bar(state, "tool data written")
     if state.plane != 170 or any(axis in values for axis in AXES if axis not in axes):
         axes = AXES
     kept = {k: state.tool[k] for k, axis in enumerate(AXES) if axis not in axes}
@@ -51,6 +55,8 @@ def tool_length(
     for k, offset in kept.items():
         state.tool[k] = offset
         state.move(k, places[k])
+    if dialect.length_moves:
+        state.forget_positions(k for k in range(len(AXES)) if k not in kept)
 
 
 def _shift_tool(state: State, code: int, values: Values, lengths: Mapping[int, float]) -> None:
@@ -85,6 +91,7 @@ def system_key(name: str) -> int:
 
 def select_system(state: State, code: int) -> None:
     """G54 to G59.3, and those with a number."""
+    end_bar(state, "offsets written")
     if state.system == code and code:
         return
     state.put("system", code)
@@ -94,11 +101,44 @@ def select_system(state: State, code: int) -> None:
     _rename(state, "g5x", state.offsets.get(code, [NAN] * len(AXES)))
 
 
+def end_bar(state: State, name: str) -> None:
+    """End one of `State.bars`, if it was there."""
+    if name in state.bars:
+        state.put("bars", {**state.bars, name: False})
+
+
+def data_written(state: State, lengths: dict[int, float]) -> None:
+    """Offsets or tool data of the control have been written, nobody knows which.
+
+    When they take effect differs: at once, in the next block, where a work system is selected. So
+    what absolute words say is not certain before one is, nor before a tool length is.
+    """
+    lengths.clear()
+    state.offsets = {}
+    state.put("system", None)
+    state.forget_frame()
+    state.forget_positions()
+    state.put("bars", {**state.bars, "offsets written": True, "tool data written": True})
+
+
+_OFFSETS, _TOOLS = frozenset({2.0, 20.0}), frozenset({1.0, 3.0, 10.0, 11.0, 12.0, 13.0})
+"""L of G10 for data of work systems, and of tools (Fanuc, Haas; Mach has 1 and 2 of these)."""
+
+
+def write_data(state: State, lengths: dict[int, float], values: Values) -> None:
+    """G10 with an L: offsets, tool data, or parameters, which may change everything."""
+    kind = values.get("L", NAN)
+    data_written(state, lengths)
+    if kind in _OFFSETS:
+        end_bar(state, "tool data written")
+    elif "L" in values and kind not in _TOOLS:
+        state.forget()
+        state.put("bars", {**state.bars, "parameters written": True})
+
+
 def change(state: State, effect: Effect, values: Values, lengths: dict[int, float]) -> None:
-    """Do what a non-modal code does to the frames: G92 and its kin, G52, G10."""
-    if effect == "set":
-        _set_g92(state, values)
-    elif effect == "clear":
+    """Do what a non-modal code does to the frames: G92.1 and its kin, G52, G10."""
+    if effect == "clear":
         _rename(state, "g92", [0.0] * len(AXES))
     elif effect == "restore":
         _rename(state, "g92", [NAN] * len(AXES))
@@ -108,11 +148,26 @@ def change(state: State, effect: Effect, values: Values, lengths: dict[int, floa
         _write_table(state, values, lengths)
 
 
-def _set_g92(state: State, values: Values) -> None:
-    """G92: the axis words are the new names of where the axes stand."""
+def set_names(state: State, codes: Codes, dialect: Dialect) -> None:
+    """G92: the axis words are the new names of where the axes stand.
+
+    What increments mean beside it (G50 U5., G91 G92 X5.) is not known but where the table says so:
+    then where the axes stand has no name any more.
+    """
+    values: Values = codes.values
+    if not values and not codes.increments:
+        if dialect.bare_set == "zero":
+            values = dict.fromkeys(AXES, 0.0)
+        elif dialect.bare_set == "unknown":
+            state.forget_positions()
+            state.lose("g92")
     after = list(state.g92)
+    unknown = state.distance != 900 and not dialect.incremental_set
     for axis, letter in enumerate(AXES):
-        if letter in values:
+        if letter in codes.increments or (unknown and letter in values):
+            after[axis] = NAN
+            state.move(axis, NAN)
+        elif letter in values:
             named = values[letter] * state.scale(axis)
             after[axis] += state.position[axis] - named
             state.move(axis, named)

@@ -36,6 +36,16 @@ _FRAME_CHANGES: frozenset[Effect] = frozenset(
 """Effects that, in the block of a rapid, move the origin that its numbers refer to."""
 
 
+BARS = {
+    "offsets written": Reason.SYSTEM_WRITTEN,  # until a work system is selected
+    "tool data written": Reason.SYSTEM_WRITTEN,  # until a tool length is
+    "parameters written": Reason.SYSTEM_WRITTEN,  # for good
+    "look-ahead": Reason.LOOK_AHEAD,
+    "feed group": Reason.FEED_GROUP,
+}
+"""What makes rapids unfit while it is, or may be, in force (`State.bars`), and the reason."""
+
+
 @dataclass(frozen=True, slots=True)
 class Call:
     """``M98 P1000 L3``."""
@@ -54,14 +64,25 @@ class Step:
     rapid: bool = False
     reason: Reason | None = None
     start: list[float] = field(default_factory=list)
+    end: list[float] = field(default_factory=list)
+    """Where the block's own motion ends, whatever a stop behind it leaves."""
     words: int = 0
     """Bit k set: a word for AXES[k]."""
     cycle: bool = False
     """The rapid is one of a canned cycle."""
     feed_event: int = NO_FEED
     fault: bool = False
-    unknown: bool = False
-    """A code that the dialect does not know."""
+    unknown: str = ""
+    """A code that the dialect does not know, as written."""
+    turned: int = 0
+    """Bit k set: AXES[k] turns, and its word alone does not say which way."""
+    way_unknown: bool = False
+    """Nor does the machine file."""
+    habit: bool = False
+    outputs: bool = False
+    """See `beams`."""
+    beam: bool = False
+    """What M3 turns on is, or may be, on in front of the block or behind it."""
     ends: bool = False
     """The program ends behind the block's motion."""
     call: Call | None = None
@@ -132,6 +153,9 @@ def judge(
         return Reason.CUTTER_COMPENSATION
     if state.transformed:
         return Reason.ROTATION
+    bar = next((name for name, on in state.bars.items() if on is not False), None)
+    if bar is not None:
+        return BARS[bar]
     return _judge_move(codes, step, state, dialect)
 
 
@@ -140,7 +164,7 @@ def _judge_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
     named = [k for k in range(len(AXES)) if step.words >> k & 1]
     moves = unknown = False
     for axis in named:
-        a, b = step.start[axis], state.position[axis]
+        a, b = step.start[axis], step.end[axis]
         if math.isnan(a) or math.isnan(b):
             unknown = True
         elif a != b:
@@ -153,6 +177,12 @@ def _judge_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
         return Reason.UNITS_UNKNOWN
     if unknown:
         return Reason.START_UNKNOWN
+    if dialect.lengths_only and state.feed_unit != state.unit:
+        return Reason.FEED_UNIT
+    if dialect.path_has_to_be_stated and state.path is None:
+        return Reason.PATH_UNKNOWN
+    if step.way_unknown:
+        return Reason.ROTARY_WAY
     # Where the table does not say what a letter is for, nobody knows what it does to a rapid.
     others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
     if (
@@ -163,7 +193,7 @@ def _judge_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
         or codes.functions
     ):
         return Reason.OTHER_WORDS
-    moving = {AXES[k] in LINEAR for k in named if step.start[k] != state.position[k]}
+    moving = {AXES[k] in LINEAR for k in named if step.start[k] != step.end[k]}
     if len(moving) > 1 and not dialect.feed_of_mixed:
         return Reason.MIXED_AXES
     return None

@@ -9,21 +9,21 @@ Rule 2: this file knows no machine. It says what the program asked for.
 
 Rule 3: what is not known for certain is unknown: None for a mode, NaN for a number. Unknown never
 becomes known except by a word that states the value.
+
+Rule 4: `FIELDS` is the one list of what a state holds. Starting, copying, forgetting, comparing and
+joining go through it, so that a field that is added is forgotten and joined like the others.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
 
 from gcodejerk.nc.dialect import AXES, LINEAR
 
 NAN = math.nan
-MODES = (
-    *("motion", "plane", "distance", "arc_distance", "feed_mode", "unit", "compensation"),
-    *("retract", "system", "path", "diameter"),
-)
-"""The fields of `State` that hold one modal group each."""
 MOST_VARIABLES = 1000
 """Variables that are known at a time, so that a copy of the state stays cheap."""
 
@@ -37,41 +37,92 @@ GROUP_FIELDS = {
 }
 """Modal groups whose code simply becomes the value of a field."""
 
-STICKY = ("distance_stated", "feed_mode_stated", "unit_stated", "rotates", "turns", "restores")
-"""Fields that say that the program did something somewhere; never taken back."""
+Kind = Literal[
+    "mode",  # one value; None: unknown
+    "number",  # NaN: unknown
+    "axes",  # one number an axis; NaN: unknown
+    "once",  # true as soon as the program did something somewhere; never taken back
+    "named",  # name -> in force, None unknown; a name that is not there is not in force
+    "table",  # key -> what is known of it; a key that is not there is unknown
+    "constant",  # the same from the start to the end, or kept by whoever runs the blocks
+]
 
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of the state, and how it is treated."""
+
+    name: str
+    kind: Kind
+    start: Any = None
+    """Before anything is known; empty containers are made anew."""
+    together: str = ""
+    """Fields with the same word here are known together or not at all: F and whether it was
+    written without a decimal point; a path mode and its tolerances."""
+    only_if: str = ""
+    """It can only be unknown where this field of kind "once" is true: without a G7 in the program,
+    X is a radius for certain."""
+
+
+FIELDS = (
+    *(
+        Field(name, "mode")
+        for name in ("motion", "plane", "distance", "arc_distance", "feed_mode", "unit")
+    ),
+    *(Field(name, "mode") for name in ("feed_unit", "compensation", "retract", "system")),
+    Field("path", "mode", together="path"),
+    Field("path_p", "number", NAN, together="path"),
+    Field("path_q", "number", NAN, together="path"),
+    Field("feed", "number", NAN, together="feed"),
+    Field("feed_whole", "mode", False, together="feed"),
+    Field("diameter", "mode", only_if="turns"),
+    Field("rotated", "mode", False, only_if="rotates"),
+    Field("spindle", "mode", 5),
+    Field("cycle", "mode", together="cycle"),
+    Field("cycle_level", "number", NAN),
+    *(Field(name, "axes") for name in ("position", "g5x", "g92", "tool")),
+    *(Field(name, "named") for name in ("transforms", "bars")),
+    *(Field(name, "table") for name in ("offsets", "variables")),
+    *(
+        Field(name, "once", False)
+        for name in ("distance_stated", "feed_mode_stated", "unit_stated", "rotates", "turns")
+    ),
+    Field("restores", "once", False),
+    *(Field(name, "constant", start) for name, start in (("ended", False), ("touched", None))),
+    Field("fixed", "constant", frozenset()),
+    Field("wraps", "constant", (None,) * len(AXES)),
+)
+"""What a state holds."""
+BY_NAME = {field.name: field for field in FIELDS}
+MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in ("feed_whole", "cycle"))
+"""Fields that hold one modal group each."""
+_FRAME = ("g5x", "g92", "tool")
+_GROUPS = {
+    word: tuple(field.name for field in FIELDS if field.together == word)
+    for word in {field.together for field in FIELDS} - {""}
+}
 _LINEAR = tuple(axis in LINEAR for axis in AXES)
+
+
+def _unknown(field: Field, value: Any) -> Any:
+    """What a field holds where nothing is known of it."""
+    if field.kind == "mode":
+        return None
+    if field.kind == "number":
+        return NAN
+    if field.kind == "axes":
+        return [NAN] * len(AXES)
+    if field.kind == "named":
+        return dict.fromkeys(value)
+    if field.kind == "table":
+        return {}
+    return True if field.kind == "once" else value
 
 
 class State:
     """What is in force between two blocks."""
 
-    __slots__ = (
-        *MODES,
-        "cycle",
-        "cycle_level",
-        "distance_stated",
-        "ended",
-        "feed",
-        "feed_mode_stated",
-        "feed_whole",
-        "fixed",
-        "g5x",
-        "g92",
-        "offsets",
-        "path_p",
-        "path_q",
-        "position",
-        "restores",
-        "rotated",
-        "rotates",
-        "tool",
-        "touched",
-        "transforms",
-        "turns",
-        "unit_stated",
-        "variables",
-    )
+    __slots__ = tuple(field.name for field in FIELDS)
 
     motion: int | None
     plane: int | None
@@ -80,55 +131,69 @@ class State:
     feed_mode: int | None
     unit: float | None
     """mm per unit of length."""
+    feed_unit: float | None
+    """mm per unit of length of F, where a dialect keeps the two apart; elsewhere that of `unit`."""
     compensation: int | None
     retract: int | None
     system: int | None
     path: int | None
+    path_p: float
+    path_q: float
+    """P and Q of G64; NaN where `path` is known: none were given."""
+    feed: float
+    feed_whole: bool | None
+    """F was written without a decimal point."""
     diameter: bool | None
+    rotated: bool | None
+    """The coordinate system is turned."""
+    spindle: int | None
+    """3, 4 or 5: the M code in force, where G0 may darken what M3 turns on."""
+    cycle: tuple[int, float, float] | None
+    """Code in force, its Z and R words."""
+    cycle_level: float
+    """Where the series of cycles began."""
+    position: list[float]
+    g5x: list[float]
+    g92: list[float]
+    tool: list[float]
+    transforms: dict[str, bool | None]
+    """Rotation, scaling, mirroring..."""
+    bars: dict[str, bool | None]
+    """What besides makes rapids unfit to be rewritten while it is in force, by `judge.BARS`."""
+    offsets: dict[int, list[float]]
+    variables: dict[str, float]
+    """Variables whose value is certain, by `expressions.variable_name`."""
+    distance_stated: bool
+    feed_mode_stated: bool
+    unit_stated: bool
+    rotates: bool
+    """The program turns a coordinate system somewhere."""
+    turns: bool
+    """The program uses G7, so X may be a diameter."""
+    restores: bool
+    """The subprogram gives the modes of its caller back (M73)."""
+    ended: bool
+    touched: set[str | int] | None
+    """What blocks have changed since somebody wanted to know."""
+    fixed: frozenset[str]
+    """Modes that no code of the dialect changes, so that nothing makes them unknown."""
+    wraps: tuple[str | None, ...]
+    """How each axis turns: see `nc.start.Start`; None unknown."""
 
     def __init__(self) -> None:
-        for name in MODES:
-            setattr(self, name, None)
-        self.position = [NAN] * len(AXES)
-        self.g5x = [NAN] * len(AXES)
-        self.g92 = [NAN] * len(AXES)
-        self.tool = [NAN] * len(AXES)
-        self.offsets: dict[int, list[float]] = {}
-        self.feed = NAN
-        self.feed_whole = False  # F was written without a decimal point
-        self.path_p = NAN
-        self.path_q = NAN
-        self.distance_stated = False
-        self.feed_mode_stated = False
-        self.unit_stated = False
-        self.ended = False
-        self.fixed: frozenset[str] = frozenset()
-        """Modes that no code of the dialect changes, so that nothing makes them unknown."""
-        self.transforms: dict[str, bool | None] = {}
-        """Name of a rotation, a scaling... -> in force, None where that is unknown; a name that
-        the program never used is not in force."""
-        self.rotated: bool | None = False  # the coordinate system is turned
-        self.rotates = False  # the program turns a coordinate system somewhere
-        self.turns = False  # the program uses G7, so X may be a diameter
-        self.cycle: tuple[int, float, float] | None = None  # code in force, its Z and R words
-        self.cycle_level = NAN  # where the series of cycles began
-        self.restores = False  # the subprogram gives the modes of its caller back (M73)
-        self.variables: dict[str, float] = {}
-        """Variables whose value is certain, by `expressions.variable_name`."""
-        self.touched: set[str | int] | None = None
+        for field in FIELDS:
+            if field.kind in ("axes", "named", "table"):
+                setattr(self, field.name, [NAN] * len(AXES) if field.kind == "axes" else {})
+            else:
+                setattr(self, field.name, field.start)
 
     def copy(self) -> State:
         """Make an independent copy."""
         other = State.__new__(State)
-        for name in State.__slots__:
-            setattr(other, name, getattr(self, name))
-        other.position = self.position.copy()
-        other.g5x = self.g5x.copy()
-        other.g92 = self.g92.copy()
-        other.tool = self.tool.copy()
-        other.offsets = dict(self.offsets)
-        other.transforms = dict(self.transforms)
-        other.variables = dict(self.variables)
+        for field in FIELDS:
+            value = getattr(self, field.name)
+            shared = field.kind not in ("axes", "named", "table")
+            setattr(other, field.name, value if shared else value.copy())
         return other
 
     def put(self, field: str, value: object) -> None:
@@ -158,10 +223,13 @@ class State:
         if self.touched is not None:
             self.touched.add("#")
 
-    def lose_cycle(self) -> None:
-        """No longer know whether a cycle is in force: a position may be a hole or a move."""
-        self.put("cycle", None)
-        self.put("motion", None)
+    def lose(self, name: str) -> None:
+        """Make one field unknown, and those that are known with it."""
+        field = BY_NAME[name]
+        for each in _GROUPS.get(field.together, (name,)):
+            self.put(each, _unknown(BY_NAME[each], getattr(self, each)))
+        if name == "cycle":
+            self.put("motion", None)  # a position may be a hole or a move
 
     def forget_positions(self, axes: Iterable[int] = range(len(AXES))) -> None:
         """Forget the positions of these axes."""
@@ -169,24 +237,20 @@ class State:
             self.move(axis, NAN)
 
     def forget_modes(self) -> None:
-        """Forget every modal group."""
-        for name in MODES:
-            # Nothing but G7 makes X a diameter: in a program without it, radius is certain.
-            if (name != "diameter" or self.turns) and name not in self.fixed:
-                self.put(name, None)
-        for name in ("feed", "path_p", "path_q", "cycle_level"):
-            self.put(name, NAN)
-        self.put("cycle", None)
-        if self.rotates:
-            self.put("rotated", None)
-        if self.transforms:
-            self.put("transforms", dict.fromkeys(self.transforms))
-        self.forget_frame()
+        """Forget every modal group, and what lies between machine and program coordinates."""
+        for field in FIELDS:
+            name = field.name
+            if field.kind in ("once", "table", "constant") or name == "position":
+                continue
+            if name in self.fixed or (field.only_if and not getattr(self, field.only_if)):
+                continue
+            if field.kind != "named" or getattr(self, name):
+                self.put(name, _unknown(field, getattr(self, name)))
 
     def forget_frame(self) -> None:
         """Forget what lies between machine and program coordinates."""
-        for name in ("g5x", "g92", "tool"):
-            self.put(name, [NAN] * len(AXES))
+        for name in _FRAME:
+            self.lose(name)
 
     def forget(self) -> None:
         """Forget everything."""
@@ -207,24 +271,12 @@ class State:
         for name in touched:
             if isinstance(name, int):
                 self.move(name, NAN)
-            elif name in ("g5x", "g92", "tool"):
-                self.put(name, [NAN] * len(AXES))
-            elif name in ("feed", "path_p", "path_q", "cycle_level"):
-                self.put(name, NAN)
-            elif name in STICKY:
-                self.put(name, True)
-            elif name == "transforms":
-                self.put(name, dict.fromkeys(self.transforms))
-            elif name == "feed_whole":
-                pass  # F itself is unknown
             elif name == "#":
                 self.forget_variables()
             elif name.startswith("#"):
                 self.set_variable(name[1:], NAN)
-            elif name == "cycle":
-                self.lose_cycle()
             else:
-                self.put(name, None)
+                self.lose(name)
 
     @property
     def transformed(self) -> bool:
@@ -253,45 +305,51 @@ def same(a: object, b: object) -> bool:
     return a == b or (a != a and b != b)
 
 
+def _equal(field: Field, a: Any, b: Any) -> bool:
+    """Whether two states know the same of a field."""
+    if field.kind == "axes":
+        return all(map(same, a, b))
+    if field.kind == "named":
+        return all(a.get(name, False) == b.get(name, False) for name in a.keys() | b.keys())
+    if field.name == "cycle" and a is not None and b is not None:
+        return all(map(same, a, b))
+    return same(a, b)
+
+
 def agree(a: State, b: State) -> bool:
     """Whether two states know the same."""
-    for name in State.__slots__:
-        x, y = getattr(a, name), getattr(b, name)
-        if name in ("position", "g5x", "g92", "tool"):
-            if not all(map(same, x, y)):
-                return False
-        elif name != "touched" and not same(x, y):
-            return False
-    return True
+    return all(
+        _equal(field, getattr(a, field.name), getattr(b, field.name))
+        for field in FIELDS
+        if field.name != "touched"
+    )
 
 
 def join(before: State, after: State) -> State:
     """Keep what is known when it is unknown which of two states holds."""
     joined = before.copy()
     joined.touched = after.touched
-    for name in MODES:
-        if getattr(before, name) != getattr(after, name):
-            joined.put(name, None)
-    for name in ("feed", "path_p", "path_q", "cycle_level"):
-        if not same(getattr(before, name), getattr(after, name)):
-            joined.put(name, NAN)
-    for name in STICKY:
-        joined.put(name, getattr(before, name) or getattr(after, name))
-    if before.rotated != after.rotated:
-        joined.put("rotated", None)
-    if before.cycle != after.cycle:
-        joined.lose_cycle()
-    names = before.transforms.keys() | after.transforms.keys()
-    both = {n: (before.transforms.get(n, False), after.transforms.get(n, False)) for n in names}
-    joined.put("transforms", {n: a if a == b else None for n, (a, b) in both.items()})
-    for name in ("g5x", "g92", "tool"):
-        pairs = zip(getattr(before, name), getattr(after, name), strict=True)
-        joined.put(name, [a if a == b else NAN for a, b in pairs])
-    for axis, (a, b) in enumerate(zip(before.position, after.position, strict=True)):
-        if not same(a, b):
-            joined.move(axis, NAN)
-    for variable in [n for n, v in before.variables.items() if after.variables.get(n) != v]:
-        joined.set_variable(variable, NAN)
-    if before.offsets != after.offsets:
-        joined.offsets = {k: v for k, v in before.offsets.items() if after.offsets.get(k) == v}
+    for field in FIELDS:
+        a, b = getattr(before, field.name), getattr(after, field.name)
+        if field.kind == "constant" or _equal(field, a, b):
+            continue
+        if field.kind == "once":
+            joined.put(field.name, a or b)
+        elif field.kind == "named":
+            names = a.keys() | b.keys()
+            both = {name: (a.get(name, False), b.get(name, False)) for name in names}
+            joined.put(field.name, {n: x if x == y else None for n, (x, y) in both.items()})
+        elif field.name == "position":
+            for axis, (x, y) in enumerate(zip(a, b, strict=True)):
+                if not same(x, y):
+                    joined.move(axis, NAN)
+        elif field.kind == "axes":
+            joined.put(field.name, [x if x == y else NAN for x, y in zip(a, b, strict=True)])
+        elif field.name == "variables":
+            for name in [name for name, value in a.items() if b.get(name) != value]:
+                joined.set_variable(name, NAN)
+        elif field.kind == "table":
+            joined.offsets = {key: x for key, x in a.items() if b.get(key) == x}
+        else:
+            joined.lose(field.name)
     return joined

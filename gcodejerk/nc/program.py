@@ -14,12 +14,13 @@ from typing import BinaryIO
 
 import numpy as np
 
+from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.block import Block, Line
 from gcodejerk.nc.calls import Calls
-from gcodejerk.nc.chunks import Chunk, read_chunks
+from gcodejerk.nc.chunks import BYTE_ORDER_MARK, Chunk, read_chunks
 from gcodejerk.nc.detect import detect_dialect
 from gcodejerk.nc.dialect import Dialect
-from gcodejerk.nc.dialects import AUTO, find_dialect
+from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
 from gcodejerk.nc.lexer import read_lines
 from gcodejerk.nc.modal import NAN, State
 from gcodejerk.nc.outline import find_outline, read_body, refers, seekable
@@ -83,7 +84,8 @@ def find_stamp(chunk: Chunk, dialect: Dialect) -> int | None:
         if number > STAMP_LINES:
             break
         if _STAMP.search(text):
-            block = parse_line(text.rstrip(b"\r"), dialect)
+            text = text.removeprefix(BYTE_ORDER_MARK)
+            block = parse_line(text, dialect)
             if any(_STAMP.match(text, begin) for begin, _ in block.comments):
                 return number
     return None
@@ -124,7 +126,7 @@ def read_program(
     ------
     ProgramError
         The file is empty or cannot be an NC program; the dialect is not known, or cannot be told
-        from the text.
+        from the text, or is one of mills though X is a diameter.
 
     Examples
     --------
@@ -147,9 +149,17 @@ def open_reader(
     if dialect == AUTO:
         file = seekable(file)
         begin = file.tell()
-        dialect, why = detect_dialect(next(read_chunks(file, name)).data, name)
+        head = next(read_chunks(file, name)).data.removeprefix(BYTE_ORDER_MARK)
+        dialect, why = detect_dialect(head, name, lathe=start.diameter)
         file.seek(begin)
     chosen = find_dialect(dialect)
+    if start.diameter and chosen.lathe == "no":
+        raise ProgramError(
+            f"the machine's X is a diameter, so it is a lathe, and the dialect {chosen.name} is "
+            "that of mills",
+            f"choose the dialect of the lathe's control: {', '.join(lathe_dialects())}",
+            Place(name),
+        )
     reader = Reader(name, chosen, start)
     if why:
         reader.runner.odd_lines.append(Finding(None, f"read as {chosen.name}: {why}"))

@@ -68,6 +68,11 @@ class Rapids:
     path_q: NDArray[np.float64]
     offset: NDArray[np.float64]
     """Shape (n, 9): machine = program + offset [mm, deg]; NaN where unknown."""
+    turned: NDArray[np.uint16]
+    """Bit k set: AXES[k] turns to where the machine file says, and a plain number written in the
+    program would not lead it there."""
+    beam: NDArray[np.bool_]
+    """What M3 turns on is, or may be, on."""
 
     def __len__(self) -> int:
         return len(self.line)
@@ -78,12 +83,12 @@ _TYPES: dict[str, tuple[type, int]] = {
     **{name: (np.uint8, 0) for name in ("terminator", "reason", "feed_mode", "path")},
     **{name: (np.float64, len(AXES)) for name in ("start", "target", "offset")},
     **{name: (np.float64, 0) for name in ("feed", "path_p", "path_q", "speed")},
-    "words": (np.uint16, 0),
+    **{name: (np.uint16, 0) for name in ("words", "turned")},
     **{
         name: (np.bool_, 0)
         for name in (
             *("inch", "incremental", "diameter", "distance_stated"),
-            *("feed_mode_stated", "feed_needed", "feed_whole"),
+            *("feed_mode_stated", "feed_needed", "feed_whole", "beam"),
         )
     },
 }
@@ -103,8 +108,10 @@ def common_columns(state: State) -> dict[str, object]:
         "path_p": state.path_p,
         "path_q": state.path_q,
         "offset": unknown,
-        "feed_whole": state.feed_whole,
+        "feed_whole": bool(state.feed_whole),
         "speed": np.nan,
+        "turned": 0,
+        "beam": state.spindle != 5,
     }
 
 
@@ -117,6 +124,10 @@ class RapidLog:
         self._needed: list[NDArray[np.bool_]] = []
         self._waiting = 0
         self.count = 0
+        self.habits = self.outputs = False
+        """Blocks were seen that do what `beams` looks for."""
+        self.dark = ""
+        """See `beams.Dark`."""
         self.visits = Visits()
         """Rapids of lines that may run more than once."""
 
@@ -215,5 +226,8 @@ class RapidLog:
         unknown = (mode == 0) | ((mode != 93) & columns["feed_needed"] & np.isnan(feed))
         reason = columns["reason"]
         reason[(reason == CERTAIN) & unknown] = FEED_UNKNOWN
+        if self.dark:
+            burns = columns["beam"] | (self.dark == "always")
+            reason[(reason == CERTAIN) & burns] = _INDEX[Reason.BEAM]
         assert set(columns) == {f.name for f in fields(Rapids)}
         return Rapids(**columns)

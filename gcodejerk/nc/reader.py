@@ -11,9 +11,11 @@ import re
 
 import numpy as np
 
+from gcodejerk.nc.beams import darkness
 from gcodejerk.nc.block import Line
 from gcodejerk.nc.calls import Calls
-from gcodejerk.nc.dialect import Dialect
+from gcodejerk.nc.chunks import BYTE_ORDER_MARK
+from gcodejerk.nc.dialect import Dialect, code_name
 from gcodejerk.nc.flow import Flow
 from gcodejerk.nc.jumps import is_target
 from gcodejerk.nc.modal import GROUP_FIELDS, MODES, State
@@ -36,6 +38,7 @@ class Reader:
         self.name = name
         self.dialect = dialect
         self.runner = Runner(name, dialect, start)
+        self._spindle = start.spindle
         self.flow = Flow()
         self.passes = Passes(self.runner)
         self.calls: Calls | None = None
@@ -99,6 +102,9 @@ class Reader:
 
     def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
         """Take one line the careful way; text without its LF."""
+        if begin == 0 and text.startswith(BYTE_ORDER_MARK):
+            begin = self.insert_at = len(BYTE_ORDER_MARK)
+            text = text[begin:]
         if text.endswith(b"\r"):
             text = text[:-1]
             terminator = 2 if terminator else 3
@@ -266,6 +272,8 @@ class Reader:
 
     def finish(self) -> None:
         """Take the end of the file."""
+        log = self.log
+        log.dark = darkness(self.dialect, self._spindle, log.habits, log.outputs)
         if self._structure:
             self._replay()
         if self.calls is not None:
@@ -281,7 +289,12 @@ class Reader:
             )
         if runner.asked_unit is not None:
             found.append(
-                Finding(runner.asked_unit, "no G20 or G21 before the first rapid: unit is assumed")
+                Finding(
+                    runner.asked_unit,
+                    "nobody says whether lengths are mm or inches: put G21 or G20 into the "
+                    "program, or what the control starts with into program.startup of the "
+                    f"machine file ({_unit_codes(self.dialect)})",
+                )
             )
         if runner.asked_distance is not None:
             found.append(
@@ -298,6 +311,12 @@ def _says(line: Line) -> bool:
     """Whether a line holds more than comments."""
     block = line.block
     return bool(block.words or block.assigns or block.names or block.problem)
+
+
+def _unit_codes(dialect: Dialect) -> str:
+    """How a machine file says what the unit is."""
+    codes = {inch: code_name(code).decode() for code, inch in dialect.units.items()}
+    return f"startup: {codes.get(False, 'G21')}, or {codes.get(True, 'G20')}"
 
 
 def _nothing() -> None:

@@ -13,10 +13,11 @@ from gcodejerk.errors import Place
 from gcodejerk.nc.block import Line
 from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.execute import Executor
+from gcodejerk.nc.initial import initial_state
 from gcodejerk.nc.judge import Call, Step
 from gcodejerk.nc.modal import NAN, State, join
 from gcodejerk.nc.rapids import GIVES_FEED, USES_FEED, RapidLog, common_columns
-from gcodejerk.nc.start import Start, initial_state
+from gcodejerk.nc.start import Start
 from gcodejerk.reasons import Reason
 from gcodejerk.units import SECONDS_PER_MINUTE
 
@@ -41,11 +42,11 @@ class Runner:
         self.dialect = dialect
         self.log = RapidLog()
         state = initial_state(dialect, start)
-        self.executor = Executor(dialect, state, dict(start.tool_lengths), start.decimal_point)
+        self.executor = Executor(dialect, state, start)
         self.odd_lines: list[Finding] = []
         self.odd_count = 0
         self.asked_unit: int | None = None
-        """The first rapid before any G20 or G21."""
+        """The first rapid that is left alone since nobody said whether it is in inches."""
         self.asked_distance: int | None = None
         self.call: Callable[[Call, Line], bool] | None = None
         """Runs a subprogram; whether the program goes on behind it."""
@@ -89,9 +90,11 @@ class Runner:
         elif step.fault and block.problem is None:
             self.odd(line, "the controller would refuse this combination of words")
         elif step.unknown:
-            self.odd(line, "a code that the dialect does not know")
+            self.odd(line, f"{step.unknown} is no code that the dialect {self.dialect.name} has")
         if not ((before is not None or uncertain) and step.feed_event == GIVES_FEED):
             self.log.feed_event(step.feed_event)
+        self.log.habits |= step.habit
+        self.log.outputs |= step.outputs
         if step.leaves:
             self.left()
         if step.rapid:
@@ -130,6 +133,8 @@ class Runner:
                 reason = Reason.FEED_UNKNOWN
         if reason is None:
             self.ask(line.number)
+        elif reason is Reason.UNITS_UNKNOWN and not state.unit_stated:
+            self.asked_unit = self.asked_unit or line.number
         row = common_columns(state)
         row.update(
             line=line.number,
@@ -137,7 +142,9 @@ class Runner:
             end=line.begin + len(line.text),
             terminator=line.terminator,
             start=step.start,
-            target=state.position.copy(),
+            target=step.end,
+            turned=step.turned,
+            beam=step.beam,
             words=step.words,
             feed=state.feed,
             speed=speed,
@@ -161,9 +168,7 @@ class Runner:
         self.state, self.executor.lengths = kept, lengths
 
     def ask(self, number: int) -> None:
-        """Note the first certain rapid that rests on an assumed unit or distance mode."""
-        if not self.state.unit_stated and self.asked_unit is None:
-            self.asked_unit = number
+        """Note the first certain rapid that rests on an assumed distance mode."""
         fixed = "distance" in self.state.fixed
         if not (fixed or self.state.distance_stated) and self.asked_distance is None:
             self.asked_distance = number

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.nc.dialect import ARC_CENTRES, AXES, LINEAR, PLANES, Dialect
+from gcodejerk.nc.judge import BARS
 from gcodejerk.nc.modal import State
 from gcodejerk.nc.rapids import CERTAIN, GIVES_FEED, REASONS, USES_FEED, RapidLog, common_columns
 from gcodejerk.nc.words import BIT, Lines
@@ -31,7 +32,6 @@ def can_run(state: State) -> bool:
         state.motion in (0, 10, 20, 30)
         and state.compensation == 400
         and state.distance is not None
-        and state.unit is not None
         and state.diameter is not None
         and state.plane in ARC_CENTRES
         and state.feed_mode is not None
@@ -66,6 +66,9 @@ def _sure(
         by_radius = (arc_words == BIT["R"]) & (letters & in_plane != 0)
         silent = letters & (_AXIS_BITS | _ARC_WORDS | BIT["G"]) == 0
         sure = np.where(is_arc, by_centre | by_radius | silent, sure)
+    counting = sum(1 << k for k, wrap in enumerate(state.wraps) if wrap in ("shortest", "sign"))
+    if counting and state.distance == 900:
+        sure = sure & (letters & np.uint32(counting) == 0)  # where they end, the way they go says
     if state.feed_mode == 93:
         sure = sure & ((motion == 0) | (letters & _AXIS_BITS == 0) | (letters & BIT["F"] != 0))
     return sure
@@ -148,9 +151,11 @@ def run_plain(
     )
     # What stands behind the end of the program uses no F.
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
+    if dialect.dark_rapids and state.spindle != 5 and not state.ended:
+        log.habits |= bool(((events == USES_FEED) & (letters & BIT["S"] != 0)).any())
     state.motion = int(motion[-1]) * 10
     state.feed = float(history[-1])
-    state.feed_whole &= not len(feeds)
+    state.feed_whole = bool(state.feed_whole) and not len(feeds)
     certain = np.flatnonzero(columns["reason"] == CERTAIN)
     return last, int(row[certain[0]]) + place[0] if len(certain) else None
 
@@ -184,14 +189,24 @@ def _reasons(
         return np.full(len(named), _INDEX[Reason.AFTER_END], dtype=np.uint8)
     if state.transformed:
         return np.full(len(named), _INDEX[Reason.ROTATION], dtype=np.uint8)
+    bar = next((name for name, on in state.bars.items() if on is not False), None)
+    if bar is not None:
+        return np.full(len(named), _INDEX[BARS[bar]], dtype=np.uint8)
     is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
     unknown = (is_named & (np.isnan(start) | np.isnan(target))).any(axis=1)
     moving = is_named & (start != target)
     moves = moving.any(axis=1)
     reason = np.full(len(named), CERTAIN, dtype=np.uint8)
+    turning = np.array(
+        [axis not in LINEAR and wrap is None for axis, wrap in zip(AXES, state.wraps, strict=True)]
+    )
+    if state.distance == 900 and turning.any():
+        reason[moving[:, turning].any(axis=1)] = _INDEX[Reason.ROTARY_WAY]
     if not dialect.feed_of_mixed:
         both = moving[:, _IS_LINEAR].any(axis=1) & moving[:, ~_IS_LINEAR].any(axis=1)
-        reason[both] = _INDEX[Reason.MIXED_AXES]
+        reason[both & (reason == CERTAIN)] = _INDEX[Reason.MIXED_AXES]
     reason[~moves] = _INDEX[Reason.NO_MOTION]
     reason[unknown] = _INDEX[Reason.START_UNKNOWN]
+    if state.unit is None:
+        reason[moves | unknown] = _INDEX[Reason.UNITS_UNKNOWN]
     return reason

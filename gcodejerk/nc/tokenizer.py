@@ -28,6 +28,12 @@ _TO_COMMENT = re.compile(rb"[^;]*")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
 _KEYWORD = re.compile(rb"[A-Za-z]*")
 _ACTIVE = re.compile(rb"[ \t]*py[ \t]*,", re.IGNORECASE)
+_BLOCK = re.compile(
+    rb"[ \t]*(?:[A-Z][ \t]*[-+]?[0-9.]+[ \t]*)+(?:[;(].*)?|.*[#=\[].*", re.IGNORECASE
+)
+"""Text that a control may run: words, or an assignment."""
+_STRING = re.compile(rb'"[^"]*"')
+_HEXADECIMAL = re.compile(rb"[A-Z][ \t]*[-+]?0[Xx]", re.IGNORECASE)
 
 
 class _Line(Cursor):
@@ -99,6 +105,8 @@ class _Line(Cursor):
             raise Odd("N stands behind something else", begin)
         match = _WORD.match(self.text, begin)
         function = ""
+        if self.rules.hexadecimal and _HEXADECIMAL.match(self.text, begin):
+            raise Odd("0X begins a hexadecimal number", self.at)
         if match and SHAPE.fullmatch(match[2]):  # the usual case, made quick
             self.at = match.end(2)
             value: float | None = float(match[2])
@@ -155,6 +163,9 @@ class _Line(Cursor):
         ends = not after or after in b" \t;)" or after.isalpha()
         if ends and SHAPE.fullmatch(match[0]):
             return self.number()
+        if self.rules.strings and (match := _STRING.match(self.text, self.at)):
+            self.at = match.end()
+            return None
         match = _TO_BLANK.match(self.text, self.at)
         assert match is not None
         if not match[0]:
@@ -270,15 +281,20 @@ class _Line(Cursor):
         ):
             self.comment()
         elif byte == b";" and rules.semicolon == "end":
-            self.at += 1
-            if self.skip():
-                raise Odd("text behind the end of the block", self.at)
+            if _BLOCK.fullmatch(text, self.at + 1):
+                raise Odd("another block behind the end of the block", self.at + 1)
+            self.comments.append((self.at, len(text)))
+            self.at = len(text)
         elif byte == b"#" and rules.variables == "#":
             self.assignment()
         elif byte == b"/" and self.delete_mark():
             pass
         elif byte == b"%":
             self.percent_mark()
+        elif byte == b"$" and "$" in self.dialect.names:
+            end = _TO_COMMENT.match(text, self.at).end()  # type: ignore[union-attr]
+            self.names.append(Name("$", text[self.at : end]))
+            self.at = end
         elif byte == b":" and rules.o_word == "program" and not self.words:
             self.flow()
         elif rules.checksum and _CHECKSUM.fullmatch(text, self.at):
@@ -289,7 +305,7 @@ class _Line(Cursor):
             if self.skip() not in (b"", b";"):
                 raise Odd("text behind the end of the block", self.at)
         else:
-            raise Odd(f"'{byte.decode('latin-1')}' has no meaning here", self.at)
+            raise Odd(f"{_shown(byte)} has no meaning here", self.at)
 
 
 @lru_cache(maxsize=16)
@@ -299,6 +315,11 @@ def _keywords(words: tuple[str, ...]) -> re.Pattern[bytes] | None:
         return None
     every = b"|".join(word.encode() for word in sorted(words, key=len, reverse=True))
     return re.compile(rb"(" + every + rb")(?![A-Za-z_])", re.IGNORECASE)
+
+
+def _shown(byte: bytes) -> str:
+    """A byte in a message: itself, or its number where it would not be seen."""
+    return f"'{byte.decode()}'" if 0x20 < byte[0] < 0x7F else f"byte 0x{byte[0]:02x}"
 
 
 def parse_line(text: bytes, dialect: Dialect) -> Block:
@@ -316,6 +337,7 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     Block
         With a `problem` where the controller would refuse the line.
     """
+    text = text.rstrip(b"\r")  # CR CR LF, which a transfer in text mode makes of CR LF
     line = _Line(text, dialect)
     problem, column, rest, mark = None, None, b"", 0
     limit = dialect.text.line_limit

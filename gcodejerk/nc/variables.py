@@ -8,6 +8,7 @@ be a program, can have set.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 
 from gcodejerk.nc.block import Block, Word
@@ -19,6 +20,7 @@ from gcodejerk.nc.modal import State
 _INCREMENT_DECIMALS = (3, 4)
 """Of the least increment: 0.001 mm or degrees, 0.0001 inch."""
 _POSITIONS = frozenset("XYZABCUVWIJKR")
+_READ = re.compile(rb"#([0-9]+|<[^<>]*>|[#\[])")
 _PREDEFINED = """
 VMAJOR VMINOR LINE MOTION_MODE PLANE CCOMP METRIC IMPERIAL ABSOLUTE INCREMENTAL INVERSE_TIME
 UNITS_PER_MINUTE UNITS_PER_REV COORD_SYSTEM TOOL_OFFSET RETRACT_R_PLANE RETRACT_OLD_Z
@@ -78,6 +80,22 @@ def assign(block: Block, values: Iterable[float], state: State, rules: Arithmeti
 
 def _name(target: str) -> str:
     return variable_name(target.encode("latin-1"))
+
+
+def reads_feed(block: Block, rules: Arithmetic) -> bool:
+    """Whether a block reads F, or a variable that is computed and may be it."""
+    if not rules.feed:
+        return False
+    texts = [word.text for word in block.words if word.value is None]
+    texts += [*block.assigned, *block.o_arguments, *(name.arguments for name in block.names)]
+    if not any(b"#" in text for text in texts):
+        return False
+    names = {n for text in texts for n in _READ.findall(text.translate(None, b" \t").upper())}
+    return any(name in (b"#", b"[") or _name_of(name) in rules.feed for name in names)
+
+
+def _name_of(text: bytes) -> str:
+    return text.decode("latin-1").lower()
 
 
 def forget_shared(state: State, rules: Arithmetic) -> None:

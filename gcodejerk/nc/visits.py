@@ -85,6 +85,8 @@ def _merge(a: Row | None, b: Row | None) -> Row | None:
         ]
     for name in _STATED:
         row[name] = a[name] and b[name]
+    row["turned"] |= b["turned"]
+    row["beam"] = a["beam"] or b["beam"]
     if not same(a["feed"], b["feed"]) or a["feed_whole"] != b["feed_whole"]:
         row["feed"] = NAN
     known = all(

@@ -20,6 +20,8 @@ from gcodejerk.verification.known import Facts
 from gcodejerk.verification.reading import Line, Text, jumps_back, pieces
 from gcodejerk.verification.tracking import Sighting, Tracker
 
+MARK = b"\xef\xbb\xbf"
+"""Of UTF-8, in front of the first line."""
 NEAR = 1e-6
 """Two sums of the same numbers may differ by this much. [mm] or [deg]"""
 
@@ -104,6 +106,9 @@ def sightings(
     text = Text(dialect, decimals)
     tracker = _begin(text, dialect, start)
     tracker.doubt = doubt
+    if dialect.dark_rapids and start.spindle == "mill" and lines:
+        tracker.dark = _behaves_like_a_laser(original, dialect, start)
+        original.seek(begin)
     number, wanted, following = 1, iter([*lines, math.inf]), 0
     line: float = next(wanted)
     for data in pieces(original):
@@ -121,13 +126,23 @@ def sightings(
                 continue
             end = data.find(b"\n", at)
             end = size if end < 0 else end
-            bare = data[at:end]
-            bare = bare[:-1] if bare.endswith(b"\r") else bare
+            bare = data[at:end].rstrip(b"\r")
+            bare = bare.removeprefix(MARK) if number == 1 else bare
             seen = tracker.follow(text.read(bare, not tracker.begun))
             if number == line:
                 yield following, seen
                 line, following = next(wanted), following + 1
             number, at = number + 1, end + 1
+
+
+def _behaves_like_a_laser(original: BinaryIO, dialect: Dialect, start: Start) -> bool:
+    """Whether any line of the program does what only programs for lasers do."""
+    text = Text(dialect, False)
+    tracker = _begin(text, dialect, start)
+    for data in pieces(original):
+        for line in data.split(b"\n"):
+            tracker.follow(text.read(line.rstrip(b"\r"), not tracker.begun))
+    return tracker.habits
 
 
 def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
@@ -138,9 +153,11 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
             start.positions,
             start.offsets,
             start.tool_lengths,
-            start.inch,
             start.diameter,
             start.decimal_point,
+            start.wraps,
+            start.resume,
+            start.spindle,
         ),
     )
     codes = text.read(start.startup.encode("latin-1", "replace"), first=False)

@@ -8,12 +8,29 @@ that of the tool. A change of one renames where an axis stands by as much.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Dialect, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.reading import NAN
+
+KINDS = {
+    "g": "modes",
+    **dict.fromkeys(("frames", "bars"), "frames"),
+    **dict.fromkeys(("at", "system", "g92", "tool"), "axes"),
+    **dict.fromkeys(("systems", "lengths"), "table"),
+    **dict.fromkeys(("feed", "level", "r"), "number"),
+    **dict.fromkeys(("p", "q"), "tolerance"),
+    **dict.fromkeys(("doubt", "turns", "habits"), "ever"),
+    **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter", "selected"), "mode"),
+    **dict.fromkeys(("cycle", "feed_whole", "spindle"), "mode"),
+    **dict.fromkeys(("dialect", "facts", "fixed", "dark"), "given"),
+    # where in the file the reading is; a line that may be skipped changes none of these for good
+    **dict.fromkeys(("ended", "opened", "begun", "started", "depth", "contour"), "place"),
+}
+"""Every field of `Known`, and how two states of it are joined."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +40,11 @@ class Facts:
     positions: Mapping[str, float] = field(default_factory=dict)
     offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     tool_lengths: Mapping[int, float] = field(default_factory=dict)
-    inch: bool = False
     diameter: bool = False
     decimal_point: str | None = None
+    wraps: Mapping[str, str] = field(default_factory=dict)
+    resume: str | None = None
+    spindle: str | None = None
 
 
 class Known:
@@ -41,8 +60,18 @@ class Known:
         self.feed_mode: int | None = self.mode_of(modes.get("feed mode"))
         self.path: int | None = dialect.paths.get(modes.get("path", -1))
         self.p = self.q = self.feed = NAN
-        self.feed_whole = False
-        self.unit: float | None = INCH if facts.inch else 1.0
+        self.feed_whole: bool | None = False
+        self.unit: float | None = None
+        if "units" in modes:
+            self.unit = INCH if dialect.units[modes["units"]] else 1.0
+        self.feed_unit = self.unit
+        self.spindle: int | None = 5
+        self.habits = False
+        """The program was seen to behave like one for a laser."""
+        self.dark = facts.spindle in ("laser", "plasma") or (
+            dialect.dark_rapids and facts.spindle is None
+        )
+        """Rapids have to stay G0 while M3 or M4 is on."""
         self.diameter: bool | None = facts.diameter
         self.turns = facts.diameter
         size = len(AXES)
@@ -60,6 +89,8 @@ class Known:
         self.level = self.r = NAN
         self.frames: dict[str, bool | None] = {}
         """Rotations and their kin: whether in force."""
+        self.bars: dict[str, bool | None] = {}
+        """What else forbids to rewrite rapids."""
         self.ended = False
         self.opened = False
         """A ``%`` began the program."""
@@ -85,6 +116,7 @@ class Known:
         """Stand where the machine file says programs start; after the startup codes."""
         if self.g.get("tool length") is not None:
             self.tool = [0.0] * len(AXES)
+        self.feed_unit = self.unit
         self.at = [self.facts.positions.get(axis, NAN) for axis in AXES]
         self.begun = self.started = False
 
@@ -99,26 +131,27 @@ class Known:
         """Keep what both agree on: either may hold."""
         in_doubt = self.cycle != other.cycle
         for name, theirs in vars(other).items():
-            mine = getattr(self, name)
-            if name in ("g", "frames"):
+            mine, kind = getattr(self, name), KINDS[name]
+            if kind in ("modes", "frames"):
+                none = None if kind == "modes" else False
                 keys = mine.keys() | theirs.keys()
-                none = None if name == "g" else False
                 both = {k: (mine.get(k, none), theirs.get(k, none)) for k in keys}
                 setattr(self, name, {k: a if a == b else None for k, (a, b) in both.items()})
-            elif isinstance(mine, list):
+            elif kind == "axes":
                 pairs = zip(mine, theirs, strict=True)
                 setattr(self, name, [a if a == b else NAN for a, b in pairs])
-            elif name in ("systems", "lengths"):
+            elif kind == "table":
                 setattr(self, name, {k: v for k, v in mine.items() if theirs.get(k) == v})
-            elif name in ("p", "q"):
-                if mine != theirs and (mine == mine or theirs == theirs):
-                    self.path = None
-            elif name in ("feed", "level", "r"):
+            elif kind == "number":
                 setattr(self, name, mine if mine == theirs else NAN)
-            elif name in ("doubt", "turns"):
+            elif kind == "ever":
                 setattr(self, name, mine or theirs)
-            elif name in ("feed_mode", "path", "unit", "diameter", "selected", "cycle"):
-                setattr(self, name, mine if mine == theirs else None)
+            elif kind == "mode" and mine != theirs:
+                setattr(self, name, None)
+            elif kind == "tolerance" and mine != theirs and (mine == mine or theirs == theirs):
+                self.path = None
+        if self.feed_whole is None:
+            self.feed = NAN  # a cutting feed that may have to be written either way
         if in_doubt:
             self.g["motion"] = None
 
@@ -136,12 +169,14 @@ class Known:
         if "path" not in self.fixed:
             self.path = None
         self.p = self.q = self.feed = self.level = self.r = NAN
-        self.unit, self.selected, self.cycle = None, None, None
+        self.selected = self.cycle = self.spindle = None
+        if "units" not in self.fixed:
+            self.unit = self.feed_unit = None
         if self.turns:
             self.diameter = None
         self.lose_offsets()
         self.systems, self.lengths = {}, {}
-        self.frames = dict.fromkeys(self.frames)
+        self.frames, self.bars = dict.fromkeys(self.frames), dict.fromkeys(self.bars)
 
     def lose_offsets(self) -> None:
         """Lose what lies between machine and program coordinates."""
@@ -163,26 +198,70 @@ class Known:
                 self.at[k] += old - new
         return after
 
-    def lengthen(self, code: int, number: float) -> None:
+    def lengthen(self, code: int, number: float, named: int) -> None:
         """Put a tool length in force: that of the machine file under an H number, or none."""
         length = self.lengths.get(int(number), NAN) if number == number else NAN
         length = 0.0 if code == 490 else length if code == 430 else NAN
         after = [length if axis == "Z" else 0.0 for axis in AXES]
         self.tool = self.rename(self.tool, after if length == length else [NAN] * len(AXES))
+        self.end_bar("tool data")
+        if self.dialect.length_moves:
+            only = self.g.get("plane") == 170 and named & ~_bits(self.dialect.length_axes) == 0
+            self.lose(self.dialect.length_axes if only else AXES)
+
+    def end_bar(self, name: str) -> None:
+        """End what forbade to rewrite."""
+        if name in self.bars:
+            self.bars[name] = False
+
+    def written(self) -> None:
+        """Data of the control have been set that may hold offsets."""
+        self.lose()
+        self.lose_offsets()
+        self.systems, self.lengths, self.selected = {}, {}, None
+        self.bars.update({"offsets": True, "tool data": True})
+
+    def turn(self, k: int, angle: float) -> float:
+        """Where a rotary axis ends that was told an absolute angle."""
+        wrap, here = self.facts.wraps.get(AXES[k]), self.at[k]
+        if wrap not in ("shortest", "sign") or (here != here and wrap == "shortest"):
+            return angle
+        if here != here or (wrap == "sign" and not -360.0 < angle < 360.0):
+            return NAN
+        turns = math.floor((here - angle) / 360.0)
+        ends = [angle + 360.0 * (turns + n) for n in (-1, 0, 1, 2)]
+        if wrap == "sign":
+            ends = [abs(angle) + 360.0 * (math.floor(here / 360.0) + n) for n in (-1, 0, 1)]
+            back = math.copysign(1.0, angle) < 0.0
+            return max(e for e in ends if e <= here) if back else min(e for e in ends if e >= here)
+        ends.sort(key=lambda end: abs(end - here))
+        return NAN if abs(abs(ends[0] - here) - abs(ends[1] - here)) < 1e-6 else ends[0]
 
     def select(self, code: int, number: float) -> None:
         """Select a work system."""
+        self.end_bar("offsets")
         selected = (code, int(number)) if number == number else None
         if selected is None or selected != self.selected:
             known = [NAN] * len(AXES) if selected is None else self.offsets_of(selected)
             self.system = self.rename(self.system, known)
         self.selected = selected
 
-    def shift(self, kinds: set[Effect], values: Mapping[str, float]) -> None:
+    def shift(
+        self, kinds: set[Effect], values: Mapping[str, float], increments: Mapping[str, float]
+    ) -> None:
         """G92 and its kin, G52, G10."""
         if "set" in kinds:
+            dialect = self.dialect
+            if not values and not increments and dialect.bare_set == "zero":
+                values = dict.fromkeys(AXES, 0.0)
+            elif not values and not increments and dialect.bare_set == "unknown":
+                self.lose()
+                self.g92 = [NAN] * len(AXES)
+            sure = dialect.incremental_set or self.g.get("distance") == 900
             for k, axis in enumerate(AXES):
-                if axis in values:
+                if axis in increments or (axis in values and not sure):
+                    self.at[k] = self.g92[k] = NAN
+                elif axis in values:
                     named = values[axis] * self.scale(axis)
                     self.g92[k] += self.at[k] - named
                     self.at[k] = named
@@ -207,6 +286,10 @@ class Known:
         """Axes that cutter compensation may displace."""
         plane = self.g.get("plane")
         return "XYZUVW" if plane is None else "".join(PLANES[plane][:2])
+
+
+def _bits(axes: str) -> int:
+    return sum(1 << AXES.index(axis) for axis in axes)
 
 
 def _system(name: str) -> tuple[int, int]:

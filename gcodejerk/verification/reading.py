@@ -34,6 +34,7 @@ _ASSIGNMENTS = re.compile(
     rb"[ \t]*(?:N[ \t]*[0-9]+)?(?:[ \t]*(#[0-9]+|#[ \t]*<[^<>]*>)[ \t]*=[^=#;()]*)"
 )
 _TARGET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
+_COMPUTED = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+)?[ \t]*#[ \t]*[#\[].*=")
 _PERCENT = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?%")
 _O_WORD = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?[O:][ \t]*(<[^<>]*>|[0-9]+)[ \t]*([A-Z0-9]*)")
 _FILE_NAME = re.compile(rb"[A-Z_][\w-]*\.[A-Z]{1,5}")
@@ -43,8 +44,9 @@ _PARAMETER = re.compile(rb"R[0-9]+[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;
 _JUMPS = re.compile(rb"(?:GOTO|DO)[ \t]*[0-9#\[]|WHILE[ \t]*\[", re.IGNORECASE)
 _NAMED_JUMPS = re.compile(rb"\b(?:GOTO[FBCS]?|WHILE|REPEATB?|UNTIL|LOOP|FOR|CASE)\b", re.IGNORECASE)
 """What may lead back to a line that was read before."""
-OFFSETS = 5161
-"""Parameters from this one on may be offsets and stored points."""
+_HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
+_SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
+_STRING = re.compile(rb"([A-Z])[ \t]*=[ \t]*\"[^\"]*\"")
 
 
 @dataclass(slots=True)
@@ -64,6 +66,8 @@ class Line:
     blank: bool = False
     offsets: bool = False
     """An assignment that may change offsets."""
+    group: bool = False
+    """F is from here on the speed of some axes only."""
 
 
 @dataclass(slots=True)
@@ -101,12 +105,13 @@ class Text:
         if rules.semicolon == "comment":
             parts.append(rb";.*")
         elif rules.semicolon == "end":
-            parts.append(rb";[ \t]*$")
+            # what stands behind the end of a block may be text, but no block
+            parts.append(rb";(?![ \t]*(?:[A-Z][ \t]*[-+]?[0-9.]+[ \t]*)+(?:[;(]|$))[^#=\[]*$")
         if rules.slashes:
             parts.append(rb"//.*")
         if rules.end:
             parts.append(re.escape(rules.end) + rb"[ \t]*$")
-        self.comments = re.compile(b"|".join(parts)) if parts else None
+        self.comments = re.compile(b"|".join(parts), re.IGNORECASE) if parts else None
         self.python = re.compile(rb"[(;][ \t]*py[ \t]*,", re.IGNORECASE) if rules.python else None
         level = rb"[0-9]?" if rules.delete == "numbered" else b""
         number = rb"(?:N[0-9]+[ \t]*)?" if rules.delete == "numbered" else b""
@@ -201,6 +206,14 @@ class Text:
         if rules.o_word != "error" and (match := _O_WORD.match(text)):
             line.flow = match[2].decode()
             return line
+        if rules.hexadecimal and _HEXADECIMAL.search(text):
+            line.understood = False
+            return line
+        if rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
+            line.effects.append("written")
+            return line
+        if rules.strings:
+            text = _STRING.sub(rb"\1#", text)
         if rules.names:
             text = self._names(text, line)
         elif rules.keywords and any(word.encode() in text for word in rules.keywords):
@@ -235,7 +248,12 @@ class Text:
     def _expressions(self, text: bytes, line: Line) -> bytes:
         """Put ``#`` in the place of everything that is computed."""
         targets = _TARGET.findall(text)
-        line.offsets = any(t.isdigit() and int(t) >= OFFSETS for t in targets)
+        rules = self.dialect.arithmetic
+        numbers = [int(t) for t in targets if t.isdigit()]
+        line.offsets = bool(rules.offsets) and (
+            any(n >= rules.offsets and n not in rules.timers for n in numbers)
+            or _COMPUTED.match(text) is not None
+        )
         for _ in range(len(text)):
             text, count = _INNERMOST.subn(b"#0", text)
             text, calls = _CALL.subn(b"#0", text) if b"[" not in text else (text, 0)
@@ -252,6 +270,8 @@ class Text:
 
         def take(match: re.Match[bytes]) -> bytes:
             effect = self.dialect.names.get(match[1].decode(), "flow")
+            if effect == "feed group":
+                line.group = (match[2] or b"").strip(b"() \t") != b""
             if effect != "none":
                 line.effects.append(effect)
             return b" "

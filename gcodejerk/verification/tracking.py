@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from gcodejerk.nc.dialect import AXES, PLANES, Effect
+from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.known import Known
@@ -22,13 +22,16 @@ from gcodejerk.verification.sorting import Sorted
 _FRAMES: frozenset[Effect] = frozenset(
     {
         *("return", "store", "machine", "system", "numbered system", "length", "set", "clear"),
-        *("restore", "local", "table", "frames", "home", "transform", "modal cycle"),
+        *("restore", "local", "table", "frames", "home", "transform", "modal cycle", "data"),
     }
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
 _QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
-_CALLS = (47, 96, 97, 98)
+_WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
+_CALLS = (47, 96, 97, 98, 198)
+_STOPS = (0, 1, 60)
+_OUTPUTS = (*range(62, 69), *range(100, 200))
 _ENDS = (2, 17, 30, 99)
 
 
@@ -96,8 +99,10 @@ class Tracker(Known):
         if line.flow is not None:
             self._flow(line.flow)
             return Sighting()
-        if line.offsets:
+        if line.offsets and self.dialect.arithmetic.at_selection:
             self.systems = {}
+        elif line.offsets:
+            self.written()
         if line.understood and not line.words and not line.effects:
             self.started = self.started or not line.blank
             return Sighting()
@@ -148,6 +153,10 @@ class Tracker(Known):
     def _execute(self, line: Line) -> Sighting:
         """Execute words, the modal ones in front of the motion."""
         dialect = self.dialect
+        if line.understood and line.effects and _WRITES.issuperset(line.effects):
+            for effect in line.effects:
+                self._write(effect, line)
+            return Sighting()
         if not line.understood or any(effect not in _QUIET for effect in line.effects):
             return self._lost(line)
         if self.contour is not None:
@@ -172,6 +181,15 @@ class Tracker(Known):
         self.forget()
         return Sighting()
 
+    def _write(self, effect: Effect, line: Line) -> None:
+        """A line that only writes data, or says which axes F is for."""
+        if any(letter != "N" for letter, _, _ in line.words):
+            self.forget()
+        if effect == "written":
+            self.written()
+        else:
+            self.bars["feed group"] = line.group
+
     def _in_contour(self, line: Line) -> None:
         self.lose()
         self.g["motion"], self.feed = None, NAN
@@ -185,6 +203,7 @@ class Tracker(Known):
     def _run_block(self, block: Sorted) -> Sighting:
         dialect, g, values = self.dialect, block.g, block.values
         effects = {code: dialect.effect(code) for code in g.values()}
+        burnt = self.spindle != 5
         kinds = set(effects.values())
         against = self._ban(kinds)
         if "feed mode" in g:
@@ -196,9 +215,12 @@ class Tracker(Known):
         if "F" in values and not taken:
             self.feed, self.feed_whole = values["F"], self._matters(block.feed_whole)
         ends = self._machine_codes(block)
+        if dialect.length_word in values and "tool length" not in g:
+            self.lengthen(0, NAN, block.axes)
         if not dialect.tool_frame.isdisjoint(values):
             self.tool = [NAN] * len(AXES)
             self.lose()
+            self.end_bar("tool data")
             against = against or "it changes the tool's offset"
         self._modes(g, values)
         for code, effect in effects.items():
@@ -219,10 +241,32 @@ class Tracker(Known):
             seen.against = seen.against or "it names no axis"
         seen.end = list(self.at)
         seen.modes = self._in_force()
+        self._beam(block, seen, burnt)
+        stays = self.facts.resume == "same"
+        if not stays and not (self.facts.resume is None and dialect.same_after_stop):
+            stops = [m for m in block.m if m in _STOPS and dialect.m_groups.get(m) == "stop"]
+            self.lose(AXES if stops else "")
         if ends:
             self.forget()
             self.ended = self.depth == 0  # in a branch it may not run
         return seen
+
+    def _beam(self, block: Sorted, seen: Sighting, burnt: bool) -> None:
+        """Whether G1 would burn where G0 does not."""
+        feeds = block.axes and self.g.get("motion") != self.dialect.rapid
+        on = burnt or self.spindle != 5
+        self.habits = (
+            self.habits
+            or bool(feeds and "S" in block.values and self.spindle != 5)
+            or not self.dialect.beam_codes.isdisjoint(block.m)
+            or ("I" in block.values and (3 in block.m or 4 in block.m))
+        )
+        if self.dark and any(m in _OUTPUTS for m in block.m):
+            self.bars["outputs"] = True
+        if self.dark and on:
+            seen.sure = False
+            if not self.depth and not self.doubt and self.spindle in (3, 4):
+                seen.against = seen.against or "a beam may be on"
 
     def _in_force(self) -> dict[str, Any]:
         distance = self.g.get("distance")
@@ -253,14 +297,21 @@ class Tracker(Known):
         ends = False
         for m in block.m:
             group = self.dialect.m_groups.get(m)
+            if group == "spindle" and m in (3, 4, 5):
+                self.spindle = m
             if group == "stop" and m in _ENDS:
                 ends = True
-            elif m in _CALLS:
+            elif m in _CALLS and group is not None:
                 self._unknown_call()
             elif group is None and self.dialect.other_m == "unknown":
                 self.forget()
             elif group in (None, "tool", "user"):
                 self.lose()
+                if self.dialect.other_m == "positions":
+                    self.tool = [NAN] * len(AXES)
+                    self.g["motion"], self.cycle = None, None
+                    if self.g.get("distance") == 910 and "distance" not in self.fixed:
+                        self.g["distance"] = None
             elif group == "state":
                 self.forget()
         return ends
@@ -277,10 +328,19 @@ class Tracker(Known):
                 if on or self.frames.get(name, False) is not False:
                     self.lose()
                 self.frames[name] = on
+            if code in dialect.bars:
+                name, begins = dialect.bars[code]
+                p = values.get("P", 0.0)
+                on_p = None if p != p else p != 0.0
+                self.bars[name] = on_p if begins == "P" else bool(begins)
         if "units" in g:
             unit = INCH if dialect.units[g["units"]] else 1.0
             if unit != self.unit:
-                self.feed = self.p = self.q = self.level = self.r = NAN
+                self.p = self.q = self.level = self.r = NAN
+            if g["units"] not in dialect.lengths_only:
+                if unit != self.feed_unit:
+                    self.feed = NAN
+                self.feed_unit = unit
             self.unit = unit
         if "path" in g:
             self.path = dialect.paths.get(g["path"])
@@ -292,9 +352,11 @@ class Tracker(Known):
         if effect in _QUIET:
             self._turning(effect)
         elif effect == "length":
-            self.lengthen(code, values.get("H", NAN))
+            self.lengthen(code, values.get("H", NAN), _axes(values))
         elif effect in ("system", "numbered system"):
             number = values.get("P", NAN) if effect == "numbered system" else 0.0
+            if "P" in values and code in self.dialect.p_selects:
+                number = NAN
             self.select(code if effect == "system" else 541, number)
         elif effect == "frames":
             self.lose_offsets()
@@ -307,8 +369,20 @@ class Tracker(Known):
             self.g["motion"], self.feed = None, NAN
         elif effect == "home":
             self.lose()
+        elif effect == "data":
+            self._data(values)
         elif effect == "flow":
             self._unknown_call()
+
+    def _data(self, values: dict[str, float]) -> None:
+        """G10: offsets (L2, L20), tool data (L1, L3, L10 to L13), or parameters."""
+        kind = values.get("L")
+        self.written()
+        if kind in (2.0, 20.0):
+            self.end_bar("tool data")
+        elif kind is not None and kind not in (1.0, 3.0, 10.0, 11.0, 12.0, 13.0):
+            self.forget()
+            self.bars["parameters"] = True
 
     def _motion(self, code: int) -> None:
         self.g["motion"] = code
@@ -329,7 +403,7 @@ class Tracker(Known):
             self.lose("".join(a for k, a in enumerate(AXES) if block.axes >> k & 1) or AXES)
             return
         if kinds & {"set", "clear", "restore", "local", "table"}:
-            self.shift(kinds, block.values)
+            self.shift(kinds, block.values, block.increments)
             return
         if g.get("tool length") not in (None, 430, 490) and block.axes:
             return
@@ -376,6 +450,8 @@ class Tracker(Known):
                 there = block.values[axis] * self.scale(axis)
                 if distance == 910:
                     there += self.at[k]
+                elif axis not in LINEAR:
+                    there = self.turn(k, there)
                 self.at[k] = NAN if distance is None else there
 
     def _judge(self, block: Sorted, seen: Sighting) -> None:
@@ -389,10 +465,30 @@ class Tracker(Known):
             self.lose()
             if True in self.frames.values():
                 seen.against = seen.against or "a rotation, scaling or mirroring is active"
+        seen.against = seen.against or self._barred(block, seen)
+        dialect = self.dialect
         known = compensation == 400 and not self.turned() and self.depth == 0 and not self.doubt
+        known = known and all(on is False for on in self.bars.values())
+        known = known and (self.path is not None or not dialect.path_has_to_be_stated)
+        known = known and (self.feed_unit is not None or not dialect.lengths_only)
         seen.sure = known and seen.against is None
         if self.depth or self.doubt:
             seen.against = None
+
+    def _barred(self, block: Sorted, seen: Sighting) -> str | None:
+        """What else speaks against rewriting the move."""
+        for name, on in self.bars.items():
+            if on:
+                return f"rapids have to stay as they are ({name})"
+        for k, axis in enumerate(AXES):
+            stated = axis in LINEAR or axis in self.facts.wraps
+            if stated or axis not in block.values or self.g.get("distance") != 900:
+                continue
+            if seen.start[k] != self.at[k] and seen.start[k] == seen.start[k]:
+                return f"nobody says which way {axis} turns"
+        if self.dialect.lengths_only and None not in (self.unit, self.feed_unit):
+            return "F is not in the unit of lengths" if self.unit != self.feed_unit else None
+        return None
 
     def _drill(self, code: int, block: Sorted) -> None:
         """Where a block of a drilling cycle ends, if it is one that is followed."""
@@ -426,3 +522,8 @@ class Tracker(Known):
         self.at[k] = self.r if retract == 990 else top if retract == 980 else NAN
         if self.turned() or self.g.get("compensation") != 400:
             self.lose()
+
+
+def _axes(values: dict[str, float]) -> int:
+    """Bit k: a word for AXES[k]."""
+    return sum(1 << k for k, axis in enumerate(AXES) if axis in values)

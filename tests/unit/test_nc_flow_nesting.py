@@ -4,7 +4,7 @@ import pytest
 
 from gcodejerk.nc import Start, find_dialect
 from gcodejerk.nc.flow import Flow
-from gcodejerk.nc.start import initial_state
+from gcodejerk.nc.initial import initial_state
 
 MANY = 200_000
 

@@ -35,6 +35,11 @@ DIALECTS: dict[str, Dialect] = {
 """Ours, by name."""
 
 
+def lathe_dialects() -> list[str]:
+    """Names of those in which programs of lathes are written."""
+    return [name for name, dialect in DIALECTS.items() if dialect.lathe != "no"]
+
+
 def find_dialect(dialect: str | Dialect) -> Dialect:
     """Look a dialect up by its name.
 

@@ -3,7 +3,8 @@
 Sources: the modal groups of the 30i list at cncschool.pl; B-63944EN/02 p. 48 (path of G0); the
 sample programs of NC-PB/gEdit (comments that do not close, ``N120/G0``). What a parameter decides
 is unknown until the machine file says it: whether ``X100`` is 100 mm (3401), the modes after
-power-on that 3402 chooses (G0 or G1, plane, G90 or G91), and the path of G0 (1401, `positioning`).
+power-on that 3402 chooses (G0 or G1, plane, G90 or G91, G94 or G95), the path of G0 (1401,
+`positioning`), and whether G43 alone moves (5006#6).
 A machine builder adds M codes of his own, which may be macros that move. FreeCAD's post writes the
 name of the file as the first line.
 """
@@ -29,7 +30,7 @@ _EFFECTS: dict[int, Effect] = {
     541: "numbered system",
     **dict.fromkeys((430, 440, 490), "length"),
     **dict.fromkeys((434, 435), "frames"),
-    100: "frames",
+    100: "data",
     520: "frames",
     530: "machine",
     920: "set",
@@ -90,7 +91,8 @@ FANUC = Dialect(
     ),
     m_groups=grouped(
         {
-            "stop": (0, 1, 2, 30, 98, 99),
+            "stop": (0, 1, 2, 30, 98, 99, 198),
+            "interrupt": (96, 97),
             "tool": (6,),
             "spindle": (3, 4, 5, 19, 29),
             "coolant": (7, 8, 9),
@@ -98,7 +100,6 @@ FANUC = Dialect(
     ),
     # Marked as the state after power-on in the list of G codes; what 3402 chooses is not here.
     defaults={
-        "feed mode": 940,
         "compensation": 400,
         "retract": 980,
         "system": 540,
@@ -109,6 +110,9 @@ FANUC = Dialect(
     paths={610: 61, 640: 64},
     # 5001 chooses between Z, the axis across the plane, and the axis that the block names.
     length_axes="Z",
+    length_moves=True,  # 5006#6
+    length_word="H",
+    p_selects=frozenset(SYSTEMS),
     transforms={
         **dict.fromkeys((680, 682), ("rotation", True)),
         690: ("rotation", False),
@@ -134,6 +138,9 @@ FANUC = Dialect(
         bits=True,
         local=33,
         system=1000,
+        offsets=1000,
+        timers=frozenset({3000, 3001, 3002}),
+        feed=frozenset({"4109"}),
     ),
     harmless=frozenset(
         {0, 90, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 930, 940, 950, 960, 970}
@@ -152,7 +159,8 @@ _LATHE_EFFECTS: dict[int, Effect] = {
     **dict.fromkeys((270, 280, 300), "return"),
     **dict.fromkeys((290, 310), "home"),
     **dict.fromkeys(SYSTEMS, "system"),
-    **dict.fromkeys((100, 520), "frames"),
+    100: "data",
+    520: "frames",
     530: "machine",
     650: "flow",
     660: "modal cycle",
@@ -189,6 +197,9 @@ _LATHE = replace(
     contours=frozenset({710, 720, 730}),
     drilling=Drilling(),
     harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9}),
+    length_moves=False,
+    length_word="",
+    lathe="yes",
 )
 
 FANUC_LATHE_A = replace(

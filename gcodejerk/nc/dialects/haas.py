@@ -52,6 +52,8 @@ HAAS = replace(
         **dict.fromkeys((1410, 1430, 2340), ("tool centre point", True)),
     },
     m_groups={**FANUC.m_groups, 97: "stop", 96: "stop"},
+    # G103 P1 lets the control look only one block ahead, so that no stream is blended.
+    bars={1030: ("look-ahead", "P")},
     packed_repeats=False,
     tool_cancelled_by_return=True,
     harmless=FANUC.harmless | {1030, 1870},

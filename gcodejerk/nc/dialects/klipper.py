@@ -28,6 +28,10 @@ KLIPPER = replace(
         checksum=True,
         line_limit=1024,
     ),
+    # G20 is refused, and a bare G92 sets every position to 0 (klippy/extras/gcode_move.py).
+    groups={code: group for code, group in MARLIN.groups.items() if code != 200},
+    defaults={**MARLIN.defaults, "units": 210},
+    bare_set="zero",
     names={
         **dict.fromkeys(
             (

@@ -123,6 +123,9 @@ LINUXCNC = Dialect(
     feed_of_mixed=True,
     paths={610: 61, 611: 62, 640: 64},
     diameter_codes=True,
+    lathe="either",
+    same_after_stop=True,
+    incremental_set=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),
     drilling=Drilling(CYCLES, frozenset({760}), own_group=False, repeats="L", missing="error"),
     # "Expressions" and "Binary operators" of the manual; measured where it is silent: AND and OR
@@ -142,6 +145,9 @@ LINUXCNC = Dialect(
         exact=True,
         local=30,
         system=5000,
+        offsets=5161,
+        at_selection=True,
+        feed=frozenset({"<_feed>"}),
     ),
     harmless=frozenset(
         {0, 40, 70, 80, 170, 171, 180, 181, 190, 191, 200, 210, 400, 610, 611, 640}

@@ -67,7 +67,8 @@ MACH = Dialect(
         281: "home",
         **dict.fromkeys(SYSTEMS, "system"),
         **dict.fromkeys((430, 490), "length"),
-        **dict.fromkeys((100, 520), "frames"),
+        100: "data",
+        520: "frames",
         530: "machine",
         920: "set",
         **dict.fromkeys((921, 922, 923), "frames"),
@@ -75,6 +76,10 @@ MACH = Dialect(
     },
     letters="FSTXYZABCUVWDEHIJKLPQR",
     length_axes="Z",
+    length_word="H",
+    p_selects=frozenset(SYSTEMS),
+    dark_rapids=True,
+    lathe="either",
     transforms={
         **{510: ("scaling", True), 500: ("scaling", False)},
         **{680: ("rotation", True), 690: ("rotation", False)},
@@ -91,6 +96,7 @@ MACH = Dialect(
         angles=True,
         together=True,
         system=1000,
+        offsets=1000,
     ),
     harmless=frozenset(
         {0, 40, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 901, 911, 930, 940, 950}

@@ -42,6 +42,7 @@ MARLIN = Dialect(
         variables="none",
         blanks="between",
         checksum=True,
+        hexadecimal=True,
         line_limit=96,
     ),
     groups=grouped(
@@ -63,6 +64,8 @@ MARLIN = Dialect(
     paths={640: 64},
     modal_motion=False,
     one_command=True,
+    dark_rapids=True,
+    incremental_set=True,
     feed_on_rapids=True,
     tool_frame=frozenset("T"),
     other_m="positions",

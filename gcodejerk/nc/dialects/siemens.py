@@ -15,7 +15,7 @@ SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 _SILENT = (
     *("MSG", "LIMS", "SETMS", "STOPRE", "SOFT", "BRISK", "DRIVE", "FFWON", "FFWOF", "DEF"),
     *("COMPON", "COMPOF", "COMPCAD", "COMPCURV", "CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
-    *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "SPOS", "SPOSA", "FGROUP", "RTLION", "ADIS", "ADISPOS"),
+    *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "SPOS", "SPOSA", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
     *("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM", "SF", "SCC"),  # corners: the end stays
     *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE", "ACC"),
@@ -42,6 +42,8 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys(_TURNED, "transform"),
     **dict.fromkeys(_CYCLES, "cycle"),
     **dict.fromkeys(_FLOW, "flow"),
+    "FGROUP": "feed group",
+    "$": "written",  # $P_UIFR[1]=.., $TC_DP3[1,1]=.., $MC_..: offsets, tools, machine data
     "MCALL": "modal cycle",
     "DIAMON": "diameter",
     "DIAMOF": "radius",
@@ -65,6 +67,7 @@ SIEMENS = Dialect(
         equals=True,
         variables="R",
         blanks="between",
+        strings=True,
         line_limit=512,
     ),
     groups=grouped(
@@ -114,6 +117,10 @@ SIEMENS = Dialect(
     feed_modes={930: 93, 940: 94, 950: 95},
     paths={600: 61, 640: 64, 6410: 64, 6420: 64, 6430: 64, 6440: 64, 6450: 64},
     diameter_codes=True,
+    lathe="either",
+    # G70 and G71 leave F in the unit of the control, G700 and G710 do not (NC programming p. 170).
+    lengths_only=frozenset({700, 710}),
+    path_has_to_be_stated=True,
     tool_frame=frozenset("TD"),
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
