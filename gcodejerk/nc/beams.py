@@ -36,9 +36,14 @@ def shows_habits(codes: Codes, state: State, feeds: bool, dialect: Dialect) -> b
     """
     if not dialect.beam_codes.isdisjoint(codes.m):
         return True
-    if not {3, 4}.isdisjoint(codes.m) and "I" in codes.values:
-        return True  # Marlin's inline power
+    if inline_power(codes, b"I" if "I" in codes.values else b""):
+        return True
     return feeds and "S" in codes.values and state.spindle != 5
+
+
+def inline_power(codes: Codes, rest: bytes) -> bool:
+    """Whether a block is Marlin's ``M3 I``: the power follows S within moves."""
+    return not {3, 4}.isdisjoint(codes.m) and rest[:1] in (b"I", b"i")
 
 
 def uses_outputs(codes: Codes) -> bool:

@@ -70,6 +70,8 @@ CODE = (
     _code("fanuc", rb"(?<![A-Z_])(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)",
           "Fanuc macro flow", sure=False),
     _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
+    # increments U and W, which system A alone has, in a block that no mill has
+    _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
     _code("grbl", rb"^\s*\$(\$|#|G|I|N|X|H|C|J=|\d+=)", "a $ command of grbl"),
     *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
       for name in ("marlin", "klipper")),
@@ -89,6 +91,24 @@ _TURNING = re.compile(rb"\b(LATHE|TURN(?:ING)?|TURN POST)\b")
 _O_PROGRAM = re.compile(rb"^\s*[O:]\d+", re.MULTILINE)
 _KLARTEXT = re.compile(rb"^\s*\d+\s+BEGIN\s+PGM\b", re.MULTILINE)
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
+
+
+def refuse_klartext(head: bytes, name: str) -> None:
+    """Refuse Heidenhain's own language, in which hardly a line looks like a block.
+
+    Parameters
+    ----------
+    head : bytes
+        The beginning of a program.
+    name : str
+        For messages.
+    """
+    if match := _KLARTEXT.search(head[:HEAD]):
+        raise ProgramError(
+            "this is Heidenhain Klartext, which is not read",
+            "post the program as DIN/ISO (dialect heidenhain-iso)",
+            Place(name, 1 + head.count(b"\n", 0, match.start())),
+        )
 
 
 def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect, str]:
@@ -121,12 +141,7 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
     'linuxcnc'
     """
     head = head[:HEAD]
-    if _KLARTEXT.search(head):
-        raise ProgramError(
-            "this is Heidenhain Klartext, which is not read",
-            "post the program as DIN/ISO (dialect heidenhain-iso)",
-            Place(name, 1),
-        )
+    refuse_klartext(head, name)
     comments = b"\n".join(_COMMENT.findall(head))
     code = _COMMENT.sub(b" ", head)
     found: dict[str, str] = {}

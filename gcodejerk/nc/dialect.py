@@ -238,6 +238,8 @@ class Dialect:
     """G92 without axis words: changes nothing; makes every position zero; nobody knows."""
     incremental_set: bool = False
     """G92 means the same in G91."""
+    feed_before_units: bool = False
+    """F counts in the unit in force in front of a block that also states one."""
     lengths_only: frozenset[int] = frozenset()
     """Codes for inch or mm that leave the unit of F as it was."""
     bars: Mapping[int, tuple[str, bool | Literal["P"]]] = field(default_factory=dict)

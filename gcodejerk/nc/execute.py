@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from gcodejerk.nc import frames
-from gcodejerk.nc.beams import shows_habits, uses_outputs
+from gcodejerk.nc.beams import inline_power, shows_habits, uses_outputs
 from gcodejerk.nc.block import Block, Name
 from gcodejerk.nc.codes import Codes, sort_words
 from gcodejerk.nc.cycles import begin_cycle, run_cycle
@@ -84,6 +84,7 @@ class Executor:
                 assign(block, values, state, rules)
             self._act(codes, step)
         step.beam |= state.spindle != 5
+        step.habit |= block.problem is not None and inline_power(codes, block.rest)
         if reads_feed(block, rules):
             step.feed_event = USES_FEED
         contour = self._contour is not None
@@ -182,7 +183,8 @@ class Executor:
                 state.put("bars", {**state.bars, name: begins})
         if "units" in g:
             unit = MM_PER_INCH if dialect.units[g["units"]] else 1.0
-            self._units(unit, unit if g["units"] not in dialect.lengths_only else state.feed_unit)
+            own = g["units"] not in dialect.lengths_only
+            self._units(unit, unit if own else state.feed_unit, "F" in values)
         for code in g.values():
             self._effect(dialect.effect(code), code, values, step)
         effects = [self._named(name) for name in codes.names]
@@ -254,10 +256,15 @@ class Executor:
         group = [n.arguments.strip(b"() \t") for n in names if self._named(n) == "feed group"]
         self.state.put("bars", {**self.state.bars, "feed group": any(group)})
 
-    def _units(self, unit: float, feed_unit: float | None) -> None:
+    def _units(self, unit: float, feed_unit: float | None, beside_feed: bool) -> None:
         """Take a new unit of lengths, and of F."""
         state = self.state
-        if feed_unit != state.feed_unit:
+        # G21 F100 at the top: the F is meant in mm. Should the control have started in inches and
+        # read it so, restoring F100 is the slower of the two; with G20 F10 it would be the faster.
+        slower = unit == 1.0 or not self.dialect.feed_before_units
+        if feed_unit != state.feed_unit and not (
+            beside_feed and state.feed_unit is None and slower
+        ):
             state.put("feed", NAN)
         state.put("feed_unit", feed_unit)
         if unit != state.unit:
@@ -351,12 +358,11 @@ class Executor:
     def _behind_macro(self) -> None:
         """Forget what a builder's macro is known to leave changed.
 
-        It retracts with G91 G28 and ends in G90, it cancels the tool length, and it may end in G0
-        or in G1. That it leaves G91, or another work system, behind would stop every shop.
+        It retracts with G91 G28 and ends in G90, and it cancels the tool length. Were it to leave
+        G91, G1 or another work system behind, no program would run on such a machine.
         """
         state = self.state
         state.lose("tool")
-        state.put("motion", None)
         if state.cycle is not None:
             state.lose("cycle")
         if state.distance == 910 and "distance" not in state.fixed:

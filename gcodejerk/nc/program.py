@@ -18,7 +18,7 @@ from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.block import Block, Line
 from gcodejerk.nc.calls import Calls
 from gcodejerk.nc.chunks import BYTE_ORDER_MARK, Chunk, read_chunks
-from gcodejerk.nc.detect import detect_dialect
+from gcodejerk.nc.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
 from gcodejerk.nc.lexer import read_lines
@@ -184,6 +184,7 @@ def follow(
     for chunk in chunks:
         digest.update(chunk.data)
         if not size:
+            refuse_klartext(chunk.data, name)
             stamp = find_stamp(chunk, chosen)
             first = chunk.data.find(b"\n")
             if first > 0 and chunk.data[first - 1 : first] == b"\r":
@@ -194,6 +195,7 @@ def follow(
         if progress is not None:
             progress(size)
     reader.finish()
+    rapids = reader.log.finish()
     return Program(
         name=name,
         dialect=chosen.name,
@@ -204,8 +206,8 @@ def follow(
         newline=newline,
         stamp=stamp,
         insert_at=reader.insert_at,
-        findings=reader.findings(),
-        rapids=reader.log.finish(),
+        findings=reader.findings(rapids),
+        rapids=rapids,
     )
 
 

@@ -20,13 +20,14 @@ from gcodejerk.nc.flow import Flow
 from gcodejerk.nc.jumps import is_target
 from gcodejerk.nc.modal import GROUP_FIELDS, MODES, State
 from gcodejerk.nc.passes import Passes
-from gcodejerk.nc.rapids import USES_FEED, RapidLog
+from gcodejerk.nc.rapids import REASONS, USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.runner import Finding, Runner
 from gcodejerk.nc.runs import can_run, run_plain
 from gcodejerk.nc.start import Start
 from gcodejerk.nc.structures import Collector, Node
 from gcodejerk.nc.tokenizer import parse_line
 from gcodejerk.nc.words import Lines
+from gcodejerk.reasons import Reason
 
 _FILE_NAME = re.compile(rb"[ \t]*[A-Za-z_][\w-]*\.[A-Za-z]{1,5}[ \t]*(?:\([^()]*\)[ \t]*)?")
 
@@ -279,7 +280,7 @@ class Reader:
         if self.calls is not None:
             self.calls.finish()
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self, rapids: Rapids) -> tuple[Finding, ...]:
         """Collect what the user should know."""
         runner = self.runner
         found = list(runner.odd_lines)
@@ -287,13 +288,14 @@ class Reader:
             found.append(
                 Finding(None, f"{runner.odd_count - len(found)} more lines not understood")
             )
-        if runner.asked_unit is not None:
+        lines = rapids.line[rapids.reason == REASONS.index(Reason.UNITS_UNKNOWN)]
+        if len(lines):
+            codes = _unit_codes(self.dialect)
             found.append(
                 Finding(
-                    runner.asked_unit,
-                    "nobody says whether lengths are mm or inches: put G21 or G20 into the "
-                    "program, or what the control starts with into program.startup of the "
-                    f"machine file ({_unit_codes(self.dialect)})",
+                    int(lines[0]),
+                    f"nobody says whether lengths are mm or inches: put {codes} in front of it, or "
+                    "what the control starts with into program.startup of the machine file",
                 )
             )
         if runner.asked_distance is not None:
@@ -314,9 +316,9 @@ def _says(line: Line) -> bool:
 
 
 def _unit_codes(dialect: Dialect) -> str:
-    """How a machine file says what the unit is."""
+    """The codes for mm and for inches."""
     codes = {inch: code_name(code).decode() for code, inch in dialect.units.items()}
-    return f"startup: {codes.get(False, 'G21')}, or {codes.get(True, 'G20')}"
+    return " or ".join(codes[inch] for inch in (False, True) if inch in codes)
 
 
 def _nothing() -> None:

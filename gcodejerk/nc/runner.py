@@ -45,8 +45,6 @@ class Runner:
         self.executor = Executor(dialect, state, start)
         self.odd_lines: list[Finding] = []
         self.odd_count = 0
-        self.asked_unit: int | None = None
-        """The first rapid that is left alone since nobody said whether it is in inches."""
         self.asked_distance: int | None = None
         self.call: Callable[[Call, Line], bool] | None = None
         """Runs a subprogram; whether the program goes on behind it."""
@@ -90,7 +88,8 @@ class Runner:
         elif step.fault and block.problem is None:
             self.odd(line, "the controller would refuse this combination of words")
         elif step.unknown:
-            self.odd(line, f"{step.unknown} is no code that the dialect {self.dialect.name} has")
+            name = self.dialect.name
+            self.odd(line, f"{step.unknown} is a code that the dialect {name} does not know")
         if not ((before is not None or uncertain) and step.feed_event == GIVES_FEED):
             self.log.feed_event(step.feed_event)
         self.log.habits |= step.habit
@@ -133,8 +132,6 @@ class Runner:
                 reason = Reason.FEED_UNKNOWN
         if reason is None:
             self.ask(line.number)
-        elif reason is Reason.UNITS_UNKNOWN and not state.unit_stated:
-            self.asked_unit = self.asked_unit or line.number
         row = common_columns(state)
         row.update(
             line=line.number,

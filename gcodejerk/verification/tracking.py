@@ -176,6 +176,9 @@ class Tracker(Known):
 
     def _lost(self, line: Line) -> Sighting:
         """A line that is not understood."""
+        # M3 I: a letter without a number is no word
+        fires = any(letter == "M" and number in (3, 4) for letter, number, _ in line.words)
+        self.habits = self.habits or (fires and not line.understood)
         if any(effect in ("transform", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
@@ -309,7 +312,8 @@ class Tracker(Known):
                 self.lose()
                 if self.dialect.other_m == "positions":
                     self.tool = [NAN] * len(AXES)
-                    self.g["motion"], self.cycle = None, None
+                    if self.cycle is not None:
+                        self.g["motion"], self.cycle = None, None
                     if self.g.get("distance") == 910 and "distance" not in self.fixed:
                         self.g["distance"] = None
             elif group == "state":
@@ -338,7 +342,10 @@ class Tracker(Known):
             if unit != self.unit:
                 self.p = self.q = self.level = self.r = NAN
             if g["units"] not in dialect.lengths_only:
-                if unit != self.feed_unit:
+                sure = unit == 1.0 or not dialect.feed_before_units
+                if unit != self.feed_unit and not (
+                    self.feed_unit is None and "F" in values and sure
+                ):
                     self.feed = NAN
                 self.feed_unit = unit
             self.unit = unit

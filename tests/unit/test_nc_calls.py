@@ -26,7 +26,8 @@ class Pipe(io.BytesIO):
 
 def reasons(text, dialect="fanuc", head=HEAD, file=io.BytesIO):
     """Reason of every rapid behind the head, by line counted from the text's first."""
-    rapids = read_program(file(head + text), dialect=dialect).rapids
+    start = Start(startup="G71" if dialect == "siemens" else "")
+    rapids = read_program(file(head + text), dialect=dialect, start=start).rapids
     assert rapids.line.tolist() == sorted(set(rapids.line.tolist()))
     found = zip(rapids.line.tolist(), rapids.reason.tolist(), strict=True)
     lines = head.count(b"\n")
@@ -158,8 +159,8 @@ def test_jump_back_makes_code_behind_the_end_run():
 def test_program_that_repeats_itself_knows_nothing_at_its_beginning():
     start = Start(positions=dict.fromkeys("XYZ", 0.0))
     for text, certain in (
-        (b"G21 G90 G17 G0 X5.\nM30\n", True),
-        (b"G21 G90 G17 G0 X5.\nM99\n", False),
+        (b"G21 G90 G94 G17 G0 X5.\nM30\n", True),
+        (b"G21 G90 G94 G17 G0 X5.\nM99\n", False),
     ):
         rapids = read_program(io.BytesIO(text), dialect="fanuc", start=start).rapids
         assert (int(rapids.reason[0]) == CERTAIN) is certain

@@ -2,6 +2,7 @@
 
 import io
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -11,7 +12,8 @@ from gcodejerk.nc import trace as follow
 from gcodejerk.nc.dialects import GROUP
 from gcodejerk.reasons import CERTAIN, REASONS
 
-KNOWN = Start(positions={"X": 0.0, "Y": 0.0, "Z": 0.0}, startup="G17 G90 G94")
+KNOWN = Start(positions={"X": 0.0, "Y": 0.0, "Z": 0.0}, startup="G17 G21 G90 G94")
+SIEMENS = Start(positions=KNOWN.positions, startup="G17 G71 G90 G94 G64")
 PRINTER = Start(positions=KNOWN.positions, startup="G90 G21")
 NOWHERE = math.nan
 
@@ -54,6 +56,8 @@ def test_a_dialect_names_its_sources_and_knows_what_its_tables_refer_to(name):
 def test_every_dialect_moves_where_absolute_words_say(name):
     line_end = b"*\n" if name == "heidenhain-iso" else b"\n"
     start = Start(positions=KNOWN.positions)
+    units = DIALECTS[name].units
+    start = replace(start, startup=f"G{next(c for c in units if not units[c]) // 10}")
     states = b"G40" if name == "heidenhain-iso" else b""
     states += line_end if name == "fanuc-lathe-a" else b" G90" + line_end
     axes = b"X10. Z-3." if "lathe" in name else b"X10. Y5. Z-3."
@@ -72,7 +76,10 @@ def test_every_dialect_moves_where_absolute_words_say(name):
         ("siemens", b"G0 X1 (5)", "'(' has no meaning here"),
         ("siemens", b"G0 X1 ; (5", None),
         ("fanuc", b"G0 X1. ;", None),
-        ("fanuc", b"G0 X1. ; G1", "text behind the end of the block"),
+        ("fanuc", b"G0 X1. ; G1", "another block behind the end of the block"),
+        ("fanuc", b"G0 X1. ; to the corner", None),
+        ("fanuc", b"; T1 10MM END MILL", None),
+        ("fanuc", b"; #1=5", "another block behind the end of the block"),
         ("mach", b"G0 X1 // go", None),
         ("linuxcnc", b"G0 X1 // go", "'/' has no meaning here"),
         ("linuxcnc", b"g0x +0. 12 34y 7", None),
@@ -131,13 +138,13 @@ def test_what_x100_is_only_the_machine_knows(meaning, end_of_x):
     program = b"G0 X100\n"
     assert same(end(program, "fanuc", start)[:1], (end_of_x,))
     why = "number without a decimal point"
-    assert reasons(program, "fanuc", start) == [None if meaning else why]
-    assert reasons(b"G0 X100.\n", "fanuc", start) == [None]
+    assert reasons(b"G94 " + program, "fanuc", start) == [None if meaning else why]
+    assert reasons(b"G94 G0 X100.\n", "fanuc", start) == [None]
     assert same(end(program, "linuxcnc", start)[:1], (100.0,))
 
 
 def test_a_whole_number_in_inches_is_a_ten_thousandth():
-    start = Start(positions={"X": 0.0}, startup="G90", decimal_point="standard")
+    start = Start(positions={"X": 0.0}, startup="G90 G21", decimal_point="standard")
     assert same(end(b"G20 G0 X5\n", "haas", start)[:1], (0.0005 * 25.4,))
 
 
@@ -147,8 +154,10 @@ def test_zero_needs_no_decimal_point():
 
 def test_only_codes_that_a_dialect_states_are_assumed_at_the_start():
     unstated = Start(positions={"X": 0.0})
-    program = b"G0 X5.\n"
+    program = b"G21 G0 X5.\n"
+    assert reasons(b"G0 X5.\n", "linuxcnc", unstated) == ["units unknown"]
     assert reasons(program, "linuxcnc", unstated) == [None]
+    assert reasons(b"G0 X5.\n", "klipper", unstated) == ["distance mode unknown"]
     assert reasons(program, "grbl", unstated) == [None]
     assert reasons(program, "fanuc", unstated) == ["distance mode unknown"]
     assert reasons(program, "mach", unstated) == ["distance mode unknown"]
@@ -192,14 +201,14 @@ def test_g28_on_the_line_of_g0_is_fanucs_and_no_linuxcncs():
 
 
 def test_u_and_w_are_increments_on_a_lathe_with_system_a():
-    start = Start(positions={"X": 10.0, "Z": 5.0}, diameter=True, startup="G99")
+    start = Start(positions={"X": 10.0, "Z": 5.0}, diameter=True, startup="G21 G99")
     at = end(b"G00 X40. Z2.\nU-4. W-1.\n", "fanuc-lathe-a", start)
     assert same((at[0], at[2]), (18.0, 1.0))  # radius, from a diameter of 36
     assert reasons(b"G00 X40. Z2.\nU-4. W-1.\n", "fanuc-lathe-a", start) == [None, None]
 
 
 def test_g90_is_a_turning_cycle_on_a_lathe_with_system_a():
-    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G99")
+    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G21 G99")
     at = end(b"G00 X44. Z2.\nG90 X40. Z-20. F0.2\n", "fanuc-lathe-a", start)
     assert math.isnan(at[0])
     at = end(b"G90 G00 X44. Z2.\n", "fanuc-lathe-b", start)
@@ -207,7 +216,7 @@ def test_g90_is_a_turning_cycle_on_a_lathe_with_system_a():
 
 
 def test_blocks_of_a_contour_do_not_run_where_they_stand():
-    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G99 F0.1")
+    start = Start(positions={"X": 20.0, "Z": 2.0}, diameter=True, startup="G21 G99 F0.1")
     program = (
         b"G00 X40. Z3.\nG71 U2. R0.5\nG71 P10 Q20 U0.4 W0.1 F0.25\n"
         b"N10 G00 X16.\nG00 Z1.\nN20 X44.\nG00 X60. Z5.\nX62.\n"
@@ -219,7 +228,7 @@ def test_blocks_of_a_contour_do_not_run_where_they_stand():
 
 def test_a_tool_word_changes_the_frame_of_a_lathe_only():
     program = b"G0 X5. Z5.\nT0101\nX7. Z7.\nX8.\n"
-    turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G99")
+    turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G21 G99")
     assert reasons(program, "fanuc-lathe-a", turned) == [None, "start unknown", None]
     assert reasons(program, "fanuc") == [None, None, None]
 
@@ -281,19 +290,19 @@ def test_axis_letters_of_other_commands_move_nothing():
 
 
 def test_siemens_words_with_names():
-    at = end(b"G90\nG0 X10 Y5 Z3\nG0 X=IC(5) Y=AC(7)\n", "siemens")
+    at = end(b"G90\nG0 X10 Y5 Z3\nG0 X=IC(5) Y=AC(7)\n", "siemens", SIEMENS)
     assert same(at, (15.0, 7.0, 3.0))
-    assert math.isnan(end(b"G90\nG0 X10\nTRANS X5\n", "siemens")[0])
-    assert math.isnan(end(b"G90\nG0 X10\nMYSUB(3)\n", "siemens")[0])
-    assert end(b'G90\nG0 X10\nMSG("G0 X5")\n', "siemens")[0] == 10.0
-    turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G90")
+    assert math.isnan(end(b"G90\nG0 X10\nTRANS X5\n", "siemens", SIEMENS)[0])
+    assert math.isnan(end(b"G90\nG0 X10\nMYSUB(3)\n", "siemens", SIEMENS)[0])
+    assert end(b'G90\nG0 X10\nMSG("G0 X5")\n', "siemens", SIEMENS)[0] == 10.0
+    turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G71 G90")
     assert end(b"DIAMON\nG0 X10\n", "siemens", turned)[0] == 5.0
     assert end(b"DIAMOF\nG0 X10\n", "siemens", turned)[0] == 10.0
 
 
 def test_positions_behind_mcall_are_holes():
     program = b"G90\nG0 X1 Z5\nMCALL CYCLE81(10,0,2,-5)\nX5\nX6\nMCALL\nG0 X7 Z9\nX8\n"
-    assert reasons(program, "siemens") == [
+    assert reasons(program, "siemens", SIEMENS) == [
         None, *["rapid inside a canned cycle"] * 2, "start unknown", None,
     ]  # fmt: skip
 
@@ -311,7 +320,7 @@ def test_offsets_make_g53_known():
     start = Start(
         positions={"X": 0.0, "Y": 0.0, "Z": 0.0},
         offsets={"G54": {"X": -100.0, "Y": -50.0, "Z": -200.0}, "G54.1 P3": {"X": 10.0}},
-        startup="G90",
+        startup="G21 G90",
     )
     assert same(end(b"G54 G0 X1. Y1. Z1.\nG53 G0 Z0.\n", "fanuc", start), (1.0, 1.0, 200.0))
     assert same(end(b"G54 G0 X1.\nG54.1 P3\n", "fanuc", start)[:1], (-109.0,))
@@ -319,7 +328,9 @@ def test_offsets_make_g53_known():
 
 
 def test_linear_and_rotary_axes_together_need_a_known_feed():
-    start = Start(positions=dict.fromkeys(AXES, 0.0), startup="G90")
+    start = Start(
+        positions=dict.fromkeys(AXES, 0.0), startup="G21 G90 G94", wraps={"B": "none"}
+    )
     assert reasons(b"G0 X5. B90.\n", "fanuc", start) == ["linear and rotary axes move together"]
     assert reasons(b"G0 X5. B90.\n", "linuxcnc", start) == [None]
     assert reasons(b"G0 B90.\n", "fanuc", start) == [None]
@@ -374,7 +385,7 @@ def test_a_tool_axis_that_is_no_plane_is_read():
 
 def test_an_angle_of_direct_drawing_moves_axes_that_it_does_not_name():
     # G01 X20. A45. computes Z: a block that is not understood leaves no position known.
-    start = Start(positions={"X": 10.0, "Z": 5.0}, diameter=True, startup="G99 F0.1")
+    start = Start(positions={"X": 10.0, "Z": 5.0}, diameter=True, startup="G21 G99 F0.1")
     at = end(b"G00 X40. Z2.\nG01 X20. A45.\n", "fanuc-lathe-a", start)
     assert math.isnan(at[0])
     assert math.isnan(at[2])
@@ -389,8 +400,8 @@ def test_where_a_back_boring_cycle_ends_is_not_known():
 
 
 def test_a_rounded_corner_ends_where_it_is_programmed():
-    assert same(end(b"G90\nG1 X10 Y5 RND=2 F100\n", "siemens")[:2], (10.0, 5.0))
-    assert math.isnan(end(b"G90\nG1 X10 ANG=30 F100\n", "siemens")[1])
+    assert same(end(b"G90\nG1 X10 Y5 RND=2 F100\n", "siemens", SIEMENS)[:2], (10.0, 5.0))
+    assert math.isnan(end(b"G90\nG1 X10 ANG=30 F100\n", "siemens", SIEMENS)[1])
 
 
 def test_a_tool_length_of_a_mill_shifts_z_alone():

@@ -11,14 +11,14 @@ from gcodejerk.nc import DIALECTS, Start, read_program
 from gcodejerk.nc.expansion import expand
 from gcodejerk.verification.expansion import check_expansion
 
-HEAD = b"G21 G90 G64 P0.05 G98 F100\nM3 S500\nG0 X0 Y0 Z10\n"
+HEAD = b"G21 G90 G64 P0.05 G98\nF100 M3 S500\nG0 X0 Y0 Z10\n"
 
 
 def expanded(program, start=None, comments=False):
     """The result as lines behind HEAD, and what was found."""
     target = io.BytesIO()
     found = expand(
-        io.BytesIO(program), target, start=Start() if start is None else start, comments=comments
+        io.BytesIO(program), target, start=Start(startup="G21") if start is None else start, comments=comments
     )
     text = target.getvalue()
     return text.removeprefix(HEAD).decode().splitlines(), found

@@ -201,13 +201,23 @@ def test_startup_codes_count_as_stated():
     assert program.rapids.distance_stated.all()
 
 
-def test_assumed_unit_and_distance_mode_are_found():
-    messages = [f.message for f in read(b"G0 X1\nX2\nM2\n").findings]
-    assert len(messages) == 2
+def test_assumed_distance_mode_is_found():
+    (finding,) = read(b"G21 G0 X1\nX2\nM2\n").findings
+    assert (finding.line, "G90 is assumed" in finding.message) == (2, True)
 
 
-def test_inch_is_assumed_where_the_user_says_so():
-    rapids = read(b"G0 X1\nX2\n", start=Start(inch=True)).rapids
+@pytest.mark.parametrize("fast", [True, False])
+def test_a_unit_that_nobody_stated_is_not_guessed(fast):
+    program = read(b"G90 G0 X1\nX2\n" + b"X3\nX4\n" * 30 + b"M2\n", fast=fast)
+    assert {REASONS[r] for r in program.rapids.reason.tolist()} == {Reason.UNITS_UNKNOWN}
+    (finding,) = program.findings
+    assert finding.line == 1
+    assert "program.startup" in finding.message
+    assert "G21 or G20" in finding.message
+
+
+def test_the_user_may_say_what_the_unit_is():
+    rapids = read(b"G0 X1\nX2\n", start=Start(startup="G20")).rapids
     assert rapids.target[-1, 0] == pytest.approx(50.8)
 
 
@@ -231,7 +241,6 @@ def test_stamp_is_found_only_in_a_comment():
         (b"G0 X1\0\n", "0x00"),
         (b"\xff\xfeG\x000\x00", "UTF-16"),
         (b"G\x000\x00 \x00X\x001\x00\n\x00", "UTF-16"),
-        (b"\xef\xbb\xbfG0 X1\n", "byte order mark"),
         (b"G0 X1\n" + b"X1" * 40_000, "more than 65536 bytes"),
         (b"G0 X1\n" + b"X1" * 40_000 + b"\nM2\n", "more than 65536 bytes"),
     ],

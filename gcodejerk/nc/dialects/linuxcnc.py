@@ -125,6 +125,7 @@ LINUXCNC = Dialect(
     diameter_codes=True,
     lathe="either",
     same_after_stop=True,
+    feed_before_units=True,
     incremental_set=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),
     drilling=Drilling(CYCLES, frozenset({760}), own_group=False, repeats="L", missing="error"),

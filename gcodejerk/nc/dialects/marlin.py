@@ -11,7 +11,7 @@ from gcodejerk.nc.dialect import Dialect, Effect, Text, Writing, grouped
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 SILENT = (
-    *(3, 4, 5, 7, 8, 9, 17, 20, 21, 22, 23, 24, 25, 26, 27, 31, 42, 73, 75, 76, 77, 78),
+    *(7, 8, 9, 17, 20, 21, 22, 23, 24, 25, 26, 27, 31, 42, 73, 75, 76, 77, 78),
     *(82, 83, 85, 92, 104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 114, 115, 117, 118),
     *(119, 140, 141, 145, 149, 150, 155, 190, 191, 201, 203, 204, 205, 220, 221, 226, 250),
     *(256, 280, 300, 301, 302, 303, 304, 305, 355, 400, 500, 501, 502, 503, 504, 572, 593, 900),
@@ -55,7 +55,7 @@ MARLIN = Dialect(
             "non-modal": tuple(sorted(set(EFFECTS) - set(SYSTEMS) | {800})),
         }
     ),
-    m_groups=grouped({"stop": (0, 1, 2, 30), "silent": SILENT}),
+    m_groups=grouped({"stop": (0, 1, 2, 30), "spindle": (3, 4, 5), "silent": SILENT}),
     # No code changes these.
     defaults={"plane": 170, "feed mode": 940, "compensation": 400, "path": 640},
     effects=EFFECTS,

@@ -1,0 +1,453 @@
+"""Rapids that look certain and are not, one class after another; each was rewritten once."""
+
+import io
+import math
+
+import pytest
+
+from gcodejerk.errors import ProgramError
+from gcodejerk.nc import AXES, CERTAIN, DIALECTS, Start, read_program
+from gcodejerk.nc.modal import FIELDS, State, agree, join, same
+from gcodejerk.nc.reader import Reader
+from gcodejerk.reasons import REASONS, Reason
+from gcodejerk.verification.agreement import confirm
+from gcodejerk.verification.findings import Findings
+from gcodejerk.verification.known import KINDS, Facts, Known
+
+HEADS = {
+    "siemens": b"G71 G90 G94 G17 G40 G64 F100\nG0 X0 Y0 Z50\n",
+    "marlin": b"G21\nG90\nG0 X0 Y0 Z50 F6000\n",
+    "klipper": b"G90\nG0 X0 Y0 Z50 F6000\n",
+    "fanuc": b"G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 X0. Y0. Z50.\n",
+    "fanuc-lathe-a": b"G21 G98 G40 G18 F100.\nG0 X0. Z50.\n",
+    "haas": b"G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 X0. Y0. Z50.\n",
+    "mach": b"G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 X0. Y0. Z50.\n",
+    "grbl": b"G21 G90 G94 G17 G54 F100\nG0 X0 Y0 Z50\n",
+    "linuxcnc": b"G21 G90 G94 G17 G40 G49 G54 G64 F100\nG0 X0 Y0 Z50 A10\n",
+}
+
+
+def start_of(dialect, **facts):
+    return Start(startup="G71" if dialect == "siemens" else "", **facts)
+
+
+def read(text, dialect, head=None, **facts):
+    """Reasons of the rapids behind the head, None where certain; both readings have to agree."""
+    head = HEADS[dialect] if head is None else head
+    start = start_of(dialect, **facts)
+    rapids = read_program(io.BytesIO(head + text), dialect=dialect, start=start).rapids
+    certain = [k for k, r in enumerate(rapids.reason.tolist()) if r == CERTAIN]
+    found = Findings(100)
+    confirm(io.BytesIO(head + text), dialect, start, rapids, certain, found)
+    assert not found.violations
+    behind = rapids.line > head.count(b"\n")
+    return [None if r == CERTAIN else REASONS[r] for r in rapids.reason[behind].tolist()]
+
+
+def also_noticed(text, dialect, **facts):
+    """Whether the second reading refuses, or at least does not confirm, the last rapid."""
+    start = start_of(dialect, **facts)
+    data = HEADS[dialect] + text
+    rapids = read_program(io.BytesIO(data), dialect=dialect, start=start).rapids
+    found = Findings(100)
+    confirmed = confirm(io.BytesIO(data), dialect, start, rapids, [len(rapids) - 1], found)
+    return bool(found.violations) or confirmed == 0
+
+
+# What stands in front of the last rapid, and the reason for which that one is left alone.
+NOT_CERTAIN = {
+    "a work offset is written": ("fanuc", b"#5221=#5021\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "so on a Haas": ("haas", b"#5221=#5021\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "the external offset": ("fanuc", b"#2501=5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "a tool offset": ("fanuc", b"#2001=5.\nG54 G0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "a computed variable": ("fanuc", b"#[#1]=5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "and a doubly indirect one": ("fanuc", b"##1=5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "a stop with a message": ("fanuc", b"#3006=1\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "a variable of Mach": ("mach", b"#5221=4\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "G10 of an offset": ("fanuc", b"G10 L2 P1 X5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "G10 of a tool": ("fanuc", b"G10 L10 P1 R5.\nG54\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "G10 of a parameter": (
+        "fanuc", b"G10 L50\nN1401 P1 R0\nG11\nG90 G21 G94 G17 G40 G54 G49 F9.\nG0 X5.\nX6.\n",
+        Reason.SYSTEM_WRITTEN,
+    ),
+    "a frame of Siemens": ("siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG0 X5\nX6\n", Reason.SYSTEM_WRITTEN),
+    "tool data of Siemens": ("siemens", b"N5 $TC_DP3[1,1]=5\nG54 G0 X5\nX6\n", Reason.SYSTEM_WRITTEN),
+    "an axis variable": ("siemens", b"$AA_OFF[X]=5 ; shift\nG0 X5\nX6\n", Reason.SYSTEM_WRITTEN),
+    "G43 that may move": ("fanuc", b"G43 H1\nG0 Z9.\n", Reason.START_UNKNOWN),
+    "G49 that may move": ("haas", b"G49\nG0 Z9.\n", Reason.START_UNKNOWN),
+    "H without G43": ("fanuc", b"G43 H1 Z5.\nH2\nG0 Z9.\n", Reason.START_UNKNOWN),
+    "another program": ("fanuc", b"M198 P1000\nG90 G40 G0 X5.\nX6.\n", Reason.UNITS_UNKNOWN),
+    "an interrupt": ("fanuc", b"M96 P1000\nG90 G40 G0 X5.\nX6.\n", Reason.UNITS_UNKNOWN),
+    "a hexadecimal number": ("marlin", b"G0Y0X10\n", Reason.NOT_UNDERSTOOD),
+    "no look-ahead": ("haas", b"G103 P1\nG0 X5.\n", Reason.LOOK_AHEAD),
+    "inches with F in mm": ("siemens", b"G70\nG0 X5\nX6\n", Reason.FEED_UNIT),
+    "F of some axes": ("siemens", b"FGROUP(X,Y)\nG0 X5 Z9\n", Reason.FEED_GROUP),
+    "somebody jogs at M0": ("fanuc", b"M0\nG0 X9.\n", Reason.START_UNKNOWN),
+    "at M1 of grbl": ("grbl", b"M1\nG0 X9.\n", Reason.START_UNKNOWN),
+    "at M0 of Siemens": ("siemens", b"M0\nG0 X9\n", Reason.START_UNKNOWN),
+    "G54 P3": ("fanuc", b"G54 P3\nG91 G0 X9.\nG90 X9.\n", Reason.START_UNKNOWN),
+    "G54 P3 of Mach": ("mach", b"G54 P3\nG0 X9.\n", Reason.START_UNKNOWN),
+    "a shift by increments": ("fanuc-lathe-a", b"G50 U5.\nG0 X9.\n", Reason.START_UNKNOWN),
+    "the same along Z": ("fanuc-lathe-a", b"G50 W5.\nG0 Z9.\n", Reason.START_UNKNOWN),
+    "G92 in G91": ("fanuc", b"G91 G92 X5.\nG90 G0 X9.\n", Reason.START_UNKNOWN),
+    "a bare G92": ("fanuc", b"G92\nG0 X9.\n", Reason.START_UNKNOWN),
+    "a tool change ends in G90": ("fanuc", b"G91 G0 X1.\nM6\nG0 X9.\n", Reason.DISTANCE_MODE_UNKNOWN),
+    "a laser of grbl": ("grbl", b"M3 S100\nG0 X9\n", Reason.BEAM),
+    "a laser of Marlin": ("marlin", b"M3 I\nG0 X8 F6000\nG0 X9\n", Reason.BEAM),
+    "a plasma torch of Mach": ("mach", b"M3\nG0 X9.\n", Reason.BEAM),
+    "the way of a rotary axis": ("linuxcnc", b"G0 A5\n", Reason.ROTARY_WAY),
+    "beside a linear one": ("linuxcnc", b"G0 X3 A5\n", Reason.ROTARY_WAY),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NOT_CERTAIN)
+def test_what_only_looks_certain_is_left_alone(name):
+    dialect, text, reason = NOT_CERTAIN[name]
+    assert read(text, dialect)[-1] == reason
+    assert also_noticed(text, dialect)
+
+
+STILL_CERTAIN = {
+    "a common variable": ("fanuc", b"#500=5.\n#1=2.\nG0 X5.\n"),
+    "a timer": ("fanuc", b"#3001=0\nG0 X5.\n"),
+    "an offset is written, then selected": ("fanuc", b"#5221=3.\nG54\nG49\nG0 X5. Y5.\nX6.\n"),
+    "a frame is written, then selected": ("siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG54 D1\nG0 X5\nX6\n"),
+    "parameters of LinuxCNC": ("linuxcnc", b"#5221=3\nG0 X5\n"),
+    "G43 with its axis": ("fanuc", b"G43 H1 Z5.\nG0 Z9.\n"),
+    "look-ahead again": ("haas", b"G103 P1\nG103 P0\nG0 X5.\n"),
+    "F of all axes": ("siemens", b"FGROUP(X,Y)\nFGROUP()\nG0 X5 Z9\n"),
+    "LinuxCNC at M0": ("linuxcnc", b"M0\nG0 X9\n"),
+    "a lone G54": ("fanuc", b"G54\nG0 X9.\n"),
+    "G92 in G91 of LinuxCNC": ("linuxcnc", b"G91 G92 X5\nG90 G0 X9\n"),
+    "G92 E0 of a printer": ("marlin", b"G92 E0\nG0 X9\n"),
+    "behind the laser": ("grbl", b"M3 S100\nG1 X5\nM5\nG0 X9\n"),
+    "increments of a rotary axis": ("linuxcnc", b"G91 G0 A5\n"),
+    "a rotary axis that stays": ("linuxcnc", b"G0 X5 A10\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STILL_CERTAIN)
+def test_what_is_certain_is_still_rewritten(name):
+    dialect, text = STILL_CERTAIN[name]
+    assert read(text, dialect)[-1] is None
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "grbl", "mach", "siemens", "haas"])
+def test_the_machine_file_may_say_that_nobody_moves_an_axis_meanwhile(dialect):
+    text = b"M0\nM1\nG0 X9.\n"
+    assert read(text, dialect, resume="same", spindle="mill") == [None]
+    assert read(text, dialect, resume="unknown", spindle="mill") == [Reason.START_UNKNOWN]
+
+
+def test_a_rapid_that_ends_in_a_stop_is_certain_itself():
+    assert read(b"G0 X9. M0\nX8.\n", "fanuc") == [None, Reason.START_UNKNOWN]
+
+
+# Laser and plasma
+
+
+@pytest.mark.parametrize("dialect", ["grbl", "mach", "marlin"])
+def test_the_machine_file_may_say_that_m3_turns_a_spindle(dialect):
+    text = b"M3 S100\nG0 X9. F6000\n" if dialect != "marlin" else b"M3 S100\nG0 X9 F6000\n"
+    assert read(text, dialect) == [Reason.BEAM]
+    assert read(text, dialect, spindle="mill") == [None]
+    assert read(text, dialect, spindle="laser") == [Reason.BEAM]
+
+
+@pytest.mark.parametrize(
+    ("dialect", "habit"),
+    [
+        ("grbl", b"G1 X3 S200\n"),
+        ("grbl", b"G1 X3 S200\n" * 40),
+        ("grbl", b"M4\n"),
+        ("marlin", b"M3 I\n"),
+        ("mach", b"G1 X3. S200\n"),
+    ],
+)
+def test_a_program_that_behaves_like_one_for_a_laser_is_not_believed(dialect, habit):
+    text = b"M3 S100\nG0 X9.\n" + habit + b"M5\nG0 X2.\n"
+    found = read(text, dialect, spindle="mill")
+    assert found[0] == Reason.BEAM
+    assert found[-1] != Reason.BEAM
+
+
+def test_a_declared_laser_that_outputs_may_fire_keeps_all_its_rapids():
+    assert read(b"M5\nG0 X9\n", "linuxcnc", spindle="laser") == [None]
+    assert read(b"M67 E0 Q5\nM5\nG0 X9\n", "linuxcnc", spindle="laser") == [Reason.BEAM]
+    assert read(b"M3 S1\nG0 X9\n", "linuxcnc") == [None]
+
+
+# Rotary axes
+
+
+@pytest.mark.parametrize(
+    ("wrap", "stands", "word", "ends"),
+    [
+        ("none", b"10", b"5", 5.0),
+        ("sign", b"10", b"5", 365.0),
+        ("sign", b"10", b"20", 20.0),
+        ("sign", b"10", b"-5", 5.0),
+        ("sign", b"10", b"-350", -10.0),
+        ("sign", b"10", b"370", math.nan),
+        ("shortest", b"350", b"10", 10.0),  # 350 is reached backwards from 0
+        ("shortest", b"100", b"190", 190.0),
+        ("shortest", b"100", b"280", math.nan),
+        ("shortest", b"100", b"290", -70.0),
+        ("shortest", b"-100", b"200", -160.0),
+        ("shortest", b"10", b"350", -10.0),
+        ("shortest", b"10", b"100", 100.0),
+    ],
+)
+def test_a_rotary_axis_goes_the_way_that_the_machine_file_says(wrap, stands, word, ends):
+    data = b"G21 G90 G94 G17 G40\nG0 A" + stands + b"\nG0 A" + word + b"\n"
+    start = Start(positions={"A": 0.0}, wraps={"A": wrap})
+    rapids = read_program(io.BytesIO(data), start=start).rapids
+    assert same(float(rapids.target[-1, AXES.index("A")]), ends)
+    assert (rapids.reason[-1] == CERTAIN) is not math.isnan(ends)
+    found = Findings(9)
+    confirm(io.BytesIO(data), "linuxcnc", start, rapids, [1], found)
+    assert not found.violations or math.isnan(ends)
+
+
+@pytest.mark.parametrize("wrap", [None, "none", "sign", "shortest"])
+@pytest.mark.parametrize("fast", [True, False])
+def test_rotary_axes_in_runs_of_plain_lines(wrap, fast):
+    lines = b"".join(b"X%d A%d\n" % (k, k * 7 % 360) for k in range(60))
+    start = Start(positions=dict.fromkeys(AXES, 0.0), wraps={} if wrap is None else {"A": wrap})
+    rapids = read_program(io.BytesIO(b"G21 G90 G94 G17 G40 G0\n" + lines), start=start, fast=fast)
+    reasons = [REASONS[r] for r in rapids.rapids.reason.tolist() if r != CERTAIN]
+    assert (Reason.ROTARY_WAY in reasons) is (wrap is None)
+    if wrap == "sign":
+        assert rapids.rapids.target[-1, 3] == 59 * 7  # forwards all the time
+
+
+# Mills and lathes
+
+
+@pytest.mark.parametrize("dialect", [d for d in DIALECTS if DIALECTS[d].lathe == "no"])
+def test_a_dialect_of_mills_is_refused_on_a_lathe(dialect):
+    with pytest.raises(ProgramError, match="it is a lathe"):
+        read(b"", dialect, head=b"G90\n", diameter=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"O1 (FANUC TURN POST)\nG90 X40. Z-20.\nX35.\n",
+        b"O1 (FANUC)\nT0101\nG0 X40. Z2.\n",
+        b"O1 (FANUC)\nG50 S2000\nG0 X40. Z2.\n",
+        b"O1 (FANUC)\nG96 S200\nG0 X40. Z2.\n",
+        b"O1 (FANUC)\nG71 P10 Q20 R1.\n",
+        b"O1 (FANUC)\nG76 P010060 Q100 R0.05\n",
+        b"(HAAS ST-20)\nG0 T0202\nG50 S1000\n",
+    ],
+)
+def test_auto_takes_no_program_of_a_lathe_for_one_of_a_mill(text):
+    with pytest.raises(ProgramError, match="lathe"):
+        read_program(io.BytesIO(text), dialect="auto")
+
+
+def test_auto_takes_no_mill_on_a_machine_that_is_a_lathe():
+    with pytest.raises(ProgramError, match="lathe"):
+        read_program(io.BytesIO(b"(FANUC)\nG0 X1.\n"), dialect="auto", start=Start(diameter=True))
+
+
+def test_increments_u_and_w_are_those_of_system_a():
+    program = read_program(io.BytesIO(b"O1 (FANUC)\nG0 X40. Z2.\nU-2. W1.\n"), dialect="auto")
+    assert program.dialect == "fanuc-lathe-a"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"O1\nM62\nG0 X100\n", b"O1\nM66 (CHUCK)\nG0 X100\n", b"O1\nG38.2 Z-5. F50.\n",
+        b"O1\nG50 S2000\n", b"O1\nM97 P10\n", b"O1\nG103 P1\n", b"O1\nG54.1 P2\n",
+    ],
+)  # fmt: skip
+def test_codes_that_many_builders_use_are_no_evidence(text):
+    with pytest.raises(ProgramError):
+        read_program(io.BytesIO(text), dialect="auto")
+
+
+# F that the program itself reads
+
+
+@pytest.mark.parametrize(
+    ("dialect", "reads"),
+    [
+        ("linuxcnc", b"#1=#<_feed>\n"),
+        ("linuxcnc", b"#1=[#< _FEED >*2]\n"),
+        ("linuxcnc", b"M70\n"),
+        ("linuxcnc", b"M72\n"),
+        ("linuxcnc", b"#1=##2\n"),
+        ("fanuc", b"#1=#4109\n"),
+        ("fanuc", b"G1 X5. F[#4109*2]\n"),
+        ("haas", b"IF [#4109 GT 5] GOTO 10\n"),
+    ],
+)
+def test_f_that_the_program_reads_is_restored(dialect, reads):
+    def needed(text):
+        data = HEADS[dialect] + b"G0 X9.\n" + text + b"G1 X3. F7.\n"
+        return bool(read_program(io.BytesIO(data), dialect=dialect).rapids.feed_needed[-1])
+
+    assert needed(reads)
+    assert not needed(b"#1=#2\n")
+
+
+# What holds in one branch only
+
+
+def test_a_feed_that_may_have_been_written_either_way_is_not_known():
+    text = b"F200.\n/M98 P2\nG0 X9.\nG1 X5.\nM30\nO2\nF200\nM99\n"
+    found = read(text, "fanuc", decimal_point="calculator")
+    assert found[0] == Reason.FEED_UNKNOWN
+
+
+def test_a_tolerance_that_holds_in_one_branch_only_makes_the_path_unknown():
+    data = HEADS["linuxcnc"] + b"G64 P0.02\n/G64 P0.05\nG0 X9\n"
+    assert read_program(io.BytesIO(data)).rapids.path[-1] == 0
+
+
+def _different(field, k):
+    """A value of a field that another k does not give."""
+    return {
+        "mode": k + 1, "number": k + 0.5, "axes": [k + 0.25] * len(AXES), "once": bool(k),
+        "named": {"rotation": bool(k)}, "table": {k: [1.0]}, "constant": None,
+    }[field.kind]  # fmt: skip
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.name)
+def test_every_field_of_the_state_is_joined_forgotten_and_compared(field):
+    a, b = State(), State()
+    if field.kind == "constant":
+        assert field.name in ("ended", "touched", "fixed", "wraps")
+        return
+    for k, state in enumerate((a, b)):
+        value = _different(field, k)
+        if field.name == "cycle":
+            value = (810 + 10 * k, 1.0, 2.0)
+        elif field.name == "variables":
+            value = {"1": 1.0 + k}
+        if field.kind != "once":
+            state.turns = state.rotates = True
+        setattr(state, field.name, value)
+    assert not agree(a, b)
+    assert agree(a, a.copy())
+    assert a.copy() is not a
+    joined = getattr(join(a, b), field.name)
+    forgotten = a.copy()
+    forgotten.forget()
+    gone = getattr(forgotten, field.name)
+    if field.kind == "once":
+        assert joined is True
+    elif field.kind == "named":
+        assert joined == {"rotation": None} == gone
+    elif field.kind == "table":
+        assert joined == {} == gone
+    elif field.kind == "axes":
+        assert all(map(math.isnan, joined))
+        assert all(map(math.isnan, gone))
+    else:
+        assert joined is None or math.isnan(joined)
+        assert gone is None or math.isnan(gone)
+    for word in {other.together for other in FIELDS if other.name == field.name} - {""}:
+        for other in FIELDS:
+            if other.together == word:
+                value = getattr(join(a, b), other.name)
+                assert value is None or math.isnan(value)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_field_of_the_second_reading_is_joined(name):
+    made = [Known(DIALECTS["linuxcnc"], Facts()) for _ in range(2)]
+    assert set(vars(made[0])) == set(KINDS)
+    values = {
+        "modes": [{"motion": 0}, {"motion": 10}], "frames": [{"r": True}, {"r": False}],
+        "axes": [[1.0] * len(AXES), [2.0] * len(AXES)], "table": [{1: 2.0}, {1: 3.0}],
+        "number": [1.0, 2.0], "tolerance": [1.0, 2.0], "ever": [False, True], "mode": [1, 2],
+    }  # fmt: skip
+    kind = KINDS[name]
+    if kind in ("given", "place"):
+        return
+    for known, value in zip(made, values[kind], strict=True):
+        setattr(known, name, value)
+        known.path = value if name == "path" else 64
+    made[0].join(made[1])
+    joined = getattr(made[0], name)
+    if kind == "tolerance":
+        assert made[0].path is None
+    elif kind in ("modes", "frames"):
+        assert set(joined.values()) == {None}
+    elif kind == "axes":
+        assert all(map(math.isnan, joined))
+    elif kind == "table":
+        assert joined == {}
+    elif kind == "ever":
+        assert joined is True
+    else:
+        assert joined is None or math.isnan(joined)
+
+
+# Right programs that were refused
+
+
+def test_klippers_bare_g92_makes_every_position_zero():
+    data = HEADS["klipper"] + b"G0 X5\nG92\nG0 X5\nG1 Z3\n"
+    rapids = read_program(io.BytesIO(data), dialect="klipper").rapids
+    assert (rapids.reason[-1], rapids.start[-1, 0], rapids.target[-1, 0]) == (CERTAIN, 0.0, 5.0)
+
+
+def test_a_tool_with_a_name_is_a_tool_change():
+    found = read(b'T="DRILL 8.5" M6\nG0 X1 Y1 Z1\nX5\n', "siemens")
+    assert found[-1] is None
+
+
+@pytest.mark.parametrize("text", [b"G0 X=9\n", b"G0 X = 9\n", b"G0 X=+9\n", b"G0 X=-9 Y=AC(3)\n"])
+def test_siemens_values_behind_an_equals_sign(text):
+    assert read(text, "siemens")[-1] in (None, Reason.OTHER_WORDS)
+
+
+def test_text_behind_the_end_of_a_block_is_a_comment():
+    assert read(b"G0 X9. ; to the corner\nX8. ; T1 is a 10MM MILL\n", "fanuc") == [None, None]
+    assert read(b"G0 X9. ; X5.\n", "fanuc") == [Reason.NOT_UNDERSTOOD]
+
+
+def test_line_ends_cr_cr_lf():
+    data = HEADS["linuxcnc"].replace(b"\n", b"\r\r\n") + b"G0 X9\r\r\nX8\r\r\n"
+    rapids = read_program(io.BytesIO(data)).rapids
+    assert (rapids.reason[1:] == CERTAIN).all()
+    assert data[rapids.begin[1] : rapids.end[1]].strip() == b"G0 X9"
+
+
+def test_a_byte_order_mark_belongs_to_no_line():
+    data = b"\xef\xbb\xbf" + HEADS["linuxcnc"] + b"G0 X9\n"
+    program = read_program(io.BytesIO(data))
+    assert program.findings == (program.findings[-1],)
+    assert program.size == len(data)
+    assert program.insert_at == 3
+    assert program.rapids.reason[-1] == CERTAIN
+    assert data[program.rapids.begin[-1] : program.rapids.end[-1]] == b"G0 X9"
+
+
+def test_a_code_that_is_not_known_is_named():
+    (finding, *_) = read_program(io.BytesIO(b"G21 G90\nG187 P1\nG0 X1\nM2\n")).findings
+    assert "G187" in finding.message
+    assert "linuxcnc" in finding.message
+
+
+def test_a_control_character_is_named():
+    program = b"G21 G90\nG0 X1\x01\n"
+    with pytest.raises(ProgramError, match="0x01"):
+        read_program(io.BytesIO(program))
+
+
+def test_klartext_is_refused_whatever_dialect_is_stated():
+    klartext = b"0 BEGIN PGM PART MM\n1 TOOL CALL 1 Z S2000\n2 L X+10 FMAX\n3 END PGM PART MM\n"
+    with pytest.raises(ProgramError, match="Klartext"):
+        read_program(io.BytesIO(klartext), dialect="heidenhain-iso")
+
+
+def test_every_reader_begins_in_a_state_without_a_unit():
+    for name, dialect in DIALECTS.items():
+        fixed = "units" in dialect.defaults
+        assert (Reader("p", dialect, Start()).state.unit is not None) is fixed, name
