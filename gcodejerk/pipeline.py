@@ -28,10 +28,11 @@ from gcodejerk.expanded import (
 )
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.motion.laws import Array
-from gcodejerk.nc import Program, find_dialect, read_program
+from gcodejerk.nc import Program, Rapids, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
 from gcodejerk.start import program_start
 from gcodejerk.stream import Residuals, make_streams
@@ -263,6 +264,8 @@ def _process(
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
         )
+    if emitter.in_place:
+        program = replace(program, rapids=_writable(program.rapids))
     plans = plan_rapids(
         program.rapids,
         machine,
@@ -326,6 +329,17 @@ def _process(
         expansion=expansion,
         notes=(*notes, *emitter.notes(program.rapids, plans)),
     )
+
+
+def _writable(rapids: Rapids) -> Rapids:
+    """Leave alone what points in the program would not lead where the rapid goes.
+
+    An axis that counts its turns reads each point as it reads the rapid's own word: one rounded
+    back behind the point before it would send the axis all the way round.
+    """
+    reason = rapids.reason.copy()
+    reason[(reason == CERTAIN) & (rapids.turned != 0)] = REASONS.index(Reason.ROTARY_WAY)
+    return replace(rapids, reason=reason)
 
 
 def _judged(

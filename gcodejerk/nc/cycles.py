@@ -40,7 +40,8 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     bool
         Whether the block is complete; False where the controller would refuse it.
     """
-    if state.plane is None or code in rules.unknown_ends:
+    elsewhere = state.plane != 170 and code in rules.only_in_xy
+    if state.plane is None or elsewhere or code in rules.unknown_ends:
         state.forget_positions()
         state.put("cycle", (code, NAN, NAN))
         state.put("cycle_level", NAN)

@@ -119,6 +119,8 @@ class Drilling:
     codes: frozenset[int] = frozenset()
     unknown_ends: frozenset[int] = frozenset()
     """Those of which it is not known where they leave the tool."""
+    only_in_xy: frozenset[int] = frozenset()
+    """Those of which it is known in G17 alone."""
     own_group: bool = False
     """They do not replace G0 or G1, which are in force again after G80."""
     repeats: str = "L"

@@ -120,12 +120,20 @@ def _arc(draw: Draw) -> list[list[str]]:
 def _cycle(draw: Draw) -> list[list[str]]:
     """Draw a drilling cycle with its holes."""
     bottom = draw(st.integers(-30, -1))
-    code = draw(st.sampled_from(["G81", "G82", "G83", "G73", "G85", "G89"]))
+    code = draw(st.sampled_from(["G81", "G82", "G83", "G73", "G85", "G89", "G84", "G88"]))
     extra = {"G82": "P0.1", "G89": "P0.1", "G83": "Q2", "G73": "Q2"}.get(code)
-    first = [draw(st.sampled_from(["G98", "G99"])), code, *_axes(draw, "XY"), f"Z{bottom}", "R2"]
-    holes = [_axes(draw, "XY") for _ in range(draw(st.integers(0, 4)))]
+    extra = {"G84": "P0.1", "G88": "P0.1"}.get(code, extra)
+    plane, across, along = draw(
+        st.sampled_from(
+            [("G17", "XY", "Z"), ("G17", "XY", "Z"), ("G18", "XZ", "Y"), ("G19", "YZ", "X")]
+        )
+    )
+    back = draw(st.sampled_from(["G98", "G99"]))
+    first = [back, code, *_axes(draw, across), f"{along}{bottom}", "R2"]
+    holes = [_axes(draw, across) for _ in range(draw(st.integers(0, 4)))]
     return [
-        ["G17", "G90", "G0", "Z" + str(draw(st.integers(-40, 40)))],
+        ["S100", "M3"],
+        [plane, "G90", "G0", along + str(draw(st.integers(-40, 40)))],
         [*first, *([extra] if extra else []), "F100"],
         *holes,
         *([["G80"]] if draw(st.booleans()) else []),
@@ -142,7 +150,8 @@ def _mode(draw: Draw) -> list[list[str]]:
                 ["G64", "P0.05"], ["G64"], ["G92", "X0"], ["G92.1"], ["G43.1", "Z5"], ["G49"],
                 ["G7"], ["G8"], ["M3", "S1000"], ["M5"], ["M8"], ["T1", "M6"], ["G4", "P0.01"],
                 ["G28"], ["G90", "G53", "G0", "Z0"], ["G28", "Z5"], ["G52", "X1"], ["#1=5"],
-                ["G10", "L20", "P1", "X0"], ["F120"],
+                ["G10", "L20", "P1", "X0"], ["F120"], ["M0"], ["M1"], ["M70"], ["M72"], ["#5221=5"],
+                ["#1=#<_feed>"], ["G91", "G92", "X1"], ["G20", "G1", "X1", "F9"], ["M4"],
             ]
         )
     )  # fmt: skip

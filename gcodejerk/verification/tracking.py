@@ -501,7 +501,8 @@ class Tracker(Known):
         """Where a block of a drilling cycle ends, if it is one that is followed."""
         values, drilling = block.values, self.dialect.drilling
         plane = self.g.get("plane")
-        if self.g.get("motion") == 800 or plane is None or code == 760:
+        unsure = code in drilling.unknown_ends or (plane != 170 and code in drilling.only_in_xy)
+        if self.g.get("motion") == 800 or plane is None or unsure:
             self.lose()
             self.cycle = code
             self.level = self.r = NAN

@@ -32,6 +32,9 @@ def start_of(dialect, known=True):
         tool_lengths={1: 12.5},
         decimal_point="calculator",
         diameter="lathe" in dialect,
+        startup="G71" if dialect == "siemens" else "",
+        wraps={"A": "none", "B": "shortest", "C": "sign"} if known else {},
+        spindle="mill" if known else None,
     )
 
 

@@ -328,9 +328,7 @@ def test_offsets_make_g53_known():
 
 
 def test_linear_and_rotary_axes_together_need_a_known_feed():
-    start = Start(
-        positions=dict.fromkeys(AXES, 0.0), startup="G21 G90 G94", wraps={"B": "none"}
-    )
+    start = Start(positions=dict.fromkeys(AXES, 0.0), startup="G21 G90 G94", wraps={"B": "none"})
     assert reasons(b"G0 X5. B90.\n", "fanuc", start) == ["linear and rotary axes move together"]
     assert reasons(b"G0 X5. B90.\n", "linuxcnc", start) == [None]
     assert reasons(b"G0 B90.\n", "fanuc", start) == [None]

@@ -18,7 +18,10 @@ def expanded(program, start=None, comments=False):
     """The result as lines behind HEAD, and what was found."""
     target = io.BytesIO()
     found = expand(
-        io.BytesIO(program), target, start=Start(startup="G21") if start is None else start, comments=comments
+        io.BytesIO(program),
+        target,
+        start=Start(startup="G21") if start is None else start,
+        comments=comments,
     )
     text = target.getvalue()
     return text.removeprefix(HEAD).decode().splitlines(), found

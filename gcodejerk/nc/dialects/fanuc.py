@@ -129,7 +129,7 @@ FANUC = Dialect(
     packed_repeats=True,
     other_m="positions",
     drilling=Drilling(
-        CYCLES, frozenset({760, 870}), own_group=True, repeats="KL", missing="unknown"
+        CYCLES, frozenset({760, 870, 880}), own_group=True, repeats="KL", missing="unknown"
     ),
     # Custom macro B: AND binds like *, OR and XOR like +. Local #1 to #33, common #100 to #999.
     arithmetic=Arithmetic(

@@ -128,7 +128,16 @@ LINUXCNC = Dialect(
     feed_before_units=True,
     incremental_set=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),
-    drilling=Drilling(CYCLES, frozenset({760}), own_group=False, repeats="L", missing="error"),
+    # G88 leaves the tool at the bottom, for the operator to retract; G74 and G84 go to swapped
+    # coordinates in G18 and G19 (2.9; tests/clients/test_interpreter_cycles.py).
+    drilling=Drilling(
+        CYCLES,
+        frozenset({760, 880}),
+        only_in_xy=frozenset({740, 840}),
+        own_group=False,
+        repeats="L",
+        missing="error",
+    ),
     # "Expressions" and "Binary operators" of the manual; measured where it is silent: AND and OR
     # bind alike, MOD is never negative, EQ and NE allow 0.0001.
     arithmetic=Arithmetic(

@@ -87,7 +87,9 @@ MACH = Dialect(
     },
     redrawn=frozenset({310, 320, 330, 760}),
     other_m="positions",
-    drilling=Drilling(CYCLES, frozenset({870}), own_group=False, repeats="L", missing="unknown"),
+    drilling=Drilling(
+        CYCLES, frozenset({870, 880}), own_group=False, repeats="L", missing="unknown"
+    ),
     # NIST RS274/NGC, which has no comparisons.
     arithmetic=Arithmetic(
         levels=(("**",), ("*", "/", "MOD"), ("+", "-", "AND", "OR", "XOR")),
