@@ -9,28 +9,31 @@ out, and whatever they touched is unknown afterwards.
 
 from __future__ import annotations
 
-import math
-
 from gcodejerk.nc import frames
 from gcodejerk.nc.beams import inline_power, shows_habits, uses_outputs
 from gcodejerk.nc.block import Block, Name
 from gcodejerk.nc.codes import Codes, sort_words
 from gcodejerk.nc.cycles import begin_cycle, run_cycle
-from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Dialect, Effect
+from gcodejerk.nc.dialect import AXES, Dialect, Effect
 from gcodejerk.nc.judge import Call, Step, judge, looks_rapid
 from gcodejerk.nc.jumps import known_behind
+from gcodejerk.nc.mcodes import run_m_code
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
+from gcodejerk.nc.moves import (
+    go_straight,
+    go_to_machine_position,
+    go_to_stored_point,
+    plane_axes,
+)
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.rules import arc_words, is_complete, takes_axes
 from gcodejerk.nc.start import Start
 from gcodejerk.nc.tokenizer import CHECKSUM
-from gcodejerk.nc.variables import assign, assigned_values, forget_shared, reads_feed
+from gcodejerk.nc.variables import assign, assigned_values, reads_feed
 from gcodejerk.units import MM_PER_INCH
 
 _TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
 """Effects beside which the axis words of the block are no straight move."""
-_CALLS = frozenset({47, 96, 97, 98, 198})
-"""M codes that go on elsewhere, or may."""
 _ENDS = frozenset({2, 17, 30, 99})
 _STOPS = frozenset({0, 1, 60})
 _CALL_WORDS = frozenset("MNPL")
@@ -160,7 +163,8 @@ class Executor:
             if values["F"] == values["F"]:
                 step.feed_event = GIVES_FEED
         for m in codes.m:
-            self._miscellaneous(m, step)
+            if run_m_code(state, m, dialect, step):
+                self._leave(step)
         if dialect.length_word in values and "tool length" not in g:
             frames.tool_length(state, 0, values, {}, dialect)
         if not dialect.tool_frame.isdisjoint(values):
@@ -329,45 +333,6 @@ class Executor:
         state.put("transforms", {**state.transforms, "modal macro": begins})
         state.forget_positions()
 
-    def _miscellaneous(self, m: int, step: Step) -> None:
-        """Execute an M code, the end of the program excepted."""
-        state = self.state
-        group = self.dialect.m_groups.get(m)
-        if m in (3, 4, 5) and group == "spindle":
-            state.put("spindle", m)
-        if group is None or m == 6 or group == "user":
-            # A tool change may go anywhere, and so may a program of the user's.
-            state.forget_positions()
-            forget_shared(state, self.dialect.arithmetic)
-            if self.dialect.other_m == "positions":
-                self._behind_macro()
-        elif m in (70, 72) and group == "state":
-            self._saved(m, step)
-        elif m == 73 and group == "state":
-            state.put("restores", True)
-        elif m in _CALLS and step.call is None:
-            self._leave(step)
-
-    def _saved(self, m: int, step: Step) -> None:
-        """M70 keeps F and the modes, M72 gives them back."""
-        step.feed_event = USES_FEED
-        if m == 72:
-            self.state.forget_modes()
-            self.state.forget_positions()
-
-    def _behind_macro(self) -> None:
-        """Forget what a builder's macro is known to leave changed.
-
-        It retracts with G91 G28 and ends in G90, and it cancels the tool length. Were it to leave
-        G91, G1 or another work system behind, no program would run on such a machine.
-        """
-        state = self.state
-        state.lose("tool")
-        if state.cycle is not None:
-            state.lose("cycle")
-        if state.distance == 910 and "distance" not in state.fixed:
-            state.put("distance", None)
-
     def _leave(self, step: Step) -> None:
         """Run a program that is not followed."""
         self.state.forget()
@@ -389,7 +354,8 @@ class Executor:
         if not dialect.strict and "motion" in g:
             self._select_motion(g["motion"])
         if effect == "return":
-            self._return(codes, step)
+            step.rapid = True
+            go_to_stored_point(state, codes, dialect)
             return
         if effect == "set":
             frames.set_names(state, codes, dialect)
@@ -427,14 +393,14 @@ class Executor:
             return
         step.rapid = motion == dialect.rapid
         if effect == "machine":
-            self._machine_move(values)
+            go_to_machine_position(state, values)
         elif motion in dialect.redrawn or motion is None:
-            state.forget_positions(self._plane_axes())
+            state.forget_positions(plane_axes(state))
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         else:
-            self._straight(codes, step)
+            go_straight(state, codes, step)
         if state.compensation != 400:
-            state.forget_positions(self._plane_axes())
+            state.forget_positions(plane_axes(state))
         if any(on is not False for on in state.transforms.values()):
             state.forget_positions()
 
@@ -455,100 +421,6 @@ class Executor:
             return code
         state.put("cycle", None)
         return None
-
-    def _straight(self, codes: Codes, step: Step) -> None:
-        """Go to where the axis words say."""
-        state, values = self.state, codes.values
-        for axis, letter in enumerate(AXES):
-            if letter in codes.increments:
-                by = codes.increments[letter] * state.scale(axis)
-                state.move(axis, state.position[axis] + by)
-            elif letter in values:
-                value = values[letter] * state.scale(axis)
-                function = codes.functions.get(letter)
-                if function == "IC" or (function is None and state.distance == 910):
-                    value = state.position[axis] + value
-                elif function in (None, "AC") and (function or state.distance is not None):
-                    if letter not in LINEAR:
-                        value = self._turn(axis, value, step)
-                else:
-                    value = NAN  # the shortest way, or this way round: the machine decides
-                state.move(axis, value)
-
-    def _turn(self, axis: int, angle: float, step: Step) -> float:
-        """Where a rotary axis stands behind an absolute word."""
-        stands = self.state.position[axis]
-        wrap = self.state.wraps[axis]
-        step.way_unknown |= wrap is None and stands != angle
-        if wrap in (None, "none"):
-            return angle
-        end = way_round(stands, angle, wrap)
-        step.way_unknown |= end != end
-        if end != stands and (wrap == "sign" or not 0.0 <= stands < 360.0 or end != angle):
-            step.turned |= 1 << axis
-        return end
-
-    def _machine_move(self, values: dict[str, float]) -> None:
-        """G53: the axis words are machine coordinates."""
-        state = self.state
-        for axis, letter in enumerate(AXES):
-            if letter in values:
-                at = values[letter] * state.scale(axis) - state.shift(axis)
-                counts = letter not in LINEAR and state.wraps[axis] in ("shortest", "sign")
-                state.move(axis, NAN if counts or state.distance == 910 else at)
-
-    def _return(self, codes: Codes, step: Step) -> None:
-        """G28 and G30: to a stored point that the program does not tell."""
-        step.rapid = True
-        if self.dialect.tool_cancelled_by_return:
-            self.state.lose("tool")
-            self.state.forget_positions()
-        named = [AXES.index(axis) for axis in codes.moved()]
-        self.state.forget_positions(named or range(len(AXES)))
-        if self.state.transformed:
-            self.state.forget_positions()
-
-    def _plane_axes(self) -> list[int]:
-        """List the axes that cutter compensation may displace."""
-        plane = self.state.plane
-        # Heidenhain's G20 is a plane that nothing here knows.
-        letters = PLANES[plane][:2] if plane in PLANES else "XYZUVW"
-        return [AXES.index(letter) for letter in letters]
-
-
-def way_round(stands: float, angle: float, wrap: str) -> float:
-    """Where a rotary axis ends that counts turns, behind an absolute word.
-
-    Parameters
-    ----------
-    stands : float
-        Where it stands. [deg]
-    angle : float
-        What the word says. [deg]
-    wrap : str
-        ``shortest``, or ``sign``: LinuxCNC's WRAPPED_ROTARY, which goes forwards to a positive
-        number and backwards to a negative one (interp_convert.cc, unwrap_rotary).
-
-    Returns
-    -------
-    float
-        NaN where half a turn has no shorter way round, or the number is not an angle. [deg]
-    """
-    if stands != stands:
-        # Somewhere on this angle; how many turns have been counted, nobody knows.
-        return angle if wrap == "shortest" else NAN
-    if wrap == "shortest":
-        way = (angle - stands + 180.0) % 360.0 - 180.0
-        if abs(abs(way) - 180.0) < 1e-6:
-            return NAN
-        return angle if abs(stands + way - angle) < 1e-9 else stands + way
-    if abs(angle) >= 360.0:
-        return NAN
-    backwards = math.copysign(1.0, angle) < 0.0
-    end = abs(angle) + math.floor(stands / 360.0) * 360.0
-    if backwards and end > stands:
-        return end - 360.0
-    return end + 360.0 if not backwards and end < stands else end
 
 
 def _call(codes: Codes, dialect: Dialect) -> Call | None:

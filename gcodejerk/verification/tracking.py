@@ -15,7 +15,7 @@ from typing import Any
 from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
-from gcodejerk.verification.known import Known
+from gcodejerk.verification.coding import QUIET, Codes
 from gcodejerk.verification.reading import NAN, Line, Run
 from gcodejerk.verification.sorting import Sorted
 
@@ -27,12 +27,8 @@ _FRAMES: frozenset[Effect] = frozenset(
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
-_QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
-_CALLS = (47, 96, 97, 98, 198)
 _STOPS = (0, 1, 60)
-_OUTPUTS = (*range(62, 69), *range(100, 200))
-_ENDS = (2, 17, 30, 99)
 
 
 @dataclass(slots=True)
@@ -51,7 +47,7 @@ class Sighting:
     """In force behind it."""
 
 
-class Tracker(Known):
+class Tracker(Codes):
     """Follows lines."""
 
     @property
@@ -143,21 +139,16 @@ class Tracker(Known):
             self.doubt = True
         # `do` is closed by `while`: told apart by nobody here, so what follows stays in doubt.
         self.doubt = self.doubt or keyword == "DO" or self.depth < 0
-        self._unknown_call()
-
-    def _unknown_call(self) -> None:
-        self.forget()
-        if self.dialect.diameter_codes:
-            self.diameter = None
+        self.unknown_call()
 
     def _execute(self, line: Line) -> Sighting:
         """Execute words, the modal ones in front of the motion."""
         dialect = self.dialect
         if line.understood and line.effects and _WRITES.issuperset(line.effects):
             for effect in line.effects:
-                self._write(effect, line)
+                self.write(effect, line)
             return Sighting()
-        if not line.understood or any(effect not in _QUIET for effect in line.effects):
+        if not line.understood or any(effect not in QUIET for effect in line.effects):
             return self._lost(line)
         if self.contour is not None:
             self._in_contour(line)
@@ -168,7 +159,7 @@ class Tracker(Known):
         if not dialect.modal_motion:
             self.g["motion"] = None
         for effect in line.effects:
-            self._turning(effect)
+            self.turning(effect)
         seen = self._run_block(block)
         if line.effects and seen.sure:
             seen.sure = False
@@ -184,24 +175,11 @@ class Tracker(Known):
         self.forget()
         return Sighting()
 
-    def _write(self, effect: Effect, line: Line) -> None:
-        """A line that only writes data, or says which axes F is for."""
-        if any(letter != "N" for letter, _, _ in line.words):
-            self.forget()
-        if effect == "written":
-            self.written()
-        else:
-            self.bars["feed group"] = line.group
-
     def _in_contour(self, line: Line) -> None:
         self.lose()
         self.g["motion"], self.feed = None, NAN
         if any(letter == "N" and number == self.contour for letter, number, _ in line.words):
             self.contour = None
-
-    def _turning(self, effect: Effect) -> None:
-        self.turns = True
-        self.diameter = None if effect == "either" else effect == "diameter"
 
     def _run_block(self, block: Sorted) -> Sighting:
         dialect, g, values = self.dialect, block.g, block.values
@@ -217,7 +195,7 @@ class Tracker(Known):
         taken = "words" in kinds or (dialect.one_command and not g)
         if "F" in values and not taken:
             self.feed, self.feed_whole = values["F"], self._matters(block.feed_whole)
-        ends = self._machine_codes(block)
+        ends = self.machine_codes(block)
         if dialect.length_word in values and "tool length" not in g:
             self.lengthen(0, NAN, block.axes)
         if not dialect.tool_frame.isdisjoint(values):
@@ -225,9 +203,9 @@ class Tracker(Known):
             self.lose()
             self.end_bar("tool data")
             against = against or "it changes the tool's offset"
-        self._modes(g, values)
+        self.modes(g, values)
         for code, effect in effects.items():
-            self._effect(effect, code, values)
+            self.effect(effect, code, values)
         motion = g.get("motion")
         seen = Sighting(against=against, axes=block.axes)
         if kinds & _MOVES or (dialect.one_command and not g and not block.m):
@@ -244,7 +222,10 @@ class Tracker(Known):
             seen.against = seen.against or "it names no axis"
         seen.end = list(self.at)
         seen.modes = self._in_force()
-        self._beam(block, seen, burnt)
+        burns = self.beam(block, burnt)
+        seen.sure = seen.sure and burns is False
+        if burns:
+            seen.against = seen.against or "a beam may be on"
         stays = self.facts.resume == "same"
         if not stays and not (self.facts.resume is None and dialect.same_after_stop):
             stops = [m for m in block.m if m in _STOPS and dialect.m_groups.get(m) == "stop"]
@@ -253,23 +234,6 @@ class Tracker(Known):
             self.forget()
             self.ended = self.depth == 0  # in a branch it may not run
         return seen
-
-    def _beam(self, block: Sorted, seen: Sighting, burnt: bool) -> None:
-        """Whether G1 would burn where G0 does not."""
-        feeds = block.axes and self.g.get("motion") != self.dialect.rapid
-        on = burnt or self.spindle != 5
-        self.habits = (
-            self.habits
-            or bool(feeds and "S" in block.values and self.spindle != 5)
-            or not self.dialect.beam_codes.isdisjoint(block.m)
-            or ("I" in block.values and (3 in block.m or 4 in block.m))
-        )
-        if self.dark and any(m in _OUTPUTS for m in block.m):
-            self.bars["outputs"] = True
-        if self.dark and on:
-            seen.sure = False
-            if not self.depth and not self.doubt and self.spindle in (3, 4):
-                seen.against = seen.against or "a beam may be on"
 
     def _in_force(self) -> dict[str, Any]:
         distance = self.g.get("distance")
@@ -294,102 +258,6 @@ class Tracker(Known):
         if kinds & _FRAMES:
             return "a coordinate frame changes in it"
         return None
-
-    def _machine_codes(self, block: Sorted) -> bool:
-        """Execute M codes; whether the program ends behind the block."""
-        ends = False
-        for m in block.m:
-            group = self.dialect.m_groups.get(m)
-            if group == "spindle" and m in (3, 4, 5):
-                self.spindle = m
-            if group == "stop" and m in _ENDS:
-                ends = True
-            elif m in _CALLS and group is not None:
-                self._unknown_call()
-            elif group is None and self.dialect.other_m == "unknown":
-                self.forget()
-            elif group in (None, "tool", "user"):
-                self.lose()
-                if self.dialect.other_m == "positions":
-                    self.tool = [NAN] * len(AXES)
-                    if self.cycle is not None:
-                        self.g["motion"], self.cycle = None, None
-                    if self.g.get("distance") == 910 and "distance" not in self.fixed:
-                        self.g["distance"] = None
-            elif group == "state":
-                self.forget()
-        return ends
-
-    def _modes(self, g: dict[str, int], values: dict[str, float]) -> None:
-        dialect = self.dialect
-        if "distance" in g and self.g.get("distance") != g["distance"]:
-            self.level = self.r = NAN
-        for group, code in g.items():
-            if group not in ("motion", "non-modal", "cycle"):
-                self.g[group] = code
-            if code in dialect.transforms:
-                name, on = dialect.transforms[code]
-                if on or self.frames.get(name, False) is not False:
-                    self.lose()
-                self.frames[name] = on
-            if code in dialect.bars:
-                name, begins = dialect.bars[code]
-                p = values.get("P", 0.0)
-                on_p = None if p != p else p != 0.0
-                self.bars[name] = on_p if begins == "P" else bool(begins)
-        if "units" in g:
-            unit = INCH if dialect.units[g["units"]] else 1.0
-            if unit != self.unit:
-                self.p = self.q = self.level = self.r = NAN
-            if g["units"] not in dialect.lengths_only:
-                sure = unit == 1.0 or not dialect.feed_before_units
-                if unit != self.feed_unit and not (
-                    self.feed_unit is None and "F" in values and sure
-                ):
-                    self.feed = NAN
-                self.feed_unit = unit
-            self.unit = unit
-        if "path" in g:
-            self.path = dialect.paths.get(g["path"])
-            self.p = values.get("P", NAN) if g["path"] == 640 else NAN
-            self.q = values.get("Q", NAN) if g["path"] == 640 else NAN
-
-    def _effect(self, effect: Effect, code: int, values: dict[str, float]) -> None:
-        """What a code does besides, before anything moves."""
-        if effect in _QUIET:
-            self._turning(effect)
-        elif effect == "length":
-            self.lengthen(code, values.get("H", NAN), _axes(values))
-        elif effect in ("system", "numbered system"):
-            number = values.get("P", NAN) if effect == "numbered system" else 0.0
-            if "P" in values and code in self.dialect.p_selects:
-                number = NAN
-            self.select(code if effect == "system" else 541, number)
-        elif effect == "frames":
-            self.lose_offsets()
-            self.lose()
-        elif effect in ("transform", "modal cycle"):
-            self.frames["a frame"] = True
-            self.lose()
-        elif effect == "cycle":
-            self.lose()
-            self.g["motion"], self.feed = None, NAN
-        elif effect == "home":
-            self.lose()
-        elif effect == "data":
-            self._data(values)
-        elif effect == "flow":
-            self._unknown_call()
-
-    def _data(self, values: dict[str, float]) -> None:
-        """G10: offsets (L2, L20), tool data (L1, L3, L10 to L13), or parameters."""
-        kind = values.get("L")
-        self.written()
-        if kind in (2.0, 20.0):
-            self.end_bar("tool data")
-        elif kind is not None and kind not in (1.0, 3.0, 10.0, 11.0, 12.0, 13.0):
-            self.forget()
-            self.bars["parameters"] = True
 
     def _motion(self, code: int) -> None:
         self.g["motion"] = code
@@ -530,8 +398,3 @@ class Tracker(Known):
         self.at[k] = self.r if retract == 990 else top if retract == 980 else NAN
         if self.turned() or self.g.get("compensation") != 400:
             self.lose()
-
-
-def _axes(values: dict[str, float]) -> int:
-    """Bit k: a word for AXES[k]."""
-    return sum(1 << k for k, axis in enumerate(AXES) if axis in values)

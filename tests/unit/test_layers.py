@@ -43,7 +43,7 @@ NEVER = {
     "emit": {"verification", "report"},
 }
 """What the picture alone would allow, or what matters enough to be said twice."""
-SECOND_READER = ("reading", "sorting", "known", "tracking")
+SECOND_READER = ("reading", "sorting", "known", "coding", "tracking")
 """Modules of `verification` that read programs without the help of `nc`, but for its tables."""
 FOREIGN = {
     "yaml": {"machine"},

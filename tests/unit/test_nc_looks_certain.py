@@ -14,6 +14,7 @@ from gcodejerk.verification.agreement import confirm
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.known import KINDS, Facts, Known
 
+WRITTEN, NO_DISTANCE = Reason.SYSTEM_WRITTEN, Reason.DISTANCE_MODE_UNKNOWN
 HEADS = {
     "siemens": b"G71 G90 G94 G17 G40 G64 F100\nG0 X0 Y0 Z50\n",
     "marlin": b"G21\nG90\nG0 X0 Y0 Z50 F6000\n",
@@ -56,23 +57,23 @@ def also_noticed(text, dialect, **facts):
 
 # What stands in front of the last rapid, and the reason for which that one is left alone.
 NOT_CERTAIN = {
-    "a work offset is written": ("fanuc", b"#5221=#5021\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "so on a Haas": ("haas", b"#5221=#5021\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "the external offset": ("fanuc", b"#2501=5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "a tool offset": ("fanuc", b"#2001=5.\nG54 G0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "a computed variable": ("fanuc", b"#[#1]=5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "and a doubly indirect one": ("fanuc", b"##1=5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "a stop with a message": ("fanuc", b"#3006=1\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "a variable of Mach": ("mach", b"#5221=4\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "G10 of an offset": ("fanuc", b"G10 L2 P1 X5.\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
-    "G10 of a tool": ("fanuc", b"G10 L10 P1 R5.\nG54\nG0 X5.\nX6.\n", Reason.SYSTEM_WRITTEN),
+    "a work offset is written": ("fanuc", b"#5221=#5021\nG0 X5.\nX6.\n", WRITTEN),
+    "so on a Haas": ("haas", b"#5221=#5021\nG0 X5.\nX6.\n", WRITTEN),
+    "the external offset": ("fanuc", b"#2501=5.\nG0 X5.\nX6.\n", WRITTEN),
+    "a tool offset": ("fanuc", b"#2001=5.\nG54 G0 X5.\nX6.\n", WRITTEN),
+    "a computed variable": ("fanuc", b"#[#1]=5.\nG0 X5.\nX6.\n", WRITTEN),
+    "and a doubly indirect one": ("fanuc", b"##1=5.\nG0 X5.\nX6.\n", WRITTEN),
+    "a stop with a message": ("fanuc", b"#3006=1\nG0 X5.\nX6.\n", WRITTEN),
+    "a variable of Mach": ("mach", b"#5221=4\nG0 X5.\nX6.\n", WRITTEN),
+    "G10 of an offset": ("fanuc", b"G10 L2 P1 X5.\nG0 X5.\nX6.\n", WRITTEN),
+    "G10 of a tool": ("fanuc", b"G10 L10 P1 R5.\nG54\nG0 X5.\nX6.\n", WRITTEN),
     "G10 of a parameter": (
         "fanuc", b"G10 L50\nN1401 P1 R0\nG11\nG90 G21 G94 G17 G40 G54 G49 F9.\nG0 X5.\nX6.\n",
-        Reason.SYSTEM_WRITTEN,
+        WRITTEN,
     ),
-    "a frame of Siemens": ("siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG0 X5\nX6\n", Reason.SYSTEM_WRITTEN),
-    "tool data of Siemens": ("siemens", b"N5 $TC_DP3[1,1]=5\nG54 G0 X5\nX6\n", Reason.SYSTEM_WRITTEN),
-    "an axis variable": ("siemens", b"$AA_OFF[X]=5 ; shift\nG0 X5\nX6\n", Reason.SYSTEM_WRITTEN),
+    "a frame of Siemens": ("siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG0 X5\nX6\n", WRITTEN),
+    "tool data of Siemens": ("siemens", b"N5 $TC_DP3[1,1]=5\nG54 G0 X5\nX6\n", WRITTEN),
+    "an axis variable": ("siemens", b"$AA_OFF[X]=5 ; shift\nG0 X5\nX6\n", WRITTEN),
     "G43 that may move": ("fanuc", b"G43 H1\nG0 Z9.\n", Reason.START_UNKNOWN),
     "G49 that may move": ("haas", b"G49\nG0 Z9.\n", Reason.START_UNKNOWN),
     "H without G43": ("fanuc", b"G43 H1 Z5.\nH2\nG0 Z9.\n", Reason.START_UNKNOWN),
@@ -91,7 +92,7 @@ NOT_CERTAIN = {
     "the same along Z": ("fanuc-lathe-a", b"G50 W5.\nG0 Z9.\n", Reason.START_UNKNOWN),
     "G92 in G91": ("fanuc", b"G91 G92 X5.\nG90 G0 X9.\n", Reason.START_UNKNOWN),
     "a bare G92": ("fanuc", b"G92\nG0 X9.\n", Reason.START_UNKNOWN),
-    "a tool change ends in G90": ("fanuc", b"G91 G0 X1.\nM6\nG0 X9.\n", Reason.DISTANCE_MODE_UNKNOWN),
+    "a tool change ends in G90": ("fanuc", b"G91 G0 X1.\nM6\nG0 X9.\n", NO_DISTANCE),
     "a laser of grbl": ("grbl", b"M3 S100\nG0 X9\n", Reason.BEAM),
     "a laser of Marlin": ("marlin", b"M3 I\nG0 X8 F6000\nG0 X9\n", Reason.BEAM),
     "a plasma torch of Mach": ("mach", b"M3\nG0 X9.\n", Reason.BEAM),
@@ -111,7 +112,7 @@ STILL_CERTAIN = {
     "a common variable": ("fanuc", b"#500=5.\n#1=2.\nG0 X5.\n"),
     "a timer": ("fanuc", b"#3001=0\nG0 X5.\n"),
     "an offset is written, then selected": ("fanuc", b"#5221=3.\nG54\nG49\nG0 X5. Y5.\nX6.\n"),
-    "a frame is written, then selected": ("siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG54 D1\nG0 X5\nX6\n"),
+    "a frame is written, then selected": ("siemens", b"$P_UIFR[1]=X5\nG54 D1\nG0 X5\nX6\n"),
     "parameters of LinuxCNC": ("linuxcnc", b"#5221=3\nG0 X5\n"),
     "G43 with its axis": ("fanuc", b"G43 H1 Z5.\nG0 Z9.\n"),
     "look-ahead again": ("haas", b"G103 P1\nG103 P0\nG0 X5.\n"),

@@ -1,0 +1,159 @@
+"""What the codes of a line do before anything moves, for the second reading.
+
+Rule: as in `tracking`, what is not followed makes unknown all that it might have changed.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialect import AXES, Effect
+from gcodejerk.units import MM_PER_INCH as INCH
+from gcodejerk.verification.known import Known
+from gcodejerk.verification.reading import NAN, Line
+from gcodejerk.verification.sorting import Sorted
+
+QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
+_CALLS = (47, 96, 97, 98, 198)
+_ENDS = (2, 17, 30, 99)
+_OUTPUTS = (*range(62, 69), *range(100, 200))
+
+
+class Codes(Known):
+    """Executes codes."""
+
+    def unknown_call(self) -> None:
+        """Whatever a program does that is not followed."""
+        self.forget()
+        if self.dialect.diameter_codes:
+            self.diameter = None
+
+    def turning(self, effect: Effect) -> None:
+        """Take X as a diameter, or not."""
+        self.turns = True
+        self.diameter = None if effect == "either" else effect == "diameter"
+
+    def write(self, effect: Effect, line: Line) -> None:
+        """A line that only writes data, or says which axes F is for."""
+        if any(letter != "N" for letter, _, _ in line.words):
+            self.forget()
+        if effect == "written":
+            self.written()
+        else:
+            self.bars["feed group"] = line.group
+
+    def beam(self, block: Sorted, burnt: bool) -> bool | None:
+        """Whether G1 would burn where G0 does not; None where that is not known."""
+        feeds = block.axes and self.g.get("motion") != self.dialect.rapid
+        on = burnt or self.spindle != 5
+        self.habits = (
+            self.habits
+            or bool(feeds and "S" in block.values and self.spindle != 5)
+            or not self.dialect.beam_codes.isdisjoint(block.m)
+            or ("I" in block.values and (3 in block.m or 4 in block.m))
+        )
+        if self.dark and any(m in _OUTPUTS for m in block.m):
+            self.bars["outputs"] = True
+        if not (self.dark and on):
+            return False
+        return True if self.spindle in (3, 4) and not self.depth and not self.doubt else None
+
+    def machine_codes(self, block: Sorted) -> bool:
+        """Execute M codes; whether the program ends behind the block."""
+        ends = False
+        for m in block.m:
+            group = self.dialect.m_groups.get(m)
+            if group == "spindle" and m in (3, 4, 5):
+                self.spindle = m
+            if group == "stop" and m in _ENDS:
+                ends = True
+            elif m in _CALLS and group is not None:
+                self.unknown_call()
+            elif group is None and self.dialect.other_m == "unknown":
+                self.forget()
+            elif group in (None, "tool", "user"):
+                self.lose()
+                if self.dialect.other_m == "positions":
+                    self.tool = [NAN] * len(AXES)
+                    if self.cycle is not None:
+                        self.g["motion"], self.cycle = None, None
+                    if self.g.get("distance") == 910 and "distance" not in self.fixed:
+                        self.g["distance"] = None
+            elif group == "state":
+                self.forget()
+        return ends
+
+    def modes(self, g: dict[str, int], values: dict[str, float]) -> None:
+        """Execute modal codes."""
+        dialect = self.dialect
+        if "distance" in g and self.g.get("distance") != g["distance"]:
+            self.level = self.r = NAN
+        for group, code in g.items():
+            if group not in ("motion", "non-modal", "cycle"):
+                self.g[group] = code
+            if code in dialect.transforms:
+                name, on = dialect.transforms[code]
+                if on or self.frames.get(name, False) is not False:
+                    self.lose()
+                self.frames[name] = on
+            if code in dialect.bars:
+                name, begins = dialect.bars[code]
+                p = values.get("P", 0.0)
+                on_p = None if p != p else p != 0.0
+                self.bars[name] = on_p if begins == "P" else bool(begins)
+        if "units" in g:
+            unit = INCH if dialect.units[g["units"]] else 1.0
+            if unit != self.unit:
+                self.p = self.q = self.level = self.r = NAN
+            if g["units"] not in dialect.lengths_only:
+                sure = unit == 1.0 or not dialect.feed_before_units
+                if unit != self.feed_unit and not (
+                    self.feed_unit is None and "F" in values and sure
+                ):
+                    self.feed = NAN
+                self.feed_unit = unit
+            self.unit = unit
+        if "path" in g:
+            self.path = dialect.paths.get(g["path"])
+            self.p = values.get("P", NAN) if g["path"] == 640 else NAN
+            self.q = values.get("Q", NAN) if g["path"] == 640 else NAN
+
+    def effect(self, effect: Effect, code: int, values: dict[str, float]) -> None:
+        """What a code does besides, before anything moves."""
+        if effect in QUIET:
+            self.turning(effect)
+        elif effect == "length":
+            self.lengthen(code, values.get("H", NAN), _axes(values))
+        elif effect in ("system", "numbered system"):
+            number = values.get("P", NAN) if effect == "numbered system" else 0.0
+            if "P" in values and code in self.dialect.p_selects:
+                number = NAN
+            self.select(code if effect == "system" else 541, number)
+        elif effect == "frames":
+            self.lose_offsets()
+            self.lose()
+        elif effect in ("transform", "modal cycle"):
+            self.frames["a frame"] = True
+            self.lose()
+        elif effect == "cycle":
+            self.lose()
+            self.g["motion"], self.feed = None, NAN
+        elif effect == "home":
+            self.lose()
+        elif effect == "data":
+            self._data(values)
+        elif effect == "flow":
+            self.unknown_call()
+
+    def _data(self, values: dict[str, float]) -> None:
+        """G10: offsets (L2, L20), tool data (L1, L3, L10 to L13), or parameters."""
+        kind = values.get("L")
+        self.written()
+        if kind in (2.0, 20.0):
+            self.end_bar("tool data")
+        elif kind is not None and kind not in (1.0, 3.0, 10.0, 11.0, 12.0, 13.0):
+            self.forget()
+            self.bars["parameters"] = True
+
+
+def _axes(values: dict[str, float]) -> int:
+    """Bit k: a word for AXES[k]."""
+    return sum(1 << k for k, axis in enumerate(AXES) if axis in values)
