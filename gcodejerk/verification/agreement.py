@@ -10,7 +10,8 @@ it says so by a number and nothing is refused: `nc` follows more than it does.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 from gcodejerk.nc import AXES, Dialect, Rapids, Start, find_dialect
@@ -74,6 +75,72 @@ def confirm(
             )
         else:
             confirmed += _is_known(seen, rapids, i)
+    return confirmed
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What the first reading says of a block that was replaced otherwise than by a stream."""
+
+    line: int
+    start: Sequence[float]
+    """Positions in front of it. [mm, deg]"""
+    modes: Mapping[str, Any]
+    """In force behind it, by the names of `Sighting.modes`."""
+
+
+def confirm_contexts(
+    original: BinaryIO,
+    dialect: Dialect | str,
+    start: Start,
+    contexts: Sequence[Context],
+    found: Findings,
+) -> int:
+    """Compare what two readings say of blocks of drilling cycles.
+
+    Parameters
+    ----------
+    original : BinaryIO
+        Seekable; read from where it stands to its end.
+    dialect : Dialect or str
+        How it is written.
+    start : Start
+        What it may assume when it starts.
+    contexts : sequence of Context
+        What the first reading says, by ascending line.
+    found : Findings
+        Where they disagree.
+
+    Returns
+    -------
+    int
+        How many blocks the second reading confirms.
+    """
+    confirmed = 0
+    lines = [context.line for context in contexts]
+    for k, seen in sightings(original, find_dialect(dialect), start, lines):
+        context = contexts[k]
+        problem, known = "", bool(seen.modes)
+        for axis, here in enumerate(seen.start):
+            told = context.start[axis]
+            if abs(here - told) > NEAR * max(1.0, abs(here) / 1e3):
+                problem = f"{AXES[axis]} stands at {here:.6g}, not at {told:.6g} [mm or deg]"
+            known = known and (here == here or told != told)
+        for name, told in context.modes.items():
+            mine = seen.modes.get(name)
+            if mine is None or told is None or mine != mine or told != told:
+                known = known and (told is None or told != told)
+            elif mine != told:
+                problem = f"{name} is {mine:g}, not {told:g}"
+        if problem:
+            found.add(
+                Kind.READING,
+                None,
+                context.line,
+                f"a second reading of the program does not agree: {problem}",
+                "process it without --expand-cycles, and report the program",
+            )
+        confirmed += known and not problem
     return confirmed
 
 

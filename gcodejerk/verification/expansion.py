@@ -20,6 +20,7 @@ from gcodejerk.nc.dialect import PLANES
 from gcodejerk.nc.modal import State
 from gcodejerk.nc.program import read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
+from gcodejerk.verification.agreement import Context, confirm_contexts
 from gcodejerk.verification.cycles import (
     CLOSE,
     HEIGHTS,
@@ -58,7 +59,7 @@ def check_expansion(
     Parameters
     ----------
     original, expanded : BinaryIO
-        Opened for reading bytes, at their beginning.
+        Opened for reading bytes, at their beginning; the original seekable, since it is read twice.
     dialect : str or Dialect, optional
         How the original is written.
     start : Start, optional
@@ -86,13 +87,18 @@ def check_expansion(
     >>> str(found[0].kind), found[0].line, found[0].original_line
     ('moves of a cycle', 5, 3)
     """
+    begin = original.tell()
     walk = _Walk(Window(expanded), find_dialect(dialect), Start() if start is None else start, most)
     for chunk in read_chunks(original, names[0]):
         if not walk.take(chunk):
             break
     else:
         walk.end()
-    return Verification(walk.holes, walk.written, walk.kept, walk.found.sorted(), names)
+    # Where the tool stands in front of a hole, and in which modes, has so far one reader's word.
+    start = Start() if start is None else start
+    original.seek(begin)
+    confirmed = confirm_contexts(original, dialect, start, walk.contexts, walk.found)
+    return Verification(walk.holes, walk.written, walk.kept, walk.found.sorted(), names, confirmed)
 
 
 class _Walk:
@@ -110,6 +116,7 @@ class _Walk:
         self.path: dict[str, Fraction] | None = None
         """P and Q of the G64 in force [mm]; None where they are not known."""
         self.newline = b""
+        self.contexts: list[Context] = []
         if start.startup:
             self._remember(parse_block(start.startup.encode("latin-1", "replace"), dialect), True)
 
@@ -157,7 +164,10 @@ class _Walk:
             if motion in self.dialect.cycles:
                 self.series.doubt = "it began before the program"
         if not self._is_kept(line):
-            return self._written(bare, line, block, number, sure and axes and in_cycle)
+            hole = sure and axes and in_cycle
+            if hole:
+                self.contexts.append(Context(number, here, _modes(state)))
+            return self._written(bare, line, block, number, hole)
         self.theirs.skip(len(line))
         self.kept += 1
         series = self.series
@@ -347,6 +357,19 @@ class _Walk:
         """Note a violation, with which the walk ends."""
         self.found.add(kind, self.theirs.line, number, problem)
         return False
+
+
+def _modes(state: State) -> dict[str, float | None]:
+    """What a cycle's moves depend on, as the second reading names it."""
+    return {
+        "unit": state.unit,
+        "incremental": None if state.distance is None else state.distance == 910,
+        "feed mode": state.feed_mode,
+        "F": state.feed,
+        "plane": state.plane,
+        "retract": state.retract,
+        "path": state.path,
+    }
 
 
 class _Lines:

@@ -246,6 +246,8 @@ class Tracker(Codes):
             "feed mode": feed_mode,
             "F": self.feed,
             "F without a point": self.feed_whole if self.feed == self.feed else None,
+            "plane": self.g.get("plane"),
+            "retract": self.g.get("retract"),
             "path": self.path,
             "P": self.p,
             "Q": self.q,

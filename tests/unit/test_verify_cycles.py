@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 import gcodejerk
-from gcodejerk.nc import Start
+from gcodejerk.nc import AXES, Start
 from gcodejerk.nc.expansion import expand
+from gcodejerk.nc.reader import Reader
 from gcodejerk.verification import Kind
 from gcodejerk.verification.expansion import check_expansion
 
@@ -245,3 +246,35 @@ def test_the_judge_shares_nothing_with_those_it_judges():
         tree = ast.parse((root / "verification" / f"{name}.py").read_bytes())
         names = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
         assert not names & {f"gcodejerk.nc.{m}" for m in ("drilling", "series", "expansion")}
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "told"),
+    [
+        ("position", 15.0, "Z stands at 10"),
+        ("unit", 25.4, "unit is 1"),
+        ("retract", 990, "retract is 980"),
+        ("plane", 180, "plane is 170"),
+        ("distance", 910, "incremental is 0"),
+        ("feed", 90.0, "F is 100"),
+        ("path", 64, "path is 61"),
+    ],
+)
+def test_what_is_in_force_in_front_of_a_cycle_has_to_be_read_twice(monkeypatch, field, value, told):
+    """A mistake of the first reading, which whoever writes and whoever proves would share."""
+
+    class Mistaken(Reader):
+        def read_line(self, text, begin, number, terminator):
+            super().read_line(text, begin, number, terminator)
+            if number == 2 and field == "position":
+                self.state.position[AXES.index("Z")] = value
+            elif number == 2:
+                setattr(self.state, field, value)
+
+    program = b"G21 G90 G61 G98 F100\nG0 X0 Y0 Z10\nG81 X5 Z-3 R2\nG80\nM2\n"
+    right = b"G0 X5\nG0 Z2\nG1 Z-3\nG0 Z10\n"
+    written = program.replace(b"G81 X5 Z-3 R2\n", right)
+    assert check_expansion(io.BytesIO(program), io.BytesIO(written)).confirmed == 1
+    monkeypatch.setattr("gcodejerk.verification.expansion.Reader", Mistaken)
+    found = check_expansion(io.BytesIO(program), io.BytesIO(written))
+    assert any(v.kind is Kind.READING and told in v.problem for v in found.violations)
