@@ -25,17 +25,18 @@ LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
 STOPS = frozenset({0.0, 1.0, 2.0, 30.0, 60.0})
 """M words that take effect after the motion of their block."""
 COMMENT_LENGTH = 69
+LINES_AT_ONCE = 512
 LONGEST_STREAM = 1 << 26
 """Bytes of one stream; more is not read."""
 
 # No axis needs more digits; numbers without bounds would be a way to stall the reading.
-_NUMBER = rb"[-+]?+(?:[0-9]{1,9}+(?:\.[0-9]{0,250}+)?+|\.[0-9]{1,250}+)(?![0-9.])"
+_NUMBER = rb"[-+]?(?:[0-9]{1,9}(?:\.[0-9]{0,250})?|\.[0-9]{1,250})(?![0-9.])"
 _WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
 _WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
 _IS_POINT = re.compile(rb"[ \t]*G0?1(?![0-9.])")
 _COMMENT = re.compile(rb"(?:\(gcodejerk: ([ -'*-~]*)\)|; gcodejerk: ([ -'*-~]*))")
 # Zero is zero with a decimal point and without.
-_WHOLE = re.compile(rb"[A-FH-Z][ \t]*+[-+]?+0*+[1-9][0-9]*+(?!\.)")
+_WHOLE = re.compile(rb"[A-FH-Z][ \t]*[-+]?0*[1-9][0-9]*(?![0-9.])")
 _EXACT = Context(prec=200)
 
 
@@ -175,11 +176,22 @@ def _is_stop(letter: str, value: float | None) -> bool:
 
 @lru_cache(maxsize=256)
 def _run_of(letters: str, line_end: bytes) -> re.Pattern[bytes]:
-    """Lines of points with these axes, one after another."""
+    """Lines of points with these axes, one after another, at most LINES_AT_ONCE of them.
+
+    A repeat remembers every turn that it could still take back; so it is bounded, and repeated.
+    """
     words = b"".join(
-        rb"[ \t]*+" + letter.encode() + rb"[ \t]*+" + _NUMBER for letter in letters + "F"
+        rb"[ \t]*" + letter.encode() + rb"[ \t]*" + _NUMBER for letter in letters + "F"
     )
-    return re.compile(rb"(?:G0?1" + words + rb"[ \t]*+" + re.escape(line_end) + rb")*+")
+    line = rb"(?:G0?1" + words + rb"[ \t]*" + re.escape(line_end) + rb")"
+    return re.compile(line + rb"{1,%d}" % LINES_AT_ONCE)
+
+
+def _run_end(pattern: re.Pattern[bytes], data: bytes, begin: int, end: int) -> int:
+    """Where the lines end that a pattern of `_run_of` matches one behind the other."""
+    while match := pattern.match(data, begin, end):
+        begin = match.end()
+    return begin
 
 
 class StreamReader:
@@ -318,15 +330,13 @@ class StreamReader:
             size = 1 << 13
             while True:
                 have = window.fill(size)
-                match = _run_of(letters, self.line_end).match(
-                    window.data, window.at, window.at + have
-                )
-                assert match is not None
-                if have < size or match.end() < window.at + have - 512 or size > LONGEST_STREAM:
+                pattern = _run_of(letters, self.line_end)
+                end = _run_end(pattern, window.data, window.at, window.at + have)
+                if have < size or end < window.at + have - 512 or size > LONGEST_STREAM:
                     break
                 size *= 4
-            stream.text = match[0]
-            window.skip(len(match[0]))
+            stream.text = window.data[window.at : end]
+            window.skip(len(stream.text))
         while _IS_POINT.match(line := self.peek()):
             words = read_words(line)
             by_letter = dict(words[1:]) if words else {}
