@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
+from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.expanded import (
     hunks,
@@ -263,8 +264,12 @@ def _process(
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
         )
+    rapids = program.rapids
+    if emitter.in_place:
+        dialect = find_dialect(program.dialect)
+        rapids = replace(rapids, reason=reasons_to_leave(program, source, machine, dialect))
     plans = plan_rapids(
-        program.rapids,
+        rapids,
         machine,
         settings.profile,
         lambda done, total: report("planning", done, total),
@@ -278,7 +283,9 @@ def _process(
     writer.write_header(machine)
     done = 0
     for window in make_streams(
-        plans, emitter.spelling(program.rapids, machine), emitter.stride(machine.interval)
+        plans,
+        emitter.spelling(program.rapids, machine, options.dialect),
+        emitter.stride(machine.interval),
     ):
         for batch in window:
             collected.add(batch)

@@ -160,7 +160,7 @@ def verify_files(
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
-    walk = Walk(Window(original), Window(processed), program, found)
+    walk = Walk(Window(original), Window(processed), program, machine, found)
     reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
     stride = stride_of(machine)
     for streams in _batches(_checked(walk, reader)):

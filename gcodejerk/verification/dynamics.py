@@ -22,7 +22,7 @@ from gcodejerk.verification.conventional import rapid_time
 from gcodejerk.verification.feeds import NOT_OWN, judge_feeds, rapid_limits
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.oscillators import Oscillators
-from gcodejerk.verification.points import Array, Index, Paths, resolutions
+from gcodejerk.verification.points import Array, Index, Paths
 from gcodejerk.verification.residual import leaves_more
 
 BLOCK_TIME = 0.002
@@ -194,6 +194,7 @@ def _take(paths: Paths, streams: Index) -> Paths:
         displacement=paths.displacement[streams],
         unit=paths.unit[streams],
         speed=paths.speed[streams],
+        step=paths.step[streams],
     )
 
 
@@ -252,14 +253,15 @@ _ORDERS = ((1, Kind.VELOCITY, "s"), (2, Kind.ACCELERATION, "s^2"), (3, Kind.JERK
 def _limits(paths: Paths, machine: Machine, t: Array) -> list[tuple[Kind, NDArray[np.bool_], str]]:
     """Compare every moving axis with what designs may use."""
     padded = Padded.of(paths, t)
-    limits, step = limits_of(machine), resolutions(machine)
+    limits = limits_of(machine)
     out = []
     for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
         x = (paths.position[:, a] - paths.start[paths.owner, a])[padded.row]
         for order, kind, unit in _ORDERS:
             limit = limits[order - 1, a]
             value, error, inside = padded.differences(x, order)
-            bad = inside & (np.abs(value) > limit * (1.0 + RELATIVE) + error * step[a])
+            step = paths.step[padded.owner[: len(value)], a]
+            bad = inside & (np.abs(value) > limit * (1.0 + RELATIVE) + error * step)
             if bad.any():
                 problem = f"{AXES[a]} passes its limit of {limit:g} mm/{unit}"
                 out.append((kind, padded.rows_of(order, bad, len(t)), problem))

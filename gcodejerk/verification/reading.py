@@ -116,11 +116,11 @@ class Text:
         self.run, self.run_stated, self.run_on = self._runs(decimals_matter)
 
     def _runs(self, decimals_matter: bool) -> tuple[re.Pattern[bytes], ...]:
-        """Patterns of the begin of a run of feed moves, and of what may follow; of the second,
-        the first line states its code.
+        """Patterns of the begin of a run of feed moves, and of what may follow.
 
-        Nothing in them matches in two ways, so that a line that does not match costs its length,
-        and a repeat, which remembers every turn that it could still take back, is bounded.
+        Of the second, the first line states its code. Nothing in them matches in two ways, so that
+        a line that does not match costs its length, and a repeat, which remembers every turn that
+        it could still take back, is bounded.
         """
         rules, dialect = self.dialect.text, self.dialect
         number = rb"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?![0-9.])" if decimals_matter else _NUMBER

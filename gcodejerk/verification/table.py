@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES, CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.points import STANDSTILL, Array, Paths
+from gcodejerk.verification.points import STANDSTILL, Array, Paths, resolutions
 
 PIECE = 1 << 20
 ROWS = 512
@@ -166,4 +166,5 @@ class TableReader:
             displacement=displacement,
             unit=np.ones(len(index)),
             speed=self.rapids.speed[index],
+            step=np.tile(resolutions(self.machine), (len(index), 1)),
         )
