@@ -27,6 +27,7 @@ from gcodejerk.expanded import (
     lines_in_original,
     written_out,
 )
+from gcodejerk.foreign import HEAD, refuse_foreign
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
@@ -251,6 +252,8 @@ def _process(
     source.seek(0, io.SEEK_END)
     size = source.tell()
     source.seek(0)
+    refuse_foreign(source.read(HEAD), name)
+    source.seek(0)
     program = read_program(
         source,
         name=name,
@@ -278,6 +281,7 @@ def _process(
     deviation = np.zeros(len(plans))
     chosen = [emitter.name, settings.form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
+    chosen += [f"dialect {settings.dialect}"] if settings.dialect is not None else []
     options = Options(settings.comments, find_dialect(program.dialect))
     writer = Splicer(source, target, program, emitter, options, stamp_text(machine, chosen))
     writer.write_header(machine)
