@@ -28,7 +28,7 @@ from gcodejerk.expanded import (
     written_out,
 )
 from gcodejerk.foreign import HEAD, refuse_foreign
-from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
+from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine, resolution_warnings
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
@@ -321,6 +321,7 @@ def _process(
             "how the program's control follows its streams was not measured"
         )
     notes += dogleg_notes(plans, deviation)
+    notes += [f"{machine.source}: {warning}" for warning in resolution_warnings(machine)]
     return Result(
         program=program,
         plans=plans,
