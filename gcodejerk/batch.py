@@ -10,6 +10,7 @@ traceback.
 
 from __future__ import annotations
 
+import os
 import tempfile
 import traceback
 from collections.abc import Generator
@@ -20,7 +21,17 @@ from typing import BinaryIO
 
 from gcodejerk.designs import known_limits
 from gcodejerk.errors import EmitError, GcodejerkError
-from gcodejerk.files import STANDARD, make_folder, new_file, open_input, same_file, version
+from gcodejerk.files import (
+    STANDARD,
+    is_ours,
+    is_report,
+    make_folder,
+    new_file,
+    open_input,
+    same_content,
+    same_file,
+    version,
+)
 from gcodejerk.machine import Machine
 from gcodejerk.pipeline import Progress, Result, Settings, process_file, silent
 from gcodejerk.report.difference import difference
@@ -144,7 +155,7 @@ def _lost(job: Job, status: int | None) -> Done:
 
 
 def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
-    _refuse_overwriting(job)
+    _refuse_overwriting(job, machine)
     with ExitStack() as stack:
         before = version(job.input)
         source = stack.enter_context(open_input(job.input))
@@ -165,6 +176,8 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         if report is not None:
             report.write(dump(record_of(result, machine, job.output, source, progress)))
             report.flush()  # a full disk shows here, and not when the output is in its place
+        if job.mode == "write" and not (job.in_place or settings.force):
+            _refuse_foreign(job, source, target)
         diff = difference(source, target, result) if job.mode == "diff" else b""
         if job.in_place and version(job.input) != before:
             raise changed_error(job.input)  # an edit of the user's would be lost
@@ -216,11 +229,32 @@ def record_of(
     return process_record(result, machine, output, blocks, limit)
 
 
-def _refuse_overwriting(job: Job) -> None:
-    """An output or report that is the input, under whatever name."""
+def _refuse_overwriting(job: Job, machine: Machine) -> None:
+    """An output or report that is the input or the machine file, under whatever name."""
     for name in (None if job.in_place else job.output, job.report):
-        if name is not None and job.mode == "write" and same_file(job.input, name):
+        if name is None or job.mode != "write":
+            continue
+        if same_file(job.input, name):
             raise EmitError(
                 f"{name} is the input itself",
                 "choose another name, or say --in-place to replace the program",
             )
+        if same_file(machine.source, name):
+            raise EmitError(f"{name} is the machine file", "choose another name")
+
+
+def _refuse_foreign(job: Job, source: BinaryIO, target: BinaryIO) -> None:
+    """An output or report that is there already, and that gcodejerk has not written.
+
+    What holds the very bytes of the program, or those that are about to be written, may be
+    replaced: nothing is lost.
+    """
+    for name, own in ((job.output, is_ours), (job.report, is_report)):
+        if name is None or name == STANDARD or not os.path.isfile(name) or own(name):
+            continue
+        if name == job.output and (same_content(name, source) or same_content(name, target)):
+            continue
+        raise EmitError(
+            f"{name} exists and was not written by gcodejerk: it carries no stamp",
+            "choose another name, remove the file, or add --force to replace it",
+        )

@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import secrets
 import shutil
 import stat
@@ -26,6 +27,10 @@ from gcodejerk.errors import EmitError, ProgramError
 STANDARD = "-"
 """Name of standard input and output."""
 PREFIX = ".~gcodejerk-"
+STAMP_WITHIN = 1 << 20
+"""A stamp that stands farther from the top is not looked for. [bytes]"""
+_STAMP = re.compile(rb"^[(;] ?gcodejerk stamp [0-9]", re.MULTILINE)
+_REPORT = re.compile(rb'\s*\{\s*"gcodejerk"\s*:')
 SPOOL = 8 << 20
 """Standard input and output are held in memory up to this size, then on disk."""
 
@@ -243,6 +248,41 @@ def same_file(one: str, other: str) -> bool:
         return os.path.samefile(one, other)
     except (OSError, ValueError):
         return os.path.abspath(one) == os.path.abspath(other)
+
+
+def is_ours(path: str) -> bool:
+    """Whether a file carries gcodejerk's stamp, or is one of its tables."""
+    head = _head(path)
+    return head.startswith(b"block,t,") or _STAMP.search(head) is not None
+
+
+def is_report(path: str) -> bool:
+    """Whether a file is a report of gcodejerk's."""
+    return _REPORT.match(_head(path)) is not None
+
+
+def same_content(path: str, file: BinaryIO) -> bool:
+    """Whether a file holds the bytes of an open one; leaves that anywhere."""
+    file.seek(0)
+    try:
+        with open(path, "rb") as other:
+            while True:
+                one, two = file.read(SPOOL), other.read(SPOOL)
+                if one != two:
+                    return False
+                if not one:
+                    return True
+    except OSError as error:
+        raise _unwritable(path, error) from None
+
+
+def _head(path: str) -> bytes:
+    """The first bytes of an output that is there already."""
+    try:
+        with open(path, "rb") as file:
+            return file.read(STAMP_WITHIN)
+    except OSError as error:
+        raise _unwritable(path, error) from None
 
 
 def _mode(like: str | None) -> int:

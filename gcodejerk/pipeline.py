@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
+from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.expanded import (
     hunks,
@@ -26,13 +27,13 @@ from gcodejerk.expanded import (
     lines_in_original,
     written_out,
 )
-from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
+from gcodejerk.foreign import HEAD, refuse_foreign
+from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine, resolution_warnings
 from gcodejerk.motion.laws import Array
-from gcodejerk.nc import Program, Rapids, find_dialect, read_program
+from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
-from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
 from gcodejerk.start import program_start
 from gcodejerk.stream import Residuals, make_streams
@@ -251,6 +252,8 @@ def _process(
     source.seek(0, io.SEEK_END)
     size = source.tell()
     source.seek(0)
+    refuse_foreign(source.read(HEAD), name)
+    source.seek(0)
     program = read_program(
         source,
         name=name,
@@ -264,10 +267,12 @@ def _process(
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
         )
+    rapids = program.rapids
     if emitter.in_place:
-        program = replace(program, rapids=_writable(program.rapids))
+        dialect = find_dialect(program.dialect)
+        rapids = replace(rapids, reason=reasons_to_leave(program, source, machine, dialect))
     plans = plan_rapids(
-        program.rapids,
+        rapids,
         machine,
         settings.profile,
         lambda done, total: report("planning", done, total),
@@ -276,12 +281,15 @@ def _process(
     deviation = np.zeros(len(plans))
     chosen = [emitter.name, settings.form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
+    chosen += [f"dialect {settings.dialect}"] if settings.dialect is not None else []
     options = Options(settings.comments, find_dialect(program.dialect))
     writer = Splicer(source, target, program, emitter, options, stamp_text(machine, chosen))
     writer.write_header(machine)
     done = 0
     for window in make_streams(
-        plans, emitter.spelling(program.rapids, machine), emitter.stride(machine.interval)
+        plans,
+        emitter.spelling(program.rapids, machine, options.dialect),
+        emitter.stride(machine.interval),
     ):
         for batch in window:
             collected.add(batch)
@@ -313,6 +321,7 @@ def _process(
             "how the program's control follows its streams was not measured"
         )
     notes += dogleg_notes(plans, deviation)
+    notes += [f"{machine.source}: {warning}" for warning in resolution_warnings(machine)]
     return Result(
         program=program,
         plans=plans,
@@ -329,17 +338,6 @@ def _process(
         expansion=expansion,
         notes=(*notes, *emitter.notes(program.rapids, plans)),
     )
-
-
-def _writable(rapids: Rapids) -> Rapids:
-    """Leave alone what points in the program would not lead where the rapid goes.
-
-    An axis that counts its turns reads each point as it reads the rapid's own word: one rounded
-    back behind the point before it would send the axis all the way round.
-    """
-    reason = rapids.reason.copy()
-    reason[(reason == CERTAIN) & (rapids.turned != 0)] = REASONS.index(Reason.ROTARY_WAY)
-    return replace(rapids, reason=reason)
 
 
 def _judged(

@@ -41,6 +41,7 @@ class Reason(enum.StrEnum):
     TOO_SHORT = "shorter than minimum_length"
     TOO_LONG = "too long for a stream"
     BEYOND_TRAVEL = "beyond travel"
+    LINE_LIMIT = "line or number too long for the control"
     LIMITS = "limits cannot be met"
     NOT_BETTER = "no profile within the limits is better"
 

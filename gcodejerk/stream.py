@@ -51,15 +51,19 @@ class Spelling:
         Smallest step that is written. [mm] or [deg]
     origin : ndarray, shape (n, 9)
         Where the steps are counted from: 0, or the start for increments. [mm] or [deg]
+    finer : bool
+        The control keeps steps finer than these, so that an axis that moves a few of them only may
+        be written in finer ones.
     """
 
     start: Array
     step: Array
     origin: Array
+    finer: bool = True
 
     def take(self, index: NDArray[np.int64]) -> Spelling:
         """Some of the moves."""
-        return Spelling(self.start[index], self.step[index], self.origin[index])
+        return Spelling(self.start[index], self.step[index], self.origin[index], self.finer)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,12 +213,13 @@ class _Maker:
         self.interval = plans.machine.interval
         self.grid = Grid.every(plans.counts[moves], stride, self.interval)
         size = np.abs(plans.displacement[moves])
-        fine = (size > 0.0) & (size < FEW_STEPS * spelling.step)
+        fine = (size > 0.0) & (size < FEW_STEPS * spelling.step) & spelling.finer
         self.fine = fine
         self.spelling = Spelling(
             spelling.start,
             np.where(fine, spelling.step / 10.0**FINE_DECIMALS, spelling.step),
             spelling.origin,
+            spelling.finer,
         )
 
     def writable(self, laws: Laws) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from typing import Annotated
 
 import typer
@@ -19,6 +20,10 @@ def machine_check(
     """Validate a machine file; every problem with its line and column."""
     described = load_machine(machine, None)
     axes = ", ".join(f"{axis.name} ({len(axis.modes)})" for axis in described.axes)
+    from gcodejerk.machine import resolution_warnings
+
+    for warning in resolution_warnings(described):
+        print(f"{described.source}: warning: {warning}", file=sys.stderr)
     structure = f", and {len(described.modes)} of the structure" if described.modes else ""
     print(f"{described.source}: {described.name}: good; axes (modes): {axes}{structure}")
 

@@ -70,9 +70,10 @@ def process(
         bool, typer.Option("--no-comments", help="do not name replaced blocks")
     ] = False,
     force: Annotated[
-        bool, typer.Option("--force", help="accept a program processed before")
+        bool,
+        typer.Option("--force", help="accept a program processed before; replace any output file"),
     ] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors and notes")] = False,
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
     from gcodejerk.batch import Job, run_jobs
@@ -165,7 +166,7 @@ class _Tally:
         if done.diff:
             sys.stdout.flush()
             sys.stdout.buffer.write(done.diff)
-        for note in () if self.quiet else done.notes:
+        for note in done.notes:  # -q or not: they are about what the machine will do
             print(f"{done.input}: note: {note}", file=sys.stderr)
         if self.mode == "check" and done.changed:
             print(f"{done.input}: would be changed")
@@ -232,18 +233,30 @@ def verify(
     from gcodejerk.files import open_input
     from gcodejerk.start import program_start
     from gcodejerk.verification import verify_csv, verify_files
+    from gcodejerk.verification.stamp import read_stamp
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
     described = load_machine(machine, original)
-    if profile is not None:
-        described = replace(described, design=replace(described.design, profile=profile))
     table = processed.lower().endswith(".csv")
     if table and expand_cycles:
         raise typer.BadParameter("--expand-cycles: a table of streams has no cycles written out")
     written = 0
     with open_input(original) as one, open_input(processed) as other:
         names = (original, processed)
+        # What the user does not say again, the stamp says.
+        stamp = read_stamp(other, described)
+        if stamp is not None and not stamp.known:
+            print(
+                f"{processed}: note: stamped for another machine file or with options that are "
+                f"not known here; verified as {described.source} and the options say",
+                file=sys.stderr,
+            )
+        elif stamp is not None:
+            profile, dialect = profile or stamp.profile, dialect or stamp.dialect
+            expand_cycles = expand_cycles or stamp.expand_cycles
+        if profile is not None:
+            described = replace(described, design=replace(described.design, profile=profile))
         if expand_cycles:
             found, written = verify_expanded(
                 one, other, described, names=names, dialect=dialect, most=most

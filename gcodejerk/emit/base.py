@@ -65,7 +65,7 @@ class Controller(Protocol):
         """Intervals from one written point to the next."""
         ...
 
-    def spelling(self, rapids: Rapids, machine: Machine) -> Spelling:
+    def spelling(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> Spelling:
         """Steps and origins for all rapids of a program."""
         ...
 
@@ -172,24 +172,33 @@ def decimal_step(resolution: float) -> tuple[int, int]:
     return 1, min(MOST_DECIMALS, math.ceil(-math.log10(resolution) - 1e-9))
 
 
-def axis_steps(machine: Machine, inch: bool) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def axis_steps(
+    machine: Machine, inch: bool, doubles: bool = True
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Step of every axis of `AXES` as whole numbers and decimals, in the program's unit.
 
-    In inches a step is a power of ten, since the resolution in mm has no short form there.
+    In inches a step is a power of ten, since the resolution in mm has no short form there: the next
+    finer one where the control computes in doubles. Others round each number to their least
+    increment, which is coarser than the resolution, never finer: 0.0001 in for 0.001 mm (IS-B);
+    there, and for a resolution that no nine decimals write, it is the next coarser power of ten.
     """
     whole, decimals = np.ones(len(AXES), dtype=np.int64), np.zeros(len(AXES), dtype=np.int64)
     for axis in machine.axes:
         k = AXES.index(axis.name)
-        if inch and not axis.rotary:
-            decimals[k] = math.ceil(-math.log10(axis.resolution / MM_PER_INCH) - 1e-9)
-        else:
-            whole[k], decimals[k] = decimal_step(axis.resolution)
+        unit = MM_PER_INCH if inch and not axis.rotary else 1.0
+        exact, places = decimal_step(axis.resolution)
+        writes = abs(exact / 10**places - axis.resolution) < 1e-6 * axis.resolution
+        if unit == 1.0 and (doubles or writes):
+            whole[k], decimals[k] = exact, places
+            continue
+        place = -math.log10(axis.resolution / unit)
+        decimals[k] = max(0, math.ceil(place - 1e-9) if doubles else math.floor(place + 1e-9))
     return whole, decimals
 
 
-def step_sizes(machine: Machine, inch: bool) -> NDArray[np.float64]:
+def step_sizes(machine: Machine, inch: bool, doubles: bool = True) -> NDArray[np.float64]:
     """The same steps in mm and degrees."""
-    whole, decimals = axis_steps(machine, inch)
+    whole, decimals = axis_steps(machine, inch, doubles)
     size = whole / 10.0**decimals
     if inch:
         for axis in machine.axes:

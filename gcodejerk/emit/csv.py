@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gcodejerk.emit.base import Form, Options, decimal_step, step_sizes
 from gcodejerk.emit.digits import Column, format_lines
 from gcodejerk.machine import AXES, Machine
-from gcodejerk.nc import Rapids
+from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.plans import Plans
 from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
 
@@ -34,7 +34,7 @@ class CsvController:
         """Every interval is written."""
         return 1
 
-    def spelling(self, rapids: Rapids, machine: Machine) -> Spelling:
+    def spelling(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> Spelling:
         """Multiples of the resolution, whatever the program's unit."""
         step = np.broadcast_to(step_sizes(machine, inch=False), rapids.start.shape)
         return Spelling(rapids.start, step, np.zeros_like(rapids.start))

@@ -13,9 +13,10 @@ A replaced block becomes, each line only where it is needed, here in LinuxCNC's 
     N120 G0 M8 (go)              what else the block says, byte for byte
     G4 P0                        the feed before ends here: a stream begins at rest
     G94 G64                      modes of the stream that are not in force, or not stated
-    G1 X0.0012 Y0.0006 F38.4     the points, the last with the words of the block itself
-    G0 F600. G61                 the modal values that the program relies on
-    M0                           what takes effect after motion
+    G1 X0.0012 Y0.0006 F38.4     the points
+    G1 G61 X10. Y5. F1.2         the last with the block's own words, and the exact stop
+    G0 F600.                     the modal values that the program relies on
+    M0                           what the control runs after the motion
 
 Rule: the last point repeats the block's own words, so the end is exactly the programmed one,
 whatever was rounded before.
@@ -46,8 +47,6 @@ FEED_DECIMALS = 4
 """Of F in units per minute."""
 COMMENT_LENGTH = 69
 """Controllers and senders with short lines choke on longer comments."""
-STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)
-"""M words that take effect after the block's motion."""
 FEED_GROUPS = ("XYZ", "UVW", "ABC")
 """F is the speed along the first of these groups that moves (LinuxCNC, G94)."""
 LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
@@ -67,12 +66,13 @@ class GcodeController:
         """About 2 ms."""
         return max(1, round(BLOCK_TIME / interval))
 
-    def spelling(self, rapids: Rapids, machine: Machine) -> Spelling:
+    def spelling(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> Spelling:
         """Steps in the program's own unit; increments are counted from the start."""
-        mm, inch = step_sizes(machine, inch=False), step_sizes(machine, inch=True)
+        doubles = writing_of(dialect).doubles
+        mm, inch = (step_sizes(machine, unit, doubles) for unit in (False, True))
         step = np.where(rapids.inch[:, np.newaxis], inch, mm)
         origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
-        return Spelling(rapids.start, step, origin)
+        return Spelling(rapids.start, step, origin, finer=doubles)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What a user of these streams has to know."""
@@ -102,7 +102,7 @@ class GcodeController:
         dialect = options.dialect
         parsed = [parse_block(block, dialect) for block in blocks]
         feed = _feed(_path_speed(batch, rapids), batch, rapids)
-        points = self._points(batch, rapids, line_ends, feed)
+        points = self._points(batch, rapids, line_ends, feed, writing_of(dialect).doubles)
         out = []
         for row, move in enumerate(moves):
             frame = _Frame(rapids, int(move), parsed[row], blocks[row], dialect)
@@ -124,6 +124,7 @@ class GcodeController:
         rapids: Rapids,
         line_ends: Sequence[bytes],
         feed: NDArray[np.int64],
+        doubles: bool,
     ) -> list[_Points]:
         """The points of every move but its last, formatted for all moves of one kind together."""
         moving = batch.plans.displacement[batch.moves] != 0.0
@@ -140,9 +141,8 @@ class GcodeController:
             kinds.setdefault(kind, []).append(row)
         out: list[_Points] = [_Points(b"", {})] * len(batch)
         for kind, rows in kinds.items():
-            for row, points in zip(
-                rows, _format_kind(batch, np.array(rows), kind, feed), strict=True
-            ):
+            made = _format_kind(batch, np.array(rows), kind, feed, doubles)
+            for row, points in zip(rows, made, strict=True):
                 out[row] = points
         return out
 
@@ -160,10 +160,10 @@ class _Kind:
 
 
 def _format_kind(
-    batch: Batch, rows: NDArray[np.int64], kind: _Kind, feed: NDArray[np.int64]
+    batch: Batch, rows: NDArray[np.int64], kind: _Kind, feed: NDArray[np.int64], doubles: bool
 ) -> list[_Points]:
     """Points of rows of one kind; the last point of each is left to its block's own words."""
-    whole_step, decimals = axis_steps(batch.plans.machine, kind.inch)
+    whole_step, decimals = axis_steps(batch.plans.machine, kind.inch, doubles)
     knots = batch.grid.knots[rows]
     inner = (knots > 0) & (knots < batch.grid.counts[rows, np.newaxis])
     counts = np.count_nonzero(inner, axis=1)
@@ -212,7 +212,12 @@ class _Frame:
         self.rapids, self.move, self.block, self.text = rapids, move, block, text
         self.dialect, self.writing = dialect, writing_of(dialect)
         self.axis_words = [w for w in block.words if w.letter in AXES or w.letter in self.turned]
-        self.stops = [w for w in block.words if w.letter == "M" and w.value in STOPS]
+        after = dialect.after_m
+        self.behind = [w for w in block.words if w.letter == "M" and w.value in after]
+        """What the control runs when the motion has ended."""
+        exact = None if dialect.exact_stop is None else dialect.exact_stop / 10
+        self.exact = [w for w in block.words if w.letter == "G" and w.value == exact]
+        """G9, which is about the end of the motion of its own block."""
 
     @property
     def turned(self) -> Mapping[str, str]:
@@ -223,11 +228,12 @@ class _Frame:
         """A comment that names the block, and the block without its axis words."""
         out = [self._comment()] if comments else []
         rest, at = [], 0
-        for word in sorted([*self.axis_words, *self.stops], key=lambda w: w.begin):
+        moved = [*self.axis_words, *self.behind, *self.exact]
+        for word in sorted(moved, key=lambda w: w.begin):
             rest.append(self.text[at : word.begin])
             at = word.end
         rest.append(self.text[at:])
-        others = [w for w in self.block.words if w not in self.axis_words and w not in self.stops]
+        others = [w for w in self.block.words if w not in moved]
         if self.block.comments or any(not (w.letter == "G" and w.value == 0.0) for w in others):
             out.append(b"".join(rest).rstrip(b" \t\r"))
         return out
@@ -260,7 +266,15 @@ class _Frame:
         """The last point: the block's own words, or what is left of its increments."""
         words = [self._last_word(word, before_end) for word in self.axis_words]
         words.append(b"F" + _plain(Decimal(feed).scaleb(-FEED_DECIMALS)))
-        return b" ".join([b"G1", *words])
+        return b" ".join([b"G1", *self._ending(), *words])
+
+    def _ending(self) -> list[bytes]:
+        """What lets the last point end in a standstill where the rapid did."""
+        path, dialect = int(self.rapids.path[self.move]), self.dialect
+        code = dialect.path_code(path) if path in (61, 62) else None
+        if code is None and (self.exact or dialect.stops_after_rapid):
+            code = dialect.exact_stop
+        return [] if code is None else [code_name(code)]
 
     def _last_word(self, word: Word, before_end: dict[int, Decimal]) -> bytes:
         axis = self.turned.get(word.letter)
@@ -279,21 +293,18 @@ class _Frame:
         return word.letter.encode() + _plain(left)
 
     def tail(self) -> list[bytes]:
-        """Restore the modal values, then stop where the block stops."""
+        """Restore the modal values, then say what the block says when its motion has ended."""
         rapids, move, dialect = self.rapids, self.move, self.dialect
         words = [b"G0"]
-        mode, path = int(rapids.feed_mode[move]), int(rapids.path[move])
+        mode = int(rapids.feed_mode[move])
         code = dialect.feed_code(mode)
         if mode != 94 and code is not None:
             words.append(code_name(code))
         if mode != 93 and not np.isnan(rapids.feed[move]):
             feed = _plain(Decimal(repr(float(rapids.feed[move]))))
             words.append(b"F" + (feed.rstrip(b"0").rstrip(b".") if self._whole() else feed))
-        code = dialect.path_code(path)
-        if path in (61, 62) and code is not None:
-            words.append(code_name(code))
-        stops = [b" ".join(b"".join(w.text.split()) for w in self.stops)] if self.stops else []
-        return [b" ".join(words), *stops]
+        behind = [b" ".join(b"".join(w.text.split()) for w in self.behind)] if self.behind else []
+        return [b" ".join(words), *behind]
 
     def _whole(self) -> bool:
         """Whether F has to go without a decimal point, as it was written."""

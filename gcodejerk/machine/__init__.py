@@ -12,6 +12,7 @@ from gcodejerk.machine.model import (
     Spectrum,
 )
 from gcodejerk.machine.problems import MachineFileError
+from gcodejerk.machine.resolution import resolution_warnings
 from gcodejerk.machine.schema import machine_schema
 from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.writer import machine_yaml
@@ -30,4 +31,5 @@ __all__ = [
     "find_machine",
     "machine_schema",
     "machine_yaml",
+    "resolution_warnings",
 ]

@@ -24,6 +24,7 @@ from gcodejerk.machine.model import (
     Spectrum,
 )
 from gcodejerk.machine.problems import Problems
+from gcodejerk.machine.resolution import COARSEST
 from gcodejerk.machine.spectrum import load_spectrum
 from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 
@@ -55,6 +56,7 @@ def load_text(text: str, name: str) -> Machine:
     checker = Checker(Document(text, name), problems)
     values = checker.read()
     _check_axis_types(values, checker)
+    _check_resolutions(values, checker)
     spectra = _spectra(values, Path(name).parent, checker)
     _check_frequencies(values, checker)
     _check_participations(values, checker)
@@ -82,6 +84,20 @@ def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
                 checker.place(("axes", name, "diameter")),
                 f"axes.{name}.diameter is true, expected false: only X is given as a diameter",
                 "leave diameter out",
+            )
+
+
+def _check_resolutions(values: dict[str, Any], checker: Checker) -> None:
+    """Refuse steps so coarse that no rapid could be written in them."""
+    for name, axis in values.get("axes", {}).items():
+        resolution = axis.get("resolution")
+        if isinstance(resolution, float) and resolution > COARSEST:
+            unit = "deg" if axis.get("type") == "rotary" or name in "ABC" else "mm"
+            checker.problems.add(
+                checker.place(("axes", name, "resolution")),
+                f"axes.{name}.resolution is {resolution:g}, expected at most {COARSEST:g} [{unit}]",
+                "give the control's least increment, for example 0.001; a steps-per-mm figure is "
+                "its inverse",
             )
 
 

@@ -14,7 +14,7 @@ LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
 
 BLANKS = re.compile(rb"[ \t]*")
-SHAPE = re.compile(rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+SHAPE = re.compile(rb"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 CLOSED_NUMBER = re.compile(rb"[-+]?[ \t]*[0-9.]*")
 _UNSIGNED = re.compile(rb"[0-9]+(?:\.[0-9]*)?")
 _OPERATOR_TEXT = re.compile(rb"[ \t]*([A-Za-z][A-Za-z \t]*?)[ \t]*(?=\[)")

@@ -165,11 +165,18 @@ class Arithmetic:
 
 @dataclass(frozen=True, slots=True)
 class Writing:
-    """How a stream is spelled in the dialect."""
+    """How a stream is spelled in the dialect, and what its control keeps of a number."""
 
     comment: tuple[bytes, bytes] = (b"(", b")")
     standstill: bytes = b"G4 P0"
     """A block that waits until the machine stands."""
+    line_limit: int = 0
+    """Longest line that is written, in bytes; 0: the longest that the control reads."""
+    digits: int = 15
+    """Most digits of a number of a point, leading zeros left out."""
+    doubles: bool = False
+    """The control computes with the decimals of a double: steps finer than an axis's resolution are
+    kept, and not rounded one by one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +281,15 @@ class Dialect:
     arcs: frozenset[int] = frozenset({20, 30})
     harmless: frozenset[int] = frozenset({0})
     """G codes whose effect does not depend on when, within its block, a rapid runs."""
-    harmless_m: frozenset[int] = frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9})
+    before_m: frozenset[int] = frozenset()
+    """M codes that the control runs before the motion of their block: they stay in front of a
+    stream. One that stands neither here nor in `after_m` runs when the builder, or nobody, says."""
+    after_m: frozenset[int] = frozenset({0, 1, 2, 30})
+    """M codes that it runs when the motion has ended: they go behind a stream."""
+    exact_stop: int | None = None
+    """G code that lets the motion of its own block alone end in a standstill."""
+    stops_after_rapid: bool = False
+    """Every G0 ends in a standstill, checked before the next block begins."""
     quick: bool = False
     """Plain lines mean what they mean in RS274/NGC, so that they can be read as arrays."""
     writing: Writing | None = None

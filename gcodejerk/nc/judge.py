@@ -187,7 +187,7 @@ def _judge_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
     others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
     if (
         any(code not in dialect.harmless for code in codes.g.values())
-        or any(m not in dialect.harmless_m for m in codes.m)
+        or not dialect.before_m | dialect.after_m >= set(codes.m)
         or others
         or codes.names
         or codes.functions

@@ -20,6 +20,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -33,6 +34,7 @@ from gcodejerk.verification.findings import Findings, Kind, Verification, Violat
 from gcodejerk.verification.form import Stream
 from gcodejerk.verification.points import Paths, Reader, check_line, check_rapids
 from gcodejerk.verification.source import Window
+from gcodejerk.verification.stamp import read_stamp
 from gcodejerk.verification.table import TableReader
 from gcodejerk.verification.walk import Walk
 
@@ -68,9 +70,9 @@ def verify(
     original, processed : bytes, str or Path
         The programs themselves, or the names of their files. A file is read in bounded memory.
     machine : Machine
-        What the program was processed for.
+        What the program was processed for. The profile is that of the stamp, where there is one.
     dialect : str or Dialect, optional
-        How the original is written; the machine's by default.
+        How the original is written; the stamp's by default, or the machine's.
     most : int, optional
         Violations after which it stops.
 
@@ -99,6 +101,10 @@ def verify(
     with ExitStack() as stack:
         one, other = (stack.enter_context(_opened(given)) for given in (original, processed))
         names = (_name(original, NAMES[0]), _name(processed, NAMES[1]))
+        stamp = read_stamp(other, machine)
+        if stamp is not None and stamp.known and stamp.profile is not None:
+            design = replace(machine.design, profile=stamp.profile)
+            machine, dialect = replace(machine, design=design), dialect or stamp.dialect
         return verify_files(one, other, machine, names=names, dialect=dialect, most=most)
 
 
@@ -160,7 +166,7 @@ def verify_files(
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
-    walk = Walk(Window(original), Window(processed), program, found)
+    walk = Walk(Window(original), Window(processed), program, machine, found)
     reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
     stride = stride_of(machine)
     for streams in _batches(_checked(walk, reader)):

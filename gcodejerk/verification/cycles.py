@@ -42,8 +42,8 @@ CLEARANCE = Fraction(10, 1000)
 MOST_PECKS = 20_000
 """Of one block, repeats included."""
 
-_MOVE = re.compile(rb"(G0|G1)((?: [XYZ][-+]?\d*\.?\d*)+)")
-_DWELL = re.compile(rb"G4 P(\d*\.?\d*)")
+_MOVE = re.compile(rb"(G0|G1)((?: [XYZ][-+]?\d*(?:\.\d*)?)+)")
+_DWELL = re.compile(rb"G4 P(\d*(?:\.\d*)?)")
 QUIET_G = frozenset({17, 18, 19, 20, 21, 40, 90, 91, 90.1, 91.1, 94, 95, 98, 99})
 QUIET_M = frozenset({3, 4, 5, 7, 8, 9, 48, 49})
 STOPS = frozenset({0, 1, 2, 30, 60})

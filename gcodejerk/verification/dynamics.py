@@ -21,8 +21,9 @@ from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import rapid_time
 from gcodejerk.verification.feeds import NOT_OWN, judge_feeds, rapid_limits
 from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.independent import judge_axes
 from gcodejerk.verification.oscillators import Oscillators
-from gcodejerk.verification.points import Array, Index, Paths, resolutions
+from gcodejerk.verification.points import Array, Index, Paths
 from gcodejerk.verification.residual import leaves_more
 
 BLOCK_TIME = 0.002
@@ -69,11 +70,42 @@ def _move_time(limits: Array, displacement: Array, machine: Machine) -> Array:
     """Duration [s] of the fastest symmetric moves within limits, shape (3, moves, 9)."""
     if machine.positioning == "linear":
         return rapid_time(*limits.min(axis=2))
+    total: Array = _axis_times(limits, displacement).max(axis=1, initial=0.0)
+    return total
+
+
+def _axis_times(limits: Array, displacement: Array) -> Array:
+    """The same for each axis by itself, shape (moves, 9)."""
     moving = displacement != 0.0
     each = np.zeros(displacement.shape)
     each[moving] = rapid_time(*limits[:, moving])
-    total: Array = each.max(axis=1, initial=0.0)
-    return total
+    return each
+
+
+def _own_times(paths: Paths, machine: Machine) -> tuple[Array, Array]:
+    """What each axis takes by itself [s], shape (moves, 9): conventionally, and at most."""
+    dt, displacement = machine.interval, paths.displacement
+    each = _axis_times(rapid_limits(paths, machine), displacement)
+    usual = np.ceil(each / dt - ON_GRID)
+    if machine.design.profile == "shortest":
+        alone = _axis_times(_own_limits(displacement, machine), displacement)
+        longest = np.ceil((np.maximum(each, alone) + 2.0 * _periods(machine)) / dt)
+    else:
+        longest = np.floor(each * (1.0 + machine.design.max_extension) / dt + ON_GRID)
+    return usual * dt, np.maximum(usual, longest) * dt
+
+
+def _own_limits(displacement: Array, machine: Machine) -> Array:
+    """Limits of designs over the displacement, shape (3, moves, 9)."""
+    with np.errstate(divide="ignore"):
+        V, A, J = limits_of(machine)[:, np.newaxis, :] / np.abs(displacement)
+    # A design's acceleration rises for an interval at least.
+    return np.stack([V, A, np.minimum(J, A / machine.interval)])
+
+
+def _periods(machine: Machine) -> float:
+    """One period of every mode, one behind the other, in s."""
+    return float((2.0 * np.pi / Oscillators.of(machine).poles.imag).sum())
 
 
 def _longest(total: Array, displacement: Array, machine: Machine) -> Array:
@@ -82,14 +114,9 @@ def _longest(total: Array, displacement: Array, machine: Machine) -> Array:
     Two periods of every mode are enough to leave it at rest, whatever it does before; the time
     itself is that of the controller, or the least that the limits allow where that is longer.
     """
-    with np.errstate(divide="ignore"):
-        own = limits_of(machine)[:, np.newaxis, :] / np.abs(displacement)
-    # A design's acceleration rises for an interval at least.
-    V, A, J = own
-    own = np.stack([V, A, np.minimum(J, A / machine.interval)])
-    fastest = _move_time(own, displacement, machine)
-    periods = (2.0 * np.pi / Oscillators.of(machine).poles.imag).sum()
-    longest: Array = np.ceil((np.maximum(total, fastest) + 2.0 * periods) / machine.interval)
+    fastest = _move_time(_own_limits(displacement, machine), displacement, machine)
+    time = np.maximum(total, fastest) + 2.0 * _periods(machine)
+    longest: Array = np.ceil(time / machine.interval)
     return longest
 
 
@@ -155,7 +182,9 @@ def _judge(paths: Paths, machine: Machine, clock: Clock) -> list[Complaint | Non
     """Look at each stream under one guess of its times."""
     out: list[Complaint | None] = [None] * len(paths.begin)
     t: Array = np.asarray(clock.moment * machine.interval, dtype=np.float64)
+    independent = machine.positioning != "linear"
     for kind, rows, problem in (
+        *(judge_axes(paths, machine, t, *_own_times(paths, machine)) if independent else ()),
         *_limits(paths, machine, t),
         *judge_feeds(paths, machine, t, limits_of(machine)),
     ):
@@ -194,6 +223,7 @@ def _take(paths: Paths, streams: Index) -> Paths:
         displacement=paths.displacement[streams],
         unit=paths.unit[streams],
         speed=paths.speed[streams],
+        step=paths.step[streams],
     )
 
 
@@ -252,14 +282,15 @@ _ORDERS = ((1, Kind.VELOCITY, "s"), (2, Kind.ACCELERATION, "s^2"), (3, Kind.JERK
 def _limits(paths: Paths, machine: Machine, t: Array) -> list[tuple[Kind, NDArray[np.bool_], str]]:
     """Compare every moving axis with what designs may use."""
     padded = Padded.of(paths, t)
-    limits, step = limits_of(machine), resolutions(machine)
+    limits = limits_of(machine)
     out = []
     for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
         x = (paths.position[:, a] - paths.start[paths.owner, a])[padded.row]
         for order, kind, unit in _ORDERS:
             limit = limits[order - 1, a]
             value, error, inside = padded.differences(x, order)
-            bad = inside & (np.abs(value) > limit * (1.0 + RELATIVE) + error * step[a])
+            step = paths.step[padded.owner[: len(value)], a]
+            bad = inside & (np.abs(value) > limit * (1.0 + RELATIVE) + error * step)
             if bad.any():
                 problem = f"{AXES[a]} passes its limit of {limit:g} mm/{unit}"
                 out.append((kind, padded.rows_of(order, bad, len(t)), problem))

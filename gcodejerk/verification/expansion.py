@@ -42,7 +42,7 @@ from gcodejerk.verification.findings import Findings, Kind, Verification
 from gcodejerk.verification.source import Window
 
 _CANDIDATE = re.compile(rb"[gG][0+ \t]*[678]|[mMoO#\[%]")
-_PATH = re.compile(rb"G64((?: [PQ]\d*\.?\d*)*)")
+_PATH = re.compile(rb"G64((?: [PQ]\d*(?:\.\d*)?)*)")
 
 
 def check_expansion(

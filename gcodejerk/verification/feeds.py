@@ -22,7 +22,7 @@ from gcodejerk.nc import AXES
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.conventional import peak_velocity, rapid_speed, rapid_time
 from gcodejerk.verification.findings import Kind
-from gcodejerk.verification.points import LINEAR, Array, Paths, feed_speed, resolutions
+from gcodejerk.verification.points import LINEAR, Array, Paths, feed_speed
 from gcodejerk.verification.speeds import RELATIVE, Blocks, Speeds
 
 FEED_STEP = 1e-3
@@ -102,7 +102,7 @@ class _Judge:
         self.F = np.where(self.first, 0.0, speed)
         self.rounding = (FEED_STEP / SECONDS_PER_MINUTE) * paths.unit[owner]
         D = np.abs(paths.displacement)
-        self.step = np.where(D > 0.0, resolutions(machine), 0.0)
+        self.step = np.where(D > 0.0, paths.step, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             unit = np.where(D > 0.0, limits[:, np.newaxis, :] * length[:, np.newaxis] / D, np.inf)
         self.path_limits: Array = unit.min(axis=2)

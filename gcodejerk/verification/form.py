@@ -1,113 +1,39 @@
 """The text that stands in the place of a rapid, read back.
 
 This module owns the form: which lines may follow each other, and a small machine for the modal
-words that may stand in them (motion, distance, feed, path). It judges by meaning: a mode word
-more or less, the number of decimals and the order of words make no difference; anything that it
-does not know is a violation.
+words that may stand in them (motion, distance, feed, path). What a line would do is judged first,
+so that a message says what would happen; then the line has to hold exactly the words that may stand
+there (`allowed`).
 
 Rule: what it cannot read it does not guess. `read_stream` then returns None, and the walk ends.
 """
 
 from __future__ import annotations
 
-import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Context, Decimal
 from functools import lru_cache
 
 from gcodejerk.nc import AXES, Block, Dialect, Rapids, parse_block
+from gcodejerk.verification.allowed import Allowed, point_pattern, too_long_a_number
 from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.modes import WORD, Modes, read_words
 from gcodejerk.verification.source import PIECE, Window
 
 LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
 """By `Rapids.terminator`."""
-STOPS = frozenset({0.0, 1.0, 2.0, 30.0, 60.0})
-"""M words that take effect after the motion of their block."""
 COMMENT_LENGTH = 69
+LINES_AT_ONCE = 512
 LONGEST_STREAM = 1 << 26
 """Bytes of one stream; more is not read."""
 
-# No axis needs more digits; numbers without bounds would be a way to stall the reading.
-_NUMBER = rb"[-+]?+(?:[0-9]{1,9}+(?:\.[0-9]{0,250}+)?+|\.[0-9]{1,250}+)(?![0-9.])"
-_WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
-_WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
 _IS_POINT = re.compile(rb"[ \t]*G0?1(?![0-9.])")
 _COMMENT = re.compile(rb"(?:\(gcodejerk: ([ -'*-~]*)\)|; gcodejerk: ([ -'*-~]*))")
 # Zero is zero with a decimal point and without.
-_WHOLE = re.compile(rb"[A-FH-Z][ \t]*+[-+]?+0*+[1-9][0-9]*+(?!\.)")
+_WHOLE = re.compile(rb"[A-FH-Z][ \t]*[-+]?0*[1-9][0-9]*(?![0-9.])")
 _EXACT = Context(prec=200)
-
-
-@dataclass(slots=True)
-class Modes:
-    """The modal words that a stream may touch."""
-
-    motion: int | None
-    distance: int
-    feed_mode: int
-    feed: Decimal | None
-    path: int
-    p: float
-    q: float
-
-    @classmethod
-    def after(cls, rapids: Rapids, i: int) -> Modes:
-        """List what the original has in force after the block of rapid i."""
-        feed = float(rapids.feed[i])
-        return cls(
-            0,
-            91 if rapids.incremental[i] else 90,
-            int(rapids.feed_mode[i]),
-            None if math.isnan(feed) else Decimal(repr(feed)),
-            int(rapids.path[i]),
-            float(rapids.path_p[i]),
-            float(rapids.path_q[i]),
-        )
-
-    def apply(self, words: list[tuple[str, Decimal]], dialect: Dialect) -> str | None:
-        """Execute a line without motion; what is wrong with it."""
-        writing = dialect.writing
-        if writing is not None and words == read_words(writing.standstill):
-            return None
-        seen = [letter + str(value) if letter == "G" else letter for letter, value in words]
-        if len(set(seen)) < len(seen):
-            return "a word stands twice"
-        codes = {int(value * 10) for letter, value in words if letter == "G" and not value * 10 % 1}
-        if len(codes) < sum(letter == "G" for letter, _ in words):
-            return "a code that is none"
-        values = {letter: value for letter, value in words if letter != "G"}
-        if not set(values) <= {"F", "P", "Q"}:
-            return f"word {min(set(values) - {'F', 'P', 'Q'})} has no place here"
-        groups = [dialect.groups.get(code) for code in codes]
-        if len(set(groups)) < len(groups):
-            return "two codes of one modal group"
-        known = {0, *dialect.feed_modes, *dialect.paths}
-        known |= {code for code in (900, 910) if dialect.groups.get(code) == "distance"}
-        if not codes <= known:
-            return f"G{min(codes - known) / 10:g} has no place here"
-        if ("P" in values or "Q" in values) and 640 not in codes:
-            return "P or Q without G64"
-        self._set(codes, values, dialect)
-        return None
-
-    def _set(self, codes: set[int], values: dict[str, Decimal], dialect: Dialect) -> None:
-        """Change what the words say, the feed mode before the feed."""
-        for code in codes:
-            if code == 0:
-                self.motion = 0
-            elif code in dialect.feed_modes:
-                mode = dialect.feed_modes[code]
-                if mode != self.feed_mode:
-                    self.feed_mode, self.feed = mode, None
-            elif code in (900, 910):
-                self.distance = code // 10
-            else:
-                self.path = dialect.paths[code]
-                self.p = float(values.get("P", math.nan)) if code == 640 else math.nan
-                self.q = float(values.get("Q", math.nan)) if code == 640 else math.nan
-        if "F" in values:
-            self.feed = values["F"]
 
 
 @dataclass(slots=True)
@@ -140,7 +66,7 @@ class Stream:
     def sums(self) -> dict[str, Decimal]:
         """Sum of the numbers of each axis, exactly."""
         sums = dict.fromkeys(self.letters, Decimal(0))
-        for letter, number in _WORD.findall(self.text):
+        for letter, number in WORD.findall(self.text):
             axis = letter.decode()
             if axis in sums:
                 sums[axis] = _EXACT.add(sums[axis], Decimal(number.decode()))
@@ -150,16 +76,17 @@ class Stream:
         return sums
 
 
-def read_words(line: bytes) -> list[tuple[str, Decimal]] | None:
-    """Read the words of a line that holds nothing else; None where it does."""
-    if not _WORDS.fullmatch(line):
-        return None
-    return [(letter.decode(), Decimal(text.decode())) for letter, text in _WORD.findall(line)]
-
-
-def head_of(block: Block, text: bytes, axes: str) -> tuple[bytes, bool]:
-    """Take axis words and stops out of a block; what is left, and whether it says anything."""
-    out = [w for w in block.words if w.letter in axes or _is_stop(w.letter, w.value)]
+def head_of(block: Block, text: bytes, dialect: Dialect) -> tuple[bytes, bool]:
+    """Take out of a block what stands elsewhere; what is left, and whether it says anything."""
+    axes = AXES + "".join(dialect.increments)
+    exact = None if dialect.exact_stop is None else dialect.exact_stop / 10
+    out = [
+        w
+        for w in block.words
+        if w.letter in axes
+        or (w.letter == "M" and w.value in dialect.after_m)
+        or (w.letter == "G" and w.value == exact)
+    ]
     kept, at = [], 0
     for word in sorted(out, key=lambda w: w.begin):
         kept.append(text[at : word.begin])
@@ -169,17 +96,21 @@ def head_of(block: Block, text: bytes, axes: str) -> tuple[bytes, bool]:
     return b"".join(kept), bool(left or block.comments)
 
 
-def _is_stop(letter: str, value: float | None) -> bool:
-    return letter == "M" and value in STOPS
-
-
 @lru_cache(maxsize=256)
-def _run_of(letters: str, line_end: bytes) -> re.Pattern[bytes]:
-    """Lines of points with these axes, one after another."""
-    words = b"".join(
-        rb"[ \t]*+" + letter.encode() + rb"[ \t]*+" + _NUMBER for letter in letters + "F"
-    )
-    return re.compile(rb"(?:G0?1" + words + rb"[ \t]*+" + re.escape(line_end) + rb")*+")
+def _run_of(point: bytes, line_end: bytes) -> re.Pattern[bytes]:
+    """Points of one pattern, one after another, at most LINES_AT_ONCE of them.
+
+    A repeat remembers every turn that it could still take back; so it is bounded, and repeated.
+    """
+    line = rb"(?:" + point + re.escape(line_end) + rb")"
+    return re.compile(line + rb"{1,%d}" % LINES_AT_ONCE)
+
+
+def _run_end(pattern: re.Pattern[bytes], data: bytes, begin: int, end: int) -> int:
+    """Where the lines end that a pattern of `_run_of` matches one behind the other."""
+    while match := pattern.match(data, begin, end):
+        begin = match.end()
+    return begin
 
 
 class StreamReader:
@@ -194,8 +125,10 @@ class StreamReader:
         newline: bytes,
         found: Findings,
         dialect: Dialect,
+        decimals: Mapping[str, int],
+        follows: bool,
     ) -> None:
-        self.dialect = dialect
+        self.dialect, self.decimals = dialect, decimals
         self.window, self.rapids, self.i, self.text, self.found = window, rapids, i, text, found
         self.original_line = int(rapids.line[i])
         last = LINE_ENDS[int(rapids.terminator[i])]
@@ -203,6 +136,7 @@ class StreamReader:
         self.line_end = last if last.endswith(b"\n") else newline
         self.block = parse_block(text, dialect)
         self.modes = Modes.after(rapids, i)
+        self.allowed = Allowed.of(rapids, i, self.block, dialect, follows)
 
     def complain(self, kind: Kind, problem: str, line: int | None = None) -> None:
         """Note what is wrong."""
@@ -212,9 +146,16 @@ class StreamReader:
         """Look at the next line without its end."""
         return self.window.peek_line().rstrip(b"\r\n")
 
+    def _measure(self, length: int) -> None:
+        """What is written fits into the lines that the control reads."""
+        if length > self.allowed.limit:
+            limit = f"{self.allowed.limit} characters"
+            self.complain(Kind.FORM, f"line of {length} characters, the control reads {limit}")
+
     def next(self) -> None:
         """Go to the next line; the end of this one must be the block's."""
         line = self.window.peek_line()
+        self._measure(len(line.rstrip(b"\r\n")))
         if not line.endswith(self.line_end) or line.endswith(b"\r" + self.line_end):
             self.complain(Kind.LINE_END, f"line end is not {self.line_end!r} as in the original")
         self.window.skip(len(line))
@@ -228,6 +169,7 @@ class StreamReader:
         if self.last_end.endswith(b"\n"):
             self.next()
             return
+        self._measure(len(line.rstrip(b"\r\n")))
         if line.rstrip(b"\r\n") + self.last_end != line:
             self.complain(Kind.LINE_END, "the file's last line does not end as it did")
         self.window.skip(len(line))
@@ -262,8 +204,7 @@ class StreamReader:
         self.next()
 
     def _head(self) -> bool:
-        axes = AXES + "".join(self.dialect.increments)
-        head, needed = head_of(self.block, self.text, axes)
+        head, needed = head_of(self.block, self.text, self.dialect)
         line = self.peek()
         if line in (head, head.rstrip(b" \t")) and line.strip():
             self.next()
@@ -281,6 +222,7 @@ class StreamReader:
 
     def _setup(self) -> bool:
         """Pass the lines in front of the points."""
+        writing, lines = self.dialect.writing, []
         for _ in range(4):
             line = self.peek()
             if _IS_POINT.match(line):
@@ -291,7 +233,28 @@ class StreamReader:
                 shown = line[:60].decode("latin-1")
                 self.complain(Kind.FORM, f"{problem}: '{shown}'")
                 return False
+            lines.append(line)
             self.next()
+        before = len(self.found.violations)
+        self._modes_of_points()
+        if len(self.found.violations) == before and writing is not None:
+            self._exact_setup(lines, writing.standstill)
+        return True
+
+    def _exact_setup(self, lines: list[bytes], standstill: bytes) -> None:
+        """The lines in front of the points hold what they have to, and nothing else."""
+        stands = bool(lines) and lines[0] == standstill
+        rest = lines[stands:]
+        if stands != self.allowed.standstill:
+            how = "missing" if self.allowed.standstill else "not needed"
+            self.complain(Kind.FORM, f"'{standstill.decode()}' in front of the points is {how}")
+        elif len(rest) > 1:
+            self.complain(Kind.FORM, "modes of a stream stand in one line")
+        elif rest and (problem := self.allowed.setup_problem(read_words(rest[0]) or [])):
+            self.complain(Kind.FORM, f"{problem}: '{rest[0][:60].decode('latin-1')}'")
+
+    def _modes_of_points(self) -> None:
+        """What is in force is what a stream needs."""
         modes = self.modes
         if modes.feed_mode != 94:
             self.complain(Kind.MODE, f"feed mode is G{modes.feed_mode or '?'}, a stream needs G94")
@@ -299,7 +262,6 @@ class StreamReader:
             self.complain(Kind.MODE, "exact stop or exact path is in force, a stream needs G64")
         if (modes.distance == 91) != bool(self.rapids.incremental[self.i]):
             self.complain(Kind.MODE, "distance mode is not that of the original")
-        return True
 
     def _points(self) -> Stream | None:
         window, first = self.window, self.window.line
@@ -318,17 +280,18 @@ class StreamReader:
             size = 1 << 13
             while True:
                 have = window.fill(size)
-                match = _run_of(letters, self.line_end).match(
-                    window.data, window.at, window.at + have
-                )
-                assert match is not None
-                if have < size or match.end() < window.at + have - 512 or size > LONGEST_STREAM:
+                pattern = self._run(letters)
+                end = _run_end(pattern, window.data, window.at, window.at + have)
+                if have < size or end < window.at + have - 512 or size > LONGEST_STREAM:
                     break
                 size *= 4
-            stream.text = match[0]
-            window.skip(len(match[0]))
+            stream.text = window.data[window.at : end]
+            window.skip(len(stream.text))
+        ending = None
         while _IS_POINT.match(line := self.peek()):
             words = read_words(line)
+            if words and words[1:2] and words[1][0] == "G":
+                ending = int(words.pop(1)[1] * 10) if ending is None else -1
             by_letter = dict(words[1:]) if words else {}
             if not words or words[0] != ("G", Decimal(1)) or len(by_letter) != len(words) - 1:
                 self.complain(Kind.FORM, f"this is no point: '{line[:60].decode('latin-1')}'")
@@ -341,10 +304,33 @@ class StreamReader:
                 self.complain(Kind.FORM, "stream is endless")
                 return None
             self._points_in(line)
+            if number := too_long_a_number(line, self.text):
+                self.complain(Kind.FORM, f"{number[:20].decode()}... has more digits than any word")
             self.next()
         self._points_in(stream.text)
+        if len(stream.rest) > 1 and stream.letters:
+            self.complain(Kind.FORM, "points before the last are not written alike", first)
+        if set(stream.letters) - self.allowed.axes and len(stream.rest) == 1:
+            self.complain(Kind.AXES, "points name axes that stand still", first)
+        self._measure(max(map(len, stream.text.splitlines()), default=0))
+        self._end_of_points(ending)
         self.modes.motion, self.modes.feed = 1, None
         return stream
+
+    def _run(self, letters: str) -> re.Pattern[bytes]:
+        """Points with these axes, spelled as they may be."""
+        inch = bool(self.rapids.inch[self.i])
+        return _run_of(point_pattern(letters, self.decimals, self.dialect, inch), self.line_end)
+
+    def _end_of_points(self, ending: int | None) -> None:
+        """The last point ends in a standstill where the rapid did."""
+        wanted = self.allowed.ending
+        if ending != wanted:
+            name = "no G code" if wanted is None else f"G{wanted / 10:g}"
+            line = self.window.line - 1
+            self.complain(Kind.PATH, f"the last point has {name} beside its G1", line)
+        elif wanted is not None and wanted in self.dialect.paths:
+            self.modes.path = self.dialect.paths[wanted]
 
     def _points_in(self, text: bytes) -> None:
         """Where X12 may be 12 steps of the control, every length has its decimal point."""
@@ -353,15 +339,21 @@ class StreamReader:
             self.complain(Kind.FORM, f"{shown} has no decimal point: the control may scale it")
 
     def _tail(self) -> bool:
-        stops = [(w.letter, w.value) for w in self.block.words if _is_stop(w.letter, w.value)]
+        stops = list(self.allowed.behind)
         line = self.window.peek_line().rstrip(b"\r\n")
         words = read_words(line)
         problem = "the modes are not restored" if words is None else self._apply(words)
         if problem:
             self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
             return False
+        before = len(self.found.violations)
         self._compare(Modes.after(self.rapids, self.i))
         self._same_scale(line)
+        problem = self.allowed.tail_problem(words or [])
+        if problem and len(self.found.violations) == before:
+            self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
+        if number := too_long_a_number(line, b""):
+            self.complain(Kind.FORM, f"{number[:20].decode()}... has more digits than any word")
         self.last(more=bool(stops))
         if stops:
             line = self.window.peek_line().rstrip(b"\r\n")

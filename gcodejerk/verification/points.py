@@ -58,6 +58,8 @@ class Paths:
     """mm per unit of length."""
     speed: Array
     """What the controller's own rapid keeps to; NaN where only the axes limit it. [mm/s]"""
+    step: Array
+    """Smallest step that is written of each axis, shape (k, 9). [mm] or [deg]"""
 
     @property
     def count(self) -> Index:
@@ -77,6 +79,9 @@ class Reader:
         self.rapids, self.machine, self.found = rapids, machine, found
         self.dialect = dialect
         self.known = sum(1 << AXES.index(name) for name in machine.axis_names)
+        doubles = dialect.writing is None or dialect.writing.doubles
+        self.step = resolutions(machine) if doubles else written_steps(machine, inch=False)
+        self.inch_step = resolutions(machine) if doubles else written_steps(machine, inch=True)
 
     def check_end(self, stream: Stream, block: bytes) -> bool:
         """Compare axes and end with the words of the block, exactly; whether the axes are right."""
@@ -179,6 +184,7 @@ class Reader:
             displacement=displacement,
             unit=unit,
             speed=rapids.speed[index],
+            step=np.where(rapids.inch[index, np.newaxis], self.inch_step, self.step),
         )
 
 
@@ -232,6 +238,20 @@ def resolutions(machine: Machine) -> Array:
     return np.array([steps.get(axis, 0.0) for axis in AXES])
 
 
+def written_steps(machine: Machine, inch: bool) -> Array:
+    """The same where a control rounds each number to its least increment, a power of ten.
+
+    It is the resolution where some decimals write that in the program's unit.
+    """
+    out = resolutions(machine)
+    for k in np.flatnonzero(out):
+        unit = MM_PER_INCH if inch and LINEAR[k] else 1.0
+        written = Decimal(repr(round(float(out[k]), 9)))
+        if unit != 1.0 or abs(float(written) - out[k]) > 1e-6 * out[k]:
+            out[k] = unit * 10.0 ** np.ceil(np.log10(out[k] / unit) - 1e-9)
+    return out
+
+
 def check_rapids(paths: Paths, rapids: Rapids, machine: Machine, found: Findings) -> None:
     """Length and travel: whether these rapids may be replaced at all."""
     D = paths.displacement
@@ -260,8 +280,8 @@ def check_rapids(paths: Paths, rapids: Rapids, machine: Machine, found: Findings
 
 def check_line(paths: Paths, machine: Machine, found: Findings) -> None:
     """Every point lies on the way from start to end, in order, within a step of the line."""
-    step = resolutions(machine)
     owner = paths.owner
+    step = paths.step[owner]
     D = paths.displacement[owner]
     moved = paths.position - paths.start[owner]
     still = (D == 0.0) & (np.abs(moved) > TINY)

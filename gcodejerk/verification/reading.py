@@ -24,7 +24,7 @@ PIECE = 1 << 20
 """Bytes in memory at a time."""
 NAN = math.nan
 _BLANKS = b" \t"
-_NUMBER = rb"[-+]?+(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?![0-9.])"
+_NUMBER = rb"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?![0-9.])"
 _WORD = re.compile(rb"([A-Z])[ \t]*(" + _NUMBER + rb"|[-+]?#)[ \t]*")
 _INDEX = rb"(?:[ \t]*[0-9]+|[ \t]*<[^<>]*>)"
 _VARIABLE = re.compile(rb"#(?:[ \t]*#)*" + _INDEX)
@@ -47,6 +47,8 @@ _NAMED_JUMPS = re.compile(rb"\b(?:GOTO[FBCS]?|WHILE|REPEATB?|UNTIL|LOOP|FOR|CASE
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
 _STRING = re.compile(rb"([A-Z])[ \t]*=[ \t]*\"[^\"]*\"")
+RUN_LINES = 512
+"""Lines of a run in one match."""
 
 
 @dataclass(slots=True)
@@ -116,27 +118,37 @@ class Text:
         level = rb"[0-9]?" if rules.delete == "numbered" else b""
         number = rb"(?:N[0-9]+[ \t]*)?" if rules.delete == "numbered" else b""
         self.delete = re.compile(rb"[ \t]*" + number + rb"/" + level)
-        self.run, self.run_stated = self._runs(decimals_matter)
+        self.run, self.run_stated, self.run_on = self._runs(decimals_matter)
 
-    def _runs(self, decimals_matter: bool) -> tuple[re.Pattern[bytes], re.Pattern[bytes]]:
-        """Patterns of a run of feed moves; of the second, the first line states its code."""
+    def _runs(self, decimals_matter: bool) -> tuple[re.Pattern[bytes], ...]:
+        """Patterns of the begin of a run of feed moves, and of what may follow.
+
+        Of the second, the first line states its code. Nothing in them matches in two ways, so that
+        a line that does not match costs its length, and a repeat, which remembers every turn that
+        it could still take back, is bounded.
+        """
         rules, dialect = self.dialect.text, self.dialect
-        number = rb"[-+]?+(?:[0-9]++\.[0-9]*+|\.[0-9]++)" if decimals_matter else _NUMBER
+        number = rb"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?![0-9.])" if decimals_matter else _NUMBER
         letters = "".join(a for a in AXES if a in dialect.letters and a not in dialect.increments)
         letters = "".join(a for a in letters if a not in dialect.tool_frame)
         extra = "E" if dialect.one_command else "IJKR"
-        word = rb"(?:[" + (letters + extra).encode() + rb"][ \t]*+" + number + rb"[ \t]*+)"
-        feed = rb"(?:F[ \t]*+" + _NUMBER + rb"[ \t]*+)?+"
-        line_number = rb"[ \t]*+(?:N[ \t]*+[0-9]++[ \t]*+)?+"
+        word = rb"(?:[" + (letters + extra).encode() + rb"][ \t]*" + number + rb"[ \t]*)"
+        feed = rb"(?:F[ \t]*" + _NUMBER + rb"[ \t]*)?"
+        line_number = rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?"
         arcs = b"".join(b"%d" % (code // 10) for code in dialect.arcs if code in (20, 30))
-        code = rb"G0?+[1" + arcs + rb"](?![0-9.])[ \t]*+"
-        comment = rb"(?:\((?![ \t]*[pP][yY])[^()\r\n]*+\)[ \t]*+)?+"
+        code = rb"G0?[1" + arcs + rb"](?![0-9.])[ \t]*"
+        comment = rb"(?:\((?![ \t]*[pP][yY])[^()\r\n]*\)[ \t]*)?"
         comment = b"" if rules.parentheses == "code" else comment
-        rest = word + rb"++" + feed + comment + rb"\r?+\n"
-        free = code if not dialect.modal_motion else rb"(?:" + code + rb")?+"
+        rest = word + rb"+" + feed + comment + rb"\r?\n"
+        free = code if not dialect.modal_motion else rb"(?:" + code + rb")?"
         lines = rb"(?:" + line_number + free + rest + rb")"
         stated = line_number + code + rest
-        return re.compile(lines + rb"{4,}+"), re.compile(stated + lines + rb"{3,}+")
+        most = rb"%d}" % RUN_LINES
+        return (
+            re.compile(lines + rb"{4," + most),
+            re.compile(stated + lines + rb"{3," + most),
+            re.compile(lines + rb"{1," + most),
+        )
 
     def take_run(self, data: bytes, at: int, stated: bool) -> tuple[Run, int] | None:
         """Take a run, if one begins here.
@@ -153,7 +165,10 @@ class Text:
         match = (self.run_stated if stated else self.run).match(data, at)
         if match is None:
             return None
-        text = match[0]
+        end = match.end()
+        while more := self.run_on.match(data, end):
+            end = more.end()
+        text = data[at:end]
         lines = text.count(b"\n")
         if b"(" in text:
             text = re.sub(rb"\([^()]*\)", b"", text)
@@ -168,7 +183,7 @@ class Text:
                 whole = whole or (letter == "F" and b"." not in number[2])
         place = text.rfind(b"G")
         code = None if place < 0 else int(text[place + 1 : place + 3].lstrip(b"0")[:1]) * 10
-        return Run(lines, last, whole, code), match.end()
+        return Run(lines, last, whole, code), end
 
     def read(self, text: bytes, first: bool) -> Line:
         """Read one line.

@@ -28,7 +28,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import box_widths, rapid_position
 from gcodejerk.verification.oscillators import Oscillators
-from gcodejerk.verification.points import Array, Index, Paths, resolutions
+from gcodejerk.verification.points import Array, Index, Paths
 
 RELATIVE = 0.02
 """Share by which a stream may leave more: straight lines filter both motions nearly alike."""
@@ -171,7 +171,7 @@ class _Streams:
 
     def noise(self, modes: Oscillators) -> Array:
         """What rounding to steps may add, shape (streams,) [mm]."""
-        step = np.where(self.paths.displacement != 0.0, resolutions(self.machine), 0.0)
+        step = np.where(self.paths.displacement != 0.0, self.paths.step, 0.0)
         blocks = np.maximum(self.paths.count, 1)
         h = (self.count * self.machine.interval / blocks)[:, np.newaxis]
         omega = np.abs(modes.poles)

@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES, CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.points import STANDSTILL, Array, Paths
+from gcodejerk.verification.points import STANDSTILL, Array, Paths, resolutions
 
 PIECE = 1 << 20
+ROWS = 512
+"""Rows in one match: a repeat remembers every turn that it could still take back."""
 EXACT = 1e-11
 """A position in mm written in full. [mm]"""
 _NUMBER = rb"-?(?:[0-9]{1,9}(?:\.[0-9]{0,250})?|\.[0-9]{1,250})"
@@ -33,7 +35,7 @@ class TableReader:
         self.known = sum(1 << column for column in self.columns)
         value = rb",(?:" + _NUMBER + rb"|nan)"
         self.row = re.compile(
-            rb"(?:[0-9]{1,12}," + _NUMBER + value * len(self.columns) + rb"\r?\n)*+"
+            rb"(?:[0-9]{1,12}," + _NUMBER + value * len(self.columns) + rb"\r?\n){1,%d}" % ROWS
         )
         self.line = 1
         """Of the next row, in the table."""
@@ -52,10 +54,11 @@ class TableReader:
         self.line = 2
         kept = np.zeros((0, 2 + len(self.columns)))
         while text := self._piece():
-            match = self.row.match(text)
-            assert match is not None
-            if match.end() < len(text):
-                line = self.line + len(kept) + text.count(b"\n", 0, match.end())
+            end = 0
+            while match := self.row.match(text, end):
+                end = match.end()
+            if end < len(text):
+                line = self.line + len(kept) + text.count(b"\n", 0, end)
                 self.found.add(Kind.TABLE, line, None, "this is no row of a table")
                 return
             numbers = np.fromstring(text.replace(b"\n", b",").decode("ascii"), sep=",")
@@ -163,4 +166,5 @@ class TableReader:
             displacement=displacement,
             unit=np.ones(len(index)),
             speed=self.rapids.speed[index],
+            step=np.tile(resolutions(self.machine), (len(index), 1)),
         )

@@ -11,7 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, REASONS, Program, find_dialect
+from gcodejerk.verification.allowed import decimals_of, line_limit
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.form import LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.source import Window, skip_common
@@ -25,7 +27,12 @@ class Walk:
     """One walk through an original and what was made of it."""
 
     def __init__(
-        self, original: Window, processed: Window, program: Program, found: Findings
+        self,
+        original: Window,
+        processed: Window,
+        program: Program,
+        machine: Machine,
+        found: Findings,
     ) -> None:
         self.original, self.processed = original, processed
         self.program, self.found = program, found
@@ -37,6 +44,7 @@ class Walk:
         self.block = b""
         """Text of the block whose stream was found last."""
         self.dialect = find_dialect(program.dialect)
+        self.decimals = decimals_of(machine)
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 
@@ -67,6 +75,8 @@ class Walk:
                     self.program.newline,
                     self.found,
                     self.dialect,
+                    self.decimals,
+                    self._follows(i),
                 )
                 if not self._is_stream(reader, block, i):
                     return
@@ -80,6 +90,11 @@ class Walk:
             self.at += len(block)
         if self._same(None):
             self._end()
+
+    def _follows(self, i: int) -> bool:
+        """Whether the line in front of a rapid is one that has a stream: the machine then rests."""
+        line = self.program.rapids.line
+        return bool(self.replaced) and self.replaced[-1] == i - 1 and line[i - 1] + 1 == line[i]
 
     def _goes_on(self, block: bytes) -> bool:
         """Whether a last line without end is followed by more."""
@@ -133,6 +148,8 @@ class Walk:
         proper = proper and not set(b"()") & set(body[len(opens) : len(body) - len(closes)])
         if not proper or not all(32 <= byte < 127 for byte in body):
             self._complain(Kind.STAMP, "stamp is not one comment of plain characters")
+        if len(body) > line_limit(self.dialect):
+            self._complain(Kind.STAMP, "stamp is longer than the lines that the control reads")
         if line[len(body) :] != self.program.newline:
             self._complain(Kind.STAMP, "stamp does not end as the lines of the original do")
         self.processed.skip(len(line))

@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.machine import Machine, find_machine
+from gcodejerk.nc import DIALECTS as DIALECTS_BY_NAME
 from gcodejerk.pipeline import process
 from gcodejerk.testing.vocabulary import VOCABULARIES
 from gcodejerk.verification import verify
@@ -28,6 +29,8 @@ SETTINGS = settings(
 )
 DIALECTS = ["linuxcnc", *sorted(VOCABULARIES)]
 POINT = re.compile(rb"G1 .*F[0-9.]+")
+ZEROS = b"0" * 240
+STANDSTILL = rb"((?:G4 [PF]|M400)[^\r\n]*\r?\n)"
 COMMENTS = (b"(gcodejerk: ", b"; gcodejerk: ")
 SUM = re.compile(rb"(gcodejerk stamp [ -~]{1,40}? sum:)([0-9a-f]{16})")
 AXIS = rb"([XYZABC])(-?[0-9.]+)"
@@ -63,6 +66,11 @@ def calm_programs(draw, dialect):
         # Rapids of printers run at F: at a low one, a point less is no more than rounding.
         feed = "F3000" if stated else "F90"
         between = [f"G1 X2.5 {feed}", "M5", words.comments[0]]
+    # What the control runs in front of the motion, behind it, and at a time of its own.
+    table = DIALECTS_BY_NAME[dialect]
+    others = [f" M{m}" for m in (8, 1, 5) if m in table.before_m | table.after_m]
+    if table.exact_stop is not None and table.exact_stop in table.harmless:
+        others.append(" G9")
     for _ in range(draw(st.integers(2, 4))):
         named = draw(st.lists(st.sampled_from(axes), min_size=1, max_size=3, unique=True))
         mode = draw(st.sampled_from(["G90 ", "G91 ", ""])) if incremental else ""
@@ -72,7 +80,7 @@ def calm_programs(draw, dialect):
             for _ in named
         ]
         texts = [f"{a}{v / 25.4 if inch else v:.4f}" for a, v in zip(named, values, strict=True)]
-        beside = "" if stated else draw(st.sampled_from(["", " M8", " M8", " M1"]))
+        beside = "" if stated else draw(st.sampled_from(["", *others]))
         lines.append(f"{mode}G0 {' '.join(texts)}{beside}")
         lines.append(draw(st.sampled_from(between)))
     if words is not None and draw(st.booleans()):
@@ -126,6 +134,20 @@ class Text:
             else:
                 runs.append([n])
         return runs
+
+    def heads(self):
+        """Lines between a stream's comment and its points."""
+        ours = {*self.points, *self.tails, *self.comments, self.stamp}
+        return [
+            n
+            for run in self.runs()
+            for n in range(max(k for k in self.comments if k < run[0]) + 1, run[0])
+            if n not in ours
+        ]
+
+    def stops(self):
+        """Whether an exact stop is in force, so that a stream begins with G64 anyway."""
+        return any(b"G64" in self.lines[n] for n in self.heads())
 
     def text(self, run):
         return b"".join(self.lines[n] for n in run)
@@ -275,9 +297,42 @@ DAMAGE = {
     "G0 turned G1": lambda t, p, e: t.sub(e, rb"G0", b"G1"),
     "F not restored": lambda t, p, e: _of(t, t.tails, rb" F[0-9.]+", b""),
     "F restored wrongly": lambda t, p, e: _of(t, t.tails, rb"F([0-9.]+)", _scaled(1.01)),
-    "G61 not restored": lambda t, p, e: _of(t, t.tails, rb" G61(\.1)?", b""),
+    "G61 not restored": lambda t, p, e: _of(t, t.points, rb" G6[01](\.1)?(?= )", b""),
+    "exact stop lost": lambda t, p, e: _of(t, t.points, rb" G9(?= )", b""),
+    "exact stop too early": lambda t, p, e: t.sub(p, rb"G1 ", b"G1 G9 "),
+    "exact stop within a stream": lambda t, p, e: t.sub(p, rb"G1 ", b"G1 G61 "),
+    "exact stop twice": lambda t, p, e: _of(t, t.points, rb"( G(?:9|61))(?= )", rb"\1\1"),
+    "exact stop behind the points": lambda t, p, e: t.sub(e, rb"G0", b"G0 G61"),
+    "other path mode at the end": lambda t, p, e: t.sub(e - 1, rb"G1 ", b"G1 G64 "),
+    "G64 behind the points": lambda t, p, e: t.sub(e, rb"G0", b"G0 G64"),
+    "G641 behind the points": lambda t, p, e: t.sub(e, rb"G0", b"G0 G641"),
+    "G641 for G64": lambda t, p, e: _of(t, t.heads(), rb"G64(?![0-9])", b"G641"),
+    "G64 in front": lambda t, p, e: None if t.stops() else _before(t, p, b"G64"),
+    "G641 in front": lambda t, p, e: _before(t, p, b"G641"),
+    "tolerance in front": lambda t, p, e: _before(t, p, b"G64 P5"),
+    "F in front": lambda t, p, e: _before(t, p, b"F500.0"),
+    "negative F in front": lambda t, p, e: _before(t, p, b"F-1"),
+    "G0 in front": lambda t, p, e: _before(t, p, b"G0"),
+    "standstill twice": lambda t, p, e: _of(t, t.heads(), STANDSTILL, rb"\1\1"),
+    "standstill lost": lambda t, p, e: _of(t, t.heads(), STANDSTILL, b""),
+    "standstill longer": lambda t, p, e: _of(t, t.heads(), rb"G4 ([PF])", rb"G4 \g<1>9"),
+    "zeros behind a point": lambda t, p, e: t.sub(p, rb" F", ZEROS + b" F"),
+    "zeros in front of a point": lambda t, p, e: t.sub(p, AXIS, rb"\g<1>" + ZEROS + b"1."),
+    "zeros behind an end": lambda t, p, e: t.sub(
+        e - 1, rb"\.([0-9]*) F", rb".\g<1>" + ZEROS + b" F"
+    ),
+    "zeros behind F": lambda t, p, e: t.sub(p, rb"(F[0-9.]+)", rb"\g<1>" + ZEROS),
+    "zeros behind the last F": lambda t, p, e: t.sub(e - 1, rb"(F[0-9.]+)", rb"\g<1>" + ZEROS),
+    "zeros behind the F restored": lambda t, p, e: _of(
+        t, t.tails, rb"(F[0-9]+\.[0-9]*)", rb"\g<1>" + ZEROS
+    ),
+    "blanks in a point": lambda t, p, e: t.sub(p, rb" F", b" " * 240 + b" F"),
+    "blanks behind a point": lambda t, p, e: t.sub(p, rb"(\r?\n)", b" " * 240 + rb"\1"),
+    "long stamp": lambda t, p, e: t.sub(t.stamp, rb"(\)?\r?\n)", b"x" * 1100 + rb"\1"),
+    "long comment": lambda t, p, e: t.sub(t.comments[0], rb"(\)?\r?\n)", b"x" * 1100 + rb"\1"),
+    "M5 behind a stream": lambda t, p, e: t.sub(e, rb"(\r?\n)", rb"\1M5\1"),
     "G93 not restored": lambda t, p, e: _of(t, t.tails, rb" G93", b""),
-    "G61.1 for G61": lambda t, p, e: _of(t, t.tails, rb"G61(?!\.)", b"G61.1"),
+    "G61.1 for G61": lambda t, p, e: _of(t, t.points, rb"G61(?!\.)", b"G61.1"),
     "G95 left behind": lambda t, p, e: t.sub(e, rb"G0", b"G0 G95"),
     "G91 left behind": lambda t, p, e: t.sub(
         e, rb"G0", b"G0 G90" if t.incremental(e) else b"G0 G91"
@@ -432,6 +487,7 @@ def test_every_kind_of_damage_is_done_to_programs_that_have_room_for_all():
         ("linuxcnc", "G21 G90 G94 G61\nF60\nG0 X0 Y0 Z0\n"),
         ("linuxcnc", "G21 G90 G93 G61.1\nG0 X0 Y0 Z0\n"),
         ("fanuc", "G21 G17 G40 G90 G94 G64\nG0 X0. Y0. Z0. F200.\n"),
+        ("siemens", "G71 G17 G40 G90 G94 G61\nG0 X0. Y0. Z0. F200.\n"),
     ):
         program = (head + moves).encode()
         assert missed(dialect, program, random.Random(3)) == []

@@ -88,11 +88,11 @@ def test_the_program_stops_after_the_stream(stop):
         (b"G94 G64 P0.01 F250", [b"G4 P0"], [b"G0 F250.0"]),
         (b"G94 G64 F.125", [b"G4 P0"], [b"G0 F0.125"]),
         (b"G94 G64 F1234.56789", [b"G4 P0"], [b"G0 F1234.56789"]),
-        (b"G94 G61 F250", [b"G64"], [b"G0 F250.0 G61"]),
-        (b"G94 G61.1 F250", [b"G64"], [b"G0 F250.0 G61.1"]),
+        (b"G94 G61 F250", [b"G64"], [b"G0 F250.0"]),
+        (b"G94 G61.1 F250", [b"G64"], [b"G0 F250.0"]),
         (b"G93 G64", [b"G4 P0", b"G94"], [b"G0 G93"]),
         (b"G95 G64 F0.2", [b"G4 P0", b"G94"], [b"G0 G95 F0.2"]),
-        (b"G93 G61", [b"G94 G64"], [b"G0 G93 G61"]),
+        (b"G93 G61", [b"G94 G64"], [b"G0 G93"]),
         (b"G64 F250", [b"G4 P0", b"G94"], [b"G0 F250.0"]),
     ],
 )
@@ -100,6 +100,16 @@ def test_modal_values_are_set_and_restored(codes, before, after):
     lines = stream_of(b"G21 G90 " + codes + b"\nG0 X3\nM2\n", comments=False)
     found_before, _, found_after = parts(lines)
     assert (found_before, found_after) == (before, after)
+
+
+@pytest.mark.parametrize("code", [b"G61", b"G61.1"])
+def test_an_exact_stop_in_force_stands_on_the_last_point(code):
+    """Restored behind it, it would come too late: the end would be rounded into the next move."""
+    lines = stream_of(b"G21 G90 G94 F250 " + code + b"\nG0 X3\nM2\n", comments=False)
+    before, points, after = parts(lines)
+    assert before == [b"G64"]
+    assert points[-1].startswith(b"G1 " + code + b" X3 F")
+    assert after == [b"G0 F250.0"]
 
 
 def test_absolute_distance_is_stated_where_the_program_does_not():

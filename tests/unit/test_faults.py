@@ -27,7 +27,7 @@ from gcodejerk.pipeline import Settings, process
 from gcodejerk.verification import verify
 
 COMMAND = [sys.executable, "-m", "gcodejerk.cli", "process", "part.nc", "-m", "vmc"]
-OLD = b"(the old output)\n"
+OLD = b"(gcodejerk stamp 0.1.0 0123abcd, the old output)\n"
 VMC = Machine.load(find_machine("vmc"))
 
 

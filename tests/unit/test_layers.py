@@ -17,7 +17,7 @@ import gcodejerk
 ROOT = Path(gcodejerk.__file__).parent
 
 PICTURE = """
-    errors units reasons
+    errors units reasons foreign
  <- nc | machine | motion
  <- start plans solutions optima designs refusals plan stream move survey arrival comparison dogleg
  <- emit | verification | testing

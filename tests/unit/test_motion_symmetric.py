@@ -62,7 +62,8 @@ def test_length_is_velocity_times_what_the_centroids_leave_of_the_time(durations
     _, v, a = integrated(durations)
     law, ramp = one(*durations), sum(durations[:3])
     t = np.linspace(0.0, ramp, 40001)
-    centroid = np.trapezoid(a(t) * t, t) / np.trapezoid(a(t), t)
+    trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 numpy 1
+    centroid = trapezoid(a(t) * t, t) / trapezoid(a(t), t)
     assert float(law.centroid[0]) == pytest.approx(centroid, rel=1e-4)
     assert float(law.area[0]) == pytest.approx(float(v(ramp)) / float(law.acceleration[0]))
     length = float(law.velocity[0] * (law.total[0] - 2.0 * law.centroid[0]))

@@ -147,7 +147,15 @@ FANUC = Dialect(
         | {980, 990, 800, 150, 500, 501, 690, 131, 670, 220, 230, 51, 80}
     ),
     quick=True,
-    writing=Writing((b"(", b")"), b"G4 P1"),
+    # Whether M3, M5, M8 and the like run with the motion of their block or behind it, the builder
+    # chooses (B-63944EN/02, "Auxiliary function"); M0, M1, M2, M30 act when the block is done.
+    before_m=frozenset(),
+    after_m=frozenset({0, 1, 2, 30}),
+    exact_stop=90,
+    # "Positioning (G00)": execution proceeds to the next block after confirming the in-position.
+    stops_after_rapid=True,
+    # "Decimal point programming": least increments of IS-B and IS-C leave eight digits.
+    writing=Writing((b"(", b")"), b"G4 P1", digits=8),
 )
 
 # A lathe: X is a diameter (`diameter: true` on the axis). T selects offsets, so it changes the
@@ -196,7 +204,6 @@ _LATHE = replace(
     tool_frame=frozenset("T"),
     contours=frozenset({710, 720, 730}),
     drilling=Drilling(),
-    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9}),
     length_moves=False,
     length_word="",
     lathe="yes",

@@ -68,5 +68,8 @@ HEIDENHAIN_ISO = Dialect(
     tool_frame=frozenset("T"),
     other_m="positions",
     harmless=frozenset({0, 170, 180, 190, 400, 900, 910}),
-    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 8, 9, 13, 14}),
+    # TNC 155 manual, list of M functions: M3, M4, M8, M13 and M14 act at the beginning of their
+    # block, M0, M2, M5, M9 and M30 at its end.
+    before_m=frozenset({3, 4, 8, 13, 14}),
+    after_m=frozenset({0, 1, 2, 30, 5, 9}),
 )

@@ -163,7 +163,10 @@ LINUXCNC = Dialect(
         {0, 40, 70, 80, 170, 171, 180, 181, 190, 191, 200, 210, 400, 610, 611, 640}
         | {900, 910, 901, 911, 930, 940, 950, 960, 970, 980, 990}
     ),
-    harmless_m=frozenset({0, 1, 2, 30, 60, 3, 4, 5, 7, 8, 9, 48, 49, 50, 51, 52, 53}),
+    # "Order of execution" of the manual: spindle, coolant and overrides, then motion, then stops.
+    before_m=frozenset({3, 4, 5, 7, 8, 9, 48, 49, 50, 51, 52, 53}),
+    after_m=frozenset({0, 1, 2, 30, 60}),
     quick=True,
-    writing=Writing((b"(", b")"), b"G4 P0"),
+    # Numbers are doubles all the way to the motion (emcmotion's EmcPose).
+    writing=Writing((b"(", b")"), b"G4 P0", doubles=True),
 )

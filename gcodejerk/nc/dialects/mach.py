@@ -104,7 +104,9 @@ MACH = Dialect(
         {0, 40, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 901, 911, 930, 940, 950}
         | {980, 990, 500, 690, 150}
     ),
-    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9, 48, 49}),
+    # NIST RS274/NGC, table of the order of execution, which Mach's manual repeats.
+    before_m=frozenset({3, 4, 5, 7, 8, 9, 48, 49}),
+    after_m=frozenset({0, 1, 2, 30}),
     quick=True,
     writing=Writing((b"(", b")"), b"G4 P0"),
 )

@@ -71,6 +71,8 @@ MARLIN = Dialect(
     other_m="positions",
     redrawn=frozenset({50}),
     harmless=frozenset({0}),
-    harmless_m=frozenset(),
-    writing=Writing((b"; ", b""), b"M400"),
+    before_m=frozenset(),
+    after_m=frozenset(),
+    # Positions are single-precision floats (gcode/parser.h, value_float), good for seven digits.
+    writing=Writing((b"; ", b""), b"M400", digits=7),
 )

@@ -133,6 +133,10 @@ SIEMENS = Dialect(
         {0, 90, 170, 180, 190, 400, 700, 710, 7000, 7100, 900, 910, 930, 940, 950, 600, 640}
         | {6410, 6420, 6430, 6440, 6450, 6010, 6020, 6030}
     ),
-    harmless_m=frozenset({0, 1, 2, 30, 3, 4, 5, 7, 8, 9}),
+    # M0, M1, M2, M17 and M30 act behind the motion of their block; for all others machine data says
+    # (22200 AUXFU_M_SYNC_TYPE).
+    before_m=frozenset(),
+    after_m=frozenset({0, 1, 2, 30}),
+    exact_stop=90,
     writing=Writing((b"; ", b""), b"G4 F0.001"),
 )

@@ -1,0 +1,150 @@
+"""The words that may stand in the place of a rapid, line by line, and how they may be spelled.
+
+What a word would do is not enough to let it pass: G641 blends like G64 and is another mode; F-1 in
+front of the points does nothing, and does not belong there. So this module lists, from the rapid
+and the dialect's table alone, which words each line of a replacement may hold.
+
+Rule: nothing else may stand there, and of what may stand, all that changes a mode has to.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+
+from gcodejerk.machine import Machine
+from gcodejerk.nc import AXES, Block, Dialect, Rapids
+
+FINER = 3
+"""Decimals more than the resolution's, where the control computes in doubles."""
+INCH_FINER = 2
+"""Decimals more in inches: a thousandth of a millimetre is some 0.00004 in."""
+MOST_DECIMALS = 12
+FEED_DIGITS, FEED_DECIMALS = 9, 8
+Words = list[tuple[str, Decimal]]
+
+
+def decimals_of(machine: Machine) -> dict[str, int]:
+    """Decimals of each axis's resolution."""
+    out = {}
+    for axis in machine.axes:
+        exponent = Decimal(repr(axis.resolution)).normalize().as_tuple().exponent
+        out[axis.name] = min(max(1, -int(exponent)), MOST_DECIMALS)
+    return out
+
+
+def line_limit(dialect: Dialect) -> int:
+    """Longest line that may be written, in bytes, its end not counted."""
+    own = 0 if dialect.writing is None else dialect.writing.line_limit
+    return own or dialect.text.line_limit
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """What may stand in the place of one rapid."""
+
+    standstill: bool
+    """A block that waits until the machine stands comes first."""
+    setup: frozenset[int]
+    """G codes in front of the points; that those stand which change a mode, the modes tell."""
+    ending: int | None
+    """G code on the last point."""
+    tail: frozenset[int]
+    feed: bool
+    """F stands in the tail."""
+    behind: tuple[tuple[str, float], ...]
+    """M words behind it all."""
+    axes: frozenset[str]
+    """Axes of the points but the last: those that move."""
+    limit: int
+
+    @classmethod
+    def of(cls, rapids: Rapids, i: int, block: Block, dialect: Dialect, follows: bool) -> Allowed:
+        """List it for rapid i; `follows` says that the line before is a stream too."""
+        path, mode = int(rapids.path[i]), int(rapids.feed_mode[i])
+        exact = path in (61, 62)
+        per_minute, through = dialect.feed_code(94), dialect.path_code(64)
+        may: set[int | None] = {per_minute} if mode != 94 else set()
+        may |= set() if rapids.feed_mode_stated[i] else {per_minute}
+        may |= {through} if exact else set()
+        if not rapids.distance_stated[i] and dialect.groups.get(900) == "distance":
+            may |= {900}
+        nine = dialect.exact_stop
+        exact_here = any(
+            w.letter == "G" and nine is not None and w.value == nine / 10 for w in block.words
+        )
+        ending = dialect.path_code(path) if exact else None
+        if ending is None and (exact_here or dialect.stops_after_rapid):
+            ending = nine
+        code = dialect.feed_code(mode)
+        step = rapids.target[i] - rapids.start[i]
+        return cls(
+            standstill=not (follows or exact),
+            setup=frozenset(c for c in may if c is not None),
+            ending=ending,
+            tail=frozenset({0} | ({code} if mode != 94 and code is not None else set())),
+            feed=mode != 93 and not math.isnan(float(rapids.feed[i])),
+            behind=tuple(
+                ("M", float(w.value))
+                for w in block.words
+                if w.letter == "M" and w.value in dialect.after_m
+            ),
+            axes=frozenset(AXES[k] for k in range(len(AXES)) if step[k] and step[k] == step[k]),
+            limit=line_limit(dialect),
+        )
+
+    def setup_problem(self, words: Words) -> str | None:
+        """What is wrong with the words of the line in front of the points."""
+        codes = _codes(words)
+        others = [letter for letter, _ in words if letter != "G"]
+        if others:
+            return f"word {others[0]} has no place in front of the points"
+        if not codes <= self.setup:
+            return f"G{min(codes - self.setup) / 10:g} has no place in front of the points"
+        return None
+
+    def tail_problem(self, words: Words) -> str | None:
+        """What is wrong with the words of the line behind the points."""
+        codes = _codes(words)
+        others = sorted(letter for letter, _ in words if letter != "G")
+        if codes != self.tail or len(codes) != len(words) - len(others):
+            wanted = " ".join(f"G{code / 10:g}" for code in sorted(self.tail))
+            return f"behind the points stand {wanted} and no other code"
+        if others != (["F"] if self.feed else []):
+            return "F stands behind the points where it is known, and nothing else does"
+        return None
+
+
+def _codes(words: Words) -> set[int]:
+    """G codes, times ten."""
+    return {int(value * 10) for letter, value in words if letter == "G"}
+
+
+def point_pattern(letters: str, decimals: Mapping[str, int], dialect: Dialect, inch: bool) -> bytes:
+    """Pattern of one point with these axes and F, as it may be spelled."""
+    digits = 15 if dialect.writing is None else dialect.writing.digits
+    finer = FINER if dialect.writing is not None and dialect.writing.doubles else 0
+    words = []
+    for letter in letters:
+        most = decimals.get(letter, 1) + finer + (INCH_FINER if inch and letter not in "ABC" else 0)
+        words.append(
+            rb" %c(?=-?[0-9.]{1,%d}(?![0-9.]))" % (ord(letter), digits + 1)
+            + rb"-?(?:0|[1-9][0-9]{0,8})\.[0-9]{1,%d}(?![0-9.])" % min(most, MOST_DECIMALS)
+        )
+    feed = rb" F(?:0|[1-9][0-9]{0,%d})\.[0-9]{1,%d}(?![0-9.])"
+    return b"G1" + b"".join(words) + feed % (FEED_DIGITS - 1, FEED_DECIMALS)
+
+
+_LONG = re.compile(rb"[A-Z][-+]?[0-9.]{25}")
+
+
+def too_long_a_number(line: bytes, block: bytes) -> bytes | None:
+    """Find a number of a line that is longer than any, and not the block's own."""
+    match = _LONG.search(line)
+    own = b"".join(block.split()).upper()
+    if match is None or match[0] in own:
+        return None
+    return match[0]

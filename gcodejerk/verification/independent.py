@@ -1,0 +1,72 @@
+r"""Axes that run on their own: each held to its own start, arrival and law.
+
+Under `positioning: independent` the path follows from when each axis moves, so a stream in which
+one axis is late is another path, though every point of it is between the ends. This module owns:
+
+- an axis stands at its end from the longest time on that its own rapid may take;
+- the mean moment of its motion, :math:`\int (1 - x/D)\,dt`, which any delay moves by itself, is
+  half of its own time where the profile's laws are symmetric, and in the middle half where not.
+
+Rule: times are those of each axis alone, from the limits of its rapid.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.machine import Machine
+from gcodejerk.nc import AXES
+from gcodejerk.verification.findings import Kind
+from gcodejerk.verification.points import TINY, Array, Paths
+
+Rows = NDArray[np.bool_]
+SYMMETRIC = ("conventional", "condition3", "cascade")
+"""Profiles whose laws are their own mirror image."""
+MIDDLE = (0.5, 1.5)
+"""Share of half the time in which the mean moment of any other law lies."""
+
+
+def judge_axes(
+    paths: Paths, machine: Machine, t: Array, usual: Array, most: Array
+) -> list[tuple[Kind, Rows, str]]:
+    """Judge when each axis moves.
+
+    Parameters
+    ----------
+    paths : Paths
+        The streams.
+    machine : Machine
+        Its interval and profile.
+    t : ndarray, shape (rows,)
+        When each point is reached. [s]
+    usual, most : ndarray, shape (streams, 9)
+        What each axis takes by itself: conventionally, and at most. [s]
+
+    Returns
+    -------
+    list of tuple
+        Kind, rows that break it, and the problem.
+    """
+    owner = paths.owner
+    h = np.diff(t, prepend=t[:1])
+    h[paths.begin] = 0.0
+    low, high = (1.0, 1.0) if machine.design.profile in SYMMETRIC else MIDDLE
+    out = []
+    for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
+        D = np.abs(paths.displacement[:, a])
+        moves = D > 0.0
+        size = np.where(moves, D, 1.0)
+        step = paths.step[:, a]
+        left = np.abs(paths.position[:, a] - (paths.start + paths.displacement)[owner, a])
+        late = moves[owner] & (t >= (most[:, a] - TINY)[owner]) & (left > (step + TINY)[owner])
+        out.append((Kind.TIME, late, f"{AXES[a]} arrives later than its own rapid may"))
+        # Rest at both ends: the trapezoids of all blocks add up to the integral.
+        before = np.roll(left, 1)
+        mean = np.add.reduceat(0.5 * (left + before) * h, paths.begin) / size
+        error = machine.interval + step / size * most[:, a]
+        off = (mean < 0.5 * low * usual[:, a] - error) | (mean > 0.5 * high * most[:, a] + error)
+        rows = np.zeros(len(t), dtype=np.bool_)
+        rows[paths.begin[moves & off] + 1] = True
+        out.append((Kind.TIME, rows, f"{AXES[a]} moves earlier or later than by its own law"))
+    return out

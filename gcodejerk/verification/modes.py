@@ -1,0 +1,96 @@
+"""Words of a line, and the modal words that a stream may touch: a small machine that runs them.
+
+Rule: what it cannot read it does not guess: the line is none of a stream.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+
+from gcodejerk.nc import Dialect, Rapids
+
+# No axis needs more digits; numbers without bounds would be a way to stall the reading.
+_NUMBER = rb"[-+]?(?:[0-9]{1,9}(?:\.[0-9]{0,250})?|\.[0-9]{1,250})(?![0-9.])"
+WORD = re.compile(rb"[ \t]*([A-Z])[ \t]*(" + _NUMBER + rb")")
+_WORDS = re.compile(rb"(?:[ \t]*[A-Z][ \t]*" + _NUMBER + rb")+[ \t]*")
+
+
+def read_words(line: bytes) -> list[tuple[str, Decimal]] | None:
+    """Read the words of a line that holds nothing else; None where it does."""
+    if not _WORDS.fullmatch(line):
+        return None
+    return [(letter.decode(), Decimal(text.decode())) for letter, text in WORD.findall(line)]
+
+
+@dataclass(slots=True)
+class Modes:
+    """The modal words that a stream may touch."""
+
+    motion: int | None
+    distance: int
+    feed_mode: int
+    feed: Decimal | None
+    path: int
+    p: float
+    q: float
+
+    @classmethod
+    def after(cls, rapids: Rapids, i: int) -> Modes:
+        """List what the original has in force after the block of rapid i."""
+        feed = float(rapids.feed[i])
+        return cls(
+            0,
+            91 if rapids.incremental[i] else 90,
+            int(rapids.feed_mode[i]),
+            None if math.isnan(feed) else Decimal(repr(feed)),
+            int(rapids.path[i]),
+            float(rapids.path_p[i]),
+            float(rapids.path_q[i]),
+        )
+
+    def apply(self, words: list[tuple[str, Decimal]], dialect: Dialect) -> str | None:
+        """Execute a line without motion; what is wrong with it."""
+        writing = dialect.writing
+        if writing is not None and words == read_words(writing.standstill):
+            return None
+        seen = [letter + str(value) if letter == "G" else letter for letter, value in words]
+        if len(set(seen)) < len(seen):
+            return "a word stands twice"
+        codes = {int(value * 10) for letter, value in words if letter == "G" and not value * 10 % 1}
+        if len(codes) < sum(letter == "G" for letter, _ in words):
+            return "a code that is none"
+        values = {letter: value for letter, value in words if letter != "G"}
+        if not set(values) <= {"F", "P", "Q"}:
+            return f"word {min(set(values) - {'F', 'P', 'Q'})} has no place here"
+        groups = [dialect.groups.get(code) for code in codes]
+        if len(set(groups)) < len(groups):
+            return "two codes of one modal group"
+        known = {0, *dialect.feed_modes, *dialect.paths}
+        known |= {code for code in (900, 910) if dialect.groups.get(code) == "distance"}
+        if not codes <= known:
+            return f"G{min(codes - known) / 10:g} has no place here"
+        if ("P" in values or "Q" in values) and 640 not in codes:
+            return "P or Q without G64"
+        self._set(codes, values, dialect)
+        return None
+
+    def _set(self, codes: set[int], values: dict[str, Decimal], dialect: Dialect) -> None:
+        """Change what the words say, the feed mode before the feed."""
+        for code in codes:
+            if code == 0:
+                self.motion = 0
+            elif code in dialect.feed_modes:
+                mode = dialect.feed_modes[code]
+                if mode != self.feed_mode:
+                    self.feed_mode, self.feed = mode, None
+            elif code in (900, 910):
+                self.distance = code // 10
+            else:
+                self.path = dialect.paths[code]
+                self.p = float(values.get("P", math.nan)) if code == 640 else math.nan
+                self.q = float(values.get("Q", math.nan)) if code == 640 else math.nan
+        if "F" in values:
+            self.feed = values["F"]

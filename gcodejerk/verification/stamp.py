@@ -1,0 +1,85 @@
+"""What the stamp of a processed program says of the options that it was made with.
+
+A stamp carries a hash of the machine file's settings and of the user's choices, not the choices
+themselves: there is no room. There are few enough of them to try: the choice that gives the hash
+is the one that was made, and the machine file is the one that was used.
+
+Rule: an option that the user repeats is taken as the user says; the stamp only fills in.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from itertools import product
+from typing import BinaryIO
+
+from gcodejerk.machine import Machine
+from gcodejerk.machine.table import PROFILES
+from gcodejerk.nc import DIALECTS
+
+WITHIN = 1 << 17
+"""A stamp that stands farther from the top is not looked for. [bytes]"""
+FORM = "stream"
+EXPANDED = "expand-cycles"
+_STAMP = re.compile(rb"^[(;] ?gcodejerk stamp [ -~]{1,20}? ([0-9a-f]{8})(?![0-9a-f])", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """Choices that a processed program was made with."""
+
+    hash: str
+    """As the stamp has it."""
+    known: bool = False
+    """This machine file and these choices give that hash."""
+    controller: str = ""
+    profile: str | None = None
+    dialect: str | None = None
+    """None: that of the machine file."""
+    expand_cycles: bool = False
+
+
+def choices_hash(
+    machine: Machine, controller: str, profile: str, expand_cycles: bool, dialect: str | None
+) -> str:
+    """Eight hex digits of a machine file's settings and a user's choices."""
+    chosen = [controller, FORM, profile, *([EXPANDED] if expand_cycles else [])]
+    chosen += [] if dialect is None else [f"dialect {dialect}"]
+    text = " ".join((machine.settings_hash, *chosen)).encode()
+    return hashlib.blake2b(text, digest_size=4).hexdigest()
+
+
+def read_stamp(processed: BinaryIO, machine: Machine) -> Stamp | None:
+    """Read the stamp of a processed program.
+
+    Parameters
+    ----------
+    processed : BinaryIO
+        Seekable; left where it was.
+    machine : Machine
+        What it was processed for, as its file has it.
+
+    Returns
+    -------
+    Stamp or None
+        None where there is no stamp.
+    """
+    at = processed.tell()
+    match = _STAMP.search(processed.read(WITHIN))
+    processed.seek(at)
+    if match is None:
+        return None
+    found = match[1].decode()
+    names = dict.fromkeys(
+        (machine.controller, *(entry.name for entry in entry_points(group="gcodejerk.controllers")))
+    )
+    profiles = dict.fromkeys((machine.design.profile, *PROFILES))
+    for dialect, expand, name, profile in product(
+        (None, *DIALECTS, "auto"), (False, True), names, profiles
+    ):
+        if choices_hash(machine, name, profile, expand, dialect) == found:
+            return Stamp(found, True, name, profile, dialect, expand)
+    return Stamp(found)

@@ -1,0 +1,133 @@
+"""Resolutions: what a machine file may say, and what a control keeps of a number."""
+
+import itertools
+import re
+from dataclasses import replace
+from decimal import Decimal
+
+import pytest
+
+from gcodejerk.errors import MachineError
+from gcodejerk.machine import Machine, find_machine, resolution_warnings
+from gcodejerk.nc import DIALECTS
+from gcodejerk.pipeline import process
+
+VMC = Machine.load(find_machine("vmc"))
+TEXT = """\
+interval: 0.001
+positioning: linear
+axes:
+  X: {{resolution: {}, rapid: {{velocity: 300, acceleration: 2000, jerk: 5.0e+4}}}}
+"""
+
+
+@pytest.mark.parametrize("resolution", ["0.11", "1", "1600", "0.1000001"])
+def test_a_resolution_above_a_tenth_is_refused(resolution):
+    with pytest.raises(MachineError, match=r"axes.X.resolution is .* at most 0.1 \[mm\]"):
+        Machine.loads(TEXT.format(resolution))
+
+
+def test_a_tenth_of_a_degree_is_the_coarsest_too():
+    text = TEXT.format("0.2").replace("  X: {", "  A: {type: rotary, ")
+    with pytest.raises(MachineError, match=r"\[deg\]"):
+        Machine.loads(text)
+
+
+def test_the_limit_of_a_file_in_inches_is_in_millimetres():
+    with pytest.raises(MachineError, match="resolution"):
+        Machine.loads("units: inch\n" + TEXT.format("0.005"))
+    Machine.loads("units: inch\n" + TEXT.format("0.0001"))
+
+
+@pytest.mark.parametrize(
+    ("resolution", "warned"), [("0.1", 1), ("0.02", 1), ("0.01", 0), ("1e-3", 0)]
+)
+def test_a_resolution_above_a_hundredth_is_warned_of(resolution, warned, command, tmp_path):
+    machine = Machine.loads(TEXT.format(resolution))
+    assert len(resolution_warnings(machine)) == warned
+    (tmp_path / "m.yaml").write_text(TEXT.format(resolution))
+    code, out = command("machine", "check", "m.yaml")
+    assert (code, out.count("warning: axes.X.resolution")) == (0, warned)
+    result = process(b"G21 G90 G94\nG0 X0\nG0 X5\nM2\n", machine, controller="mach", dialect="mach")
+    assert sum("axes.X.resolution" in note for note in result.notes) == warned
+
+
+def machine_for(dialect, resolution):
+    axes = tuple(
+        replace(
+            a, travel=None, resolution=resolution, diameter="lathe" in dialect and a.name == "X"
+        )
+        for a in VMC.axes
+    )
+    program = replace(
+        VMC.program, start=dict.fromkeys("XYZ", 0.0), decimal_point="calculator", startup=""
+    )
+    design = replace(VMC.design, minimum_length=0.0)
+    return replace(VMC, axes=axes, program=program, dialect=dialect, design=design)
+
+
+HEADS = {
+    "fanuc": "G{u} G17 G40 G94 G64 F100.\n",
+    "haas": "G{u} G17 G40 G94 G64 F100.\n",
+    "mach": "G{u} G17 G94 G64 F100\n",
+    "grbl": "G{u} G17 G94 F100\n",
+    "fanuc-lathe-b": "G{u} G18 G40 G94 G64 F100.\n",
+    "siemens": "G{s} G17 G40 G94 G64 F100\n",
+}
+NUMBER = re.compile(rb"([XYZ])(-?[0-9.]+)")
+
+
+@pytest.mark.parametrize("dialect", HEADS)
+@pytest.mark.parametrize("inch", [False, True])
+@pytest.mark.parametrize("incremental", [False, True])
+@pytest.mark.parametrize("resolution", [0.001, 0.0005, 0.002, 0.01])
+def test_points_are_whole_steps_that_the_control_keeps(dialect, inch, incremental, resolution):
+    head = HEADS[dialect].format(u=20 if inch else 21, s=70 if inch else 71)
+    unit = 25.4 if inch else 1.0
+    mode = "G91" if incremental else "G90"
+    cross = "Z" if "lathe" in dialect else "Y"
+    moves = [(12.3, 0.004), (0.004, 0.0), (-7.77, 0.0023), (0.05, -0.007), (3.3333, 2.2222)]
+    lines = [f"{mode} G0 X0. {cross}0."]
+    lines += [f"G0 X{a / unit:.5f} {cross}{b / unit:.5f}" for a, b in moves]
+    data = (head + "\n".join(lines) + "\nM30\n").encode()
+    result = process(data, machine_for(dialect, resolution), dialect=dialect, controller="mach")
+    assert result.planned
+    step = Decimal(repr(resolution))
+    if inch:
+        step = Decimal(1).scaleb(-int({0.001: 4, 0.0005: 4, 0.002: 4, 0.01: 3}[resolution]))
+    lines = [*result.output.splitlines(), b""]
+    pairs = itertools.pairwise(lines)
+    inner = [a for a, b in pairs if a.startswith(b"G1 ") and b.startswith(b"G1 ")]
+    assert len(inner) > 20
+    for line in inner:
+        for letter, number in NUMBER.findall(line):
+            value = Decimal(number.decode())
+            whole = 2 * step if letter == b"X" and "lathe" in dialect else step
+            assert value % whole == 0, line
+            digits = DIALECTS[dialect].writing.digits
+            assert len(number.translate(None, b"-.")) <= digits, line
+
+
+def test_linuxcnc_keeps_the_decimals_of_a_double():
+    data = b"G21 G91 G94 G64 F100\nG0 X12.3 Y0.004\nM2\n"
+    machine = machine_for("linuxcnc", 0.001)
+    lines = process(data, machine).output.splitlines()
+    assert any(
+        len(n.partition(b".")[2]) > 3
+        for line in lines
+        for a, n in NUMBER.findall(line)
+        if a == b"Y"
+    )
+
+
+@pytest.mark.parametrize(("x", "planned"), [("9999.5", 2), ("99999.5", 1)])
+def test_a_point_with_more_digits_than_the_control_reads_is_not_written(x, planned):
+    data = f"G21 G17 G90 G94 G64 F100.\nG0 X0. Y0.\nG0 Y5.\nG0 X{x}\nM30\n".encode()
+    machine = machine_for("fanuc", 0.0001)
+    machine = replace(machine, dialect="fanuc")
+    result = process(data, machine, dialect="fanuc", controller="fanuc")
+    assert result.planned == planned
+    if planned == 1:
+        from gcodejerk.reasons import REASONS
+
+        assert str(REASONS[result.plans.reason[-1]]) == "line or number too long for the control"
