@@ -238,7 +238,7 @@ class _Field:
             given = np.full(len(self.share), time)
             counts = np.maximum(whole_intervals(given, machine.interval), 1)
         self.task = task.after(counts)
-        self.conventional = task.conventional.general()
+        self.conventional = task.conventional
         self.weights = self.share @ self.modes.participation.T
         self.laws: dict[str, Laws] = {}
         self.notes: dict[str, str] = {}

@@ -26,7 +26,7 @@ from gcodejerk.expanded import (
     lines_in_original,
     written_out,
 )
-from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
+from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
@@ -256,6 +256,7 @@ def _process(
         dialect=settings.dialect or machine.dialect,
         start=program_start(machine),
         progress=lambda done: report("reading", done, size),
+        neighbours=machine.planner == LINUXCNC,
     )
     if program.stamp is not None and not settings.force:
         raise ProgramError(

@@ -3,6 +3,12 @@
 from gcodejerk.machine.find import find_machine
 from gcodejerk.machine.model import (
     AXES,
+    BELL,
+    JERK_LIMITED,
+    LINUXCNC,
+    LONE_SHARE,
+    PLANNERS,
+    TRAPEZOIDAL,
     Axis,
     Design,
     Limits,
@@ -18,7 +24,13 @@ from gcodejerk.machine.writer import machine_yaml
 
 __all__ = [
     "AXES",
+    "BELL",
     "DIALECT_OF_CONTROLLER",
+    "JERK_LIMITED",
+    "LINUXCNC",
+    "LONE_SHARE",
+    "PLANNERS",
+    "TRAPEZOIDAL",
     "Axis",
     "Design",
     "Limits",

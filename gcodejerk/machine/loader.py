@@ -23,7 +23,9 @@ from gcodejerk.machine.model import (
     ProgramStart,
     Spectrum,
 )
-from gcodejerk.machine.problems import Problems
+from gcodejerk.machine.planner import choose_planners, planner_warnings
+from gcodejerk.machine.plausibility import plausibility_warnings
+from gcodejerk.machine.problems import Problems, place_order
 from gcodejerk.machine.spectrum import load_spectrum
 from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 
@@ -58,8 +60,9 @@ def load_text(text: str, name: str) -> Machine:
     spectra = _spectra(values, Path(name).parent, checker)
     _check_frequencies(values, checker)
     _check_participations(values, checker)
+    planners = choose_planners(values, checker)
     problems.raise_any()
-    return _machine(values, spectra, name, checker)
+    return _machine(values, spectra, planners, name, checker)
 
 
 def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
@@ -152,7 +155,11 @@ def _spectra(values: dict[str, Any], folder: Path, checker: Checker) -> dict[str
 
 
 def _machine(
-    values: dict[str, Any], spectra: dict[str, Spectrum], name: str, checker: Checker
+    values: dict[str, Any],
+    spectra: dict[str, Spectrum],
+    planners: dict[str, str],
+    name: str,
+    checker: Checker,
 ) -> Machine:
     controller = values["controller"]
     axes = values["axes"]
@@ -163,7 +170,9 @@ def _machine(
         interval=values["interval"],
         positioning=values["positioning"],
         axes=tuple(
-            _axis(a, axes[a], a in checker.rotary, spectra.get(a)) for a in AXES if a in axes
+            _axis(a, axes[a], a in checker.rotary, spectra.get(a), planners[a])
+            for a in AXES
+            if a in axes
         ),
         modes=tuple(
             _mode(mode, mode["participation"]) for mode in values.get("modes", {}).values()
@@ -172,10 +181,21 @@ def _machine(
         program=_program(values["program"]),
         inch=checker.inch,
         source=name,
+        warnings=tuple(
+            sorted(
+                [
+                    *planner_warnings(values, planners, checker),
+                    *plausibility_warnings(values, checker),
+                ],
+                key=place_order,
+            )
+        ),
     )
 
 
-def _axis(name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | None) -> Axis:
+def _axis(
+    name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | None, planner: str
+) -> Axis:
     return Axis(
         name=name,
         rotary=rotary,
@@ -188,6 +208,7 @@ def _axis(name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | 
             _mode(mode, {name: mode["participation"]}) for mode in values.get("modes", {}).values()
         ),
         spectrum=spectrum,
+        planner=planner,
     )
 
 

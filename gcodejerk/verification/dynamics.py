@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import Machine
+from gcodejerk.machine import BELL, Machine
 from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import rapid_time
 from gcodejerk.verification.feeds import NOT_OWN, judge_feeds, rapid_limits
@@ -56,7 +56,7 @@ def limits_of(machine: Machine) -> Array:
 def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
     displacement = paths.displacement
-    total = _move_time(rapid_limits(paths, machine), displacement, machine)
+    total = _move_time(rapid_limits(paths, machine), displacement, machine, machine.planner == BELL)
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
     longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
     if machine.design.profile == "shortest":
@@ -65,13 +65,13 @@ def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     return usual.astype(np.int64), most.astype(np.int64)
 
 
-def _move_time(limits: Array, displacement: Array, machine: Machine) -> Array:
+def _move_time(limits: Array, displacement: Array, machine: Machine, bell: bool = False) -> Array:
     """Duration [s] of the fastest symmetric moves within limits, shape (3, moves, 9)."""
     if machine.positioning == "linear":
-        return rapid_time(*limits.min(axis=2))
+        return rapid_time(*limits.min(axis=2), bell=bell)
     moving = displacement != 0.0
     each = np.zeros(displacement.shape)
-    each[moving] = rapid_time(*limits[:, moving])
+    each[moving] = rapid_time(*limits[:, moving], bell=bell)
     total: Array = each.max(axis=1, initial=0.0)
     return total
 
@@ -194,6 +194,7 @@ def _take(paths: Paths, streams: Index) -> Paths:
         displacement=paths.displacement[streams],
         unit=paths.unit[streams],
         speed=paths.speed[streams],
+        lone=paths.lone[streams],
     )
 
 

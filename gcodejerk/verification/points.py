@@ -58,6 +58,8 @@ class Paths:
     """mm per unit of length."""
     speed: Array
     """What the controller's own rapid keeps to; NaN where only the axes limit it. [mm/s]"""
+    lone: NDArray[np.bool_]
+    """As in `nc.Rapids`."""
 
     @property
     def count(self) -> Index:
@@ -179,6 +181,7 @@ class Reader:
             displacement=displacement,
             unit=unit,
             speed=rapids.speed[index],
+            lone=rapids.lone[index],
         )
 
 

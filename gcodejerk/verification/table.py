@@ -163,4 +163,5 @@ class TableReader:
             displacement=displacement,
             unit=np.ones(len(index)),
             speed=self.rapids.speed[index],
+            lone=self.rapids.lone[index],
         )

@@ -19,7 +19,7 @@ ROOT = Path(gcodejerk.__file__).parent
 PICTURE = """
     errors units reasons
  <- nc | machine | motion
- <- start plans solutions optima designs refusals plan stream move survey arrival comparison dogleg
+ <- start plans today solutions optima designs refusals plan stream move survey arrival comparison dogleg
  <- emit | verification | testing
  <- expanded splice
  <- pipeline
