@@ -1,9 +1,10 @@
 """What follows a rapid: a motion, or something that LinuxCNC waits for.
 
 LinuxCNC 2.9 keeps half of a G0's acceleration back for the blend with its successor as long as it
-does not know one (tcGetOverallMaxAccel: a parabolic end). Played (2.9, G64 with and without P): where a motion follows directly, be it a feed, another rapid or
-a cycle, the G0 has all of it; in front of G4, M3 to M9, M64, S, G43, G49 and G92, and at the
-program's end it has half. G61 and G61.1 give all of it always.
+knows none (tcGetOverallMaxAccel: a parabolic end). Played (2.9, G64 with and without P): where a
+motion follows directly, be it a feed, another rapid or a cycle, the G0 has all of it; in front of
+G4, M3 to M9, M64, S, G43, G49 and G92, and at the program's end it has half. G61 and G61.1 give all
+of it always.
 
 Rule: what is not understood counts as something that is waited for: the rapid is then taken for as
 slow as it can be, and no stream is held to a time that the control would not keep.

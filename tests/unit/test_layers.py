@@ -19,7 +19,8 @@ ROOT = Path(gcodejerk.__file__).parent
 PICTURE = """
     errors units reasons
  <- nc | machine | motion
- <- start plans today solutions optima designs refusals plan stream move survey arrival comparison dogleg
+ <- start plans today solutions optima designs refusals plan stream move survey arrival
+    comparison dogleg settling
  <- emit | verification | testing
  <- expanded splice
  <- pipeline
