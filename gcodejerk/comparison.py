@@ -30,8 +30,8 @@ from gcodejerk.motion.programme import require_solver
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.move import check_time, displacement_row
 from gcodejerk.optima import Progress
-from gcodejerk.plan import STANDSTILL, path_length, plan_moves
-from gcodejerk.plans import Modes, Plans
+from gcodejerk.plan import plan_moves
+from gcodejerk.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.reasons import CERTAIN, REASONS
 
 DESIGNED = ("condition3", "cascade", "optimal", "shortest")

@@ -17,6 +17,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
 from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
@@ -32,6 +33,7 @@ from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
+from gcodejerk.settling import Left, left_alone
 from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
 from gcodejerk.start import program_start
 from gcodejerk.stream import Residuals, make_streams
@@ -76,6 +78,8 @@ class Result:
         The stream is the conventional law: nothing better was found.
     deviation : ndarray, shape (n,)
         Under independent positioning, how far the path leaves the control's own, at most. [mm]
+    rest : Left
+        What rapids leave today that were left alone.
     verification : Verification or None
         None where it was switched off, or where nothing was written.
     edits : ndarray of int, shape (k, 3)
@@ -100,6 +104,7 @@ class Result:
     conventional_residual: Array
     kept: NDArray[np.bool_]
     deviation: Array
+    rest: Left
     verification: Verification | None
     edits: NDArray[np.int64]
     hunks: NDArray[np.int64]
@@ -269,6 +274,8 @@ def _process(
         machine,
         settings.profile,
         lambda done, total: report("planning", done, total),
+        # Controllers of other packages need not know of this.
+        getattr(emitter, "unblended", "") if emitter.in_place else "",
     )
     collected = Residuals(plans)
     deviation = np.zeros(len(plans))
@@ -321,12 +328,36 @@ def _process(
         conventional_residual=collected.conventional,
         kept=collected.kept,
         deviation=deviation,
+        rest=left_alone(program.rapids, plans),
         verification=verification,
         edits=edits,
         hunks=differences,
         expansion=expansion,
-        notes=(*notes, *emitter.notes(program.rapids, plans)),
+        notes=(
+            *_operator_notes(emitter, machine, plans),
+            *notes,
+            *emitter.notes(program.rapids, plans),
+        ),
     )
+
+
+def _operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[str]:
+    """What comes first: for whoever stands at the machine, then for whoever reads the figures."""
+    notes = []
+    if emitter.in_place and plans.planned.any():
+        notes.append(at_the_machine(emitter.name))
+    if not plans.modes.modes:
+        notes.append(NO_MODES)
+    elif plans.planned.any():
+        notes.append(ABSOLUTE)
+    if machine.warnings:
+        first = machine.warnings[0]
+        more = f", and {len(machine.warnings) - 1} more" if len(machine.warnings) > 1 else ""
+        notes.append(
+            f"the machine file is doubtful: {first.place}: {first.problem}{more}; see "
+            "`gcodejerk machine check`"
+        )
+    return notes
 
 
 def _judged(

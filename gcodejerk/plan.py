@@ -27,41 +27,17 @@ from gcodejerk.motion.laws import Array
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.nc import Rapids
 from gcodejerk.optima import Progress
-from gcodejerk.plans import Modes, Plans
+from gcodejerk.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.refusals import limit_error, time_error
 from gcodejerk.today import least_time
 
 PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
-STANDSTILL = 1e-9
-"""An axis that moves less than this does not move [mm] or [deg]."""
 FARTHEST = 1e8
 """Where no axis ever is [mm] or [deg]; what is farther away could not be written exactly."""
 MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
-
-
-def path_length(displacement: Array, machine: Machine) -> Array:
-    """Length of straight moves: of the linear axes, or of the rotary ones where only they move.
-
-    Parameters
-    ----------
-    displacement : ndarray, shape (n, 9)
-        Of each axis. [mm] or [deg]
-    machine : Machine
-        Tells which axes are rotary.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        [mm] or [deg]
-    """
-    rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
-    linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
-    turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
-    length: Array = np.where(linear > STANDSTILL, linear, turning)
-    return length
 
 
 def plan_moves(
@@ -140,6 +116,7 @@ def plan_rapids(
     machine: Machine,
     profile: str | None = None,
     progress: Progress | None = None,
+    unblended: str = "",
 ) -> Plans:
     """Plan the rapids of a program, all of them together.
 
@@ -153,6 +130,8 @@ def plan_rapids(
         The machine's own by default.
     progress : callable, optional
         Called while optima are computed.
+    unblended : str, optional
+        Axes whose rapids are left alone, since the controller stops between their blocks.
 
     Returns
     -------
@@ -193,18 +172,19 @@ def plan_rapids(
     displacement = np.where((reason == CERTAIN)[:, np.newaxis], rapids.target - rapids.start, 0.0)
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)
+    moves = np.abs(displacement) > STANDSTILL
+    stops = np.array([axis in unblended for axis in AXES])
+    _rule_out(reason, moves[:, stops].any(axis=1), Reason.NO_BLENDING)
+    if profile not in ("conventional", "shortest"):
+        # Those keep the law or save time; all others do nothing but keep modes still.
+        modes = Modes.of(machine).participation
+        excited: NDArray[np.bool_] = (moves @ (modes != 0.0).T).any(axis=1)
+        _rule_out(reason, ~excited, Reason.NO_MODE)
     _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
     return plan_moves(
         displacement, machine, profile, reason,
         progress=progress, speed=rapids.speed, lone=rapids.lone,
     )  # fmt: skip
-
-
-def _is_rotary(machine: Machine, axis: str) -> bool:
-    """Whether an axis turns; one that the machine lacks is what its letter says."""
-    if axis in machine.axis_names:
-        return machine.axis(axis).rotary
-    return axis in "ABC"
 
 
 def _rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -> None:

@@ -20,7 +20,12 @@ def machine_check(
     described = load_machine(machine, None)
     axes = ", ".join(f"{axis.name} ({len(axis.modes)})" for axis in described.axes)
     structure = f", and {len(described.modes)} of the structure" if described.modes else ""
-    print(f"{described.source}: {described.name}: good; axes (modes): {axes}{structure}")
+    for warning in described.warnings:
+        place, text = str(warning.place), str(warning)
+        print(text.replace(place, f"{place}: warning", 1))
+    count = len(described.warnings)
+    doubts = "" if not count else f"; {count} warning{'' if count == 1 else 's'}"
+    print(f"{described.source}: {described.name}: good{doubts}; axes (modes): {axes}{structure}")
 
 
 def machine_schema() -> None:

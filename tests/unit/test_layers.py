@@ -17,7 +17,7 @@ import gcodejerk
 ROOT = Path(gcodejerk.__file__).parent
 
 PICTURE = """
-    errors units reasons
+    errors units reasons advice
  <- nc | machine | motion
  <- start plans today solutions optima designs refusals plan stream move survey arrival
     comparison dogleg settling
