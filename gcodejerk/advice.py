@@ -11,13 +11,11 @@ MEASURED = f"G1, rapid override does nothing, measured: {PAGE}"
 UNTESTED = f"G1, rapid override does nothing, untested: {PAGE}"
 STAMP_NOTES = (MEASURED, UNTESTED)
 """The comment below the stamp: at most 67 characters, without a parenthesis."""
-_FEED_MOVES = (
-    "streams are feed moves (G1): the rapid override does nothing to them, the feed override does: "
-    "keep it at 100 %"
-)
+_FEED_MOVES = "streams are feed moves (G1): rapid override does nothing to them"
+_FEED = "feed override does, keep it at 100 %"
 ABSOLUTE = (
-    "um are those of the real machine only if participation was measured with the servo on; the "
-    "share of today's vibration holds for any linear servo"
+    "um are the real machine's only if participation was measured with the servo on; the % of "
+    "today's holds for any linear servo"
 )
 """Of every figure in um (residues of the closed loop: the servo's gain is in the participation)."""
 NO_MODES = (
@@ -46,11 +44,10 @@ def at_the_machine(controller: str) -> str:
     """
     if controller == "linuxcnc":
         return (
-            f"{_FEED_MOVES} (measured on LinuxCNC 2.9: at 0 % rapid override X60 ran at 100 mm/s, "
-            "at 120 % feed override a stream reached 700 mm/s); feed hold brakes at "
-            f"MAX_ACCELERATION, single step stops at every block of 2 ms; see {PAGE}"
+            f"{_FEED_MOVES} (measured: at 0 % X60 ran at 100 mm/s), {_FEED}; feed hold brakes at "
+            f"MAX_ACCELERATION, single step stops at every block ({PAGE})"
         )
     return (
-        f"{_FEED_MOVES}; overrides, feed hold and single block within a stream were not measured "
-        f"on {controller}; see {PAGE}"
+        f"{_FEED_MOVES}, {_FEED}; overrides, feed hold and single block were not measured on "
+        f"{controller} ({PAGE})"
     )

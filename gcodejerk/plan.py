@@ -173,13 +173,11 @@ def plan_rapids(
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)
     moves = np.abs(displacement) > STANDSTILL
-    stops = np.array([axis in unblended for axis in AXES])
-    _rule_out(reason, moves[:, stops].any(axis=1), Reason.NO_BLENDING)
-    if profile not in ("conventional", "shortest"):
+    stops: NDArray[np.bool_] = moves & np.array([axis in unblended for axis in AXES])
+    _rule_out(reason, np.asarray(stops.any(axis=1)), Reason.NO_BLENDING)
+    if profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
         # Those keep the law or save time; all others do nothing but keep modes still.
-        modes = Modes.of(machine).participation
-        excited: NDArray[np.bool_] = (moves @ (modes != 0.0).T).any(axis=1)
-        _rule_out(reason, ~excited, Reason.NO_MODE)
+        _rule_out(reason, length > 0.0, Reason.NO_MODE)
     _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
     return plan_moves(
         displacement, machine, profile, reason,

@@ -31,7 +31,7 @@ class Reason(enum.StrEnum):
     OTHER_WORDS = "other words of the block cannot keep their order"
     FEED_UNKNOWN = "feed to restore unknown"
     AXIS_UNKNOWN = "axis not in the machine file"
-    NO_MODE = "no mode is excited"
+    NO_MODE = "no modes in the machine file"
     NO_BLENDING = "the control does not blend blocks of this axis"
     TOO_SHORT = "shorter than minimum_length"
     TOO_LONG = "too long for a stream"
