@@ -276,6 +276,7 @@ def _process(
         lambda done, total: report("planning", done, total),
         # Controllers of other packages need not know of this.
         getattr(emitter, "unblended", "") if emitter.in_place else "",
+        only_gains=True,
     )
     collected = Residuals(plans)
     deviation = np.zeros(len(plans))

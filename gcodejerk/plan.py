@@ -117,6 +117,7 @@ def plan_rapids(
     profile: str | None = None,
     progress: Progress | None = None,
     unblended: str = "",
+    only_gains: bool = False,
 ) -> Plans:
     """Plan the rapids of a program, all of them together.
 
@@ -132,6 +133,8 @@ def plan_rapids(
         Called while optima are computed.
     unblended : str, optional
         Axes whose rapids are left alone, since the controller stops between their blocks.
+    only_gains : bool, optional
+        Leave all rapids alone where nothing is known to vibrate, so that nothing can be gained.
 
     Returns
     -------
@@ -175,10 +178,10 @@ def plan_rapids(
     moves = np.abs(displacement) > STANDSTILL
     stops: NDArray[np.bool_] = moves & np.array([axis in unblended for axis in AXES])
     _rule_out(reason, np.asarray(stops.any(axis=1)), Reason.NO_BLENDING)
-    if profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
+    _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
+    if only_gains and profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
         # Those keep the law or save time; all others do nothing but keep modes still.
         _rule_out(reason, length > 0.0, Reason.NO_MODE)
-    _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
     return plan_moves(
         displacement, machine, profile, reason,
         progress=progress, speed=rapids.speed, lone=rapids.lone,
