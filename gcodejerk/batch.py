@@ -36,7 +36,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.pipeline import Progress, Result, Settings, process_file, silent
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
-from gcodejerk.report.tables import summary_line
+from gcodejerk.report.tables import summary_line, whole_line
 from gcodejerk.splice import changed_error
 from gcodejerk.workers import map_jobs
 
@@ -183,6 +183,8 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             raise changed_error(job.input)  # an edit of the user's would be lost
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}"
+    whole = whole_line(summary_of(result))
+    summary += f"\n{whole}" if whole else ""
     written = 0 if result.expansion is None else result.expansion.written
     return Done(job.input, result.planned, result.left, written, summary, result.notes, diff)
 

@@ -30,8 +30,8 @@ from gcodejerk.motion.programme import require_solver
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.move import check_time, displacement_row
 from gcodejerk.optima import Progress
-from gcodejerk.plan import STANDSTILL, path_length, plan_moves
-from gcodejerk.plans import Modes, Plans
+from gcodejerk.plan import plan_moves
+from gcodejerk.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.reasons import CERTAIN, REASONS
 
 DESIGNED = ("condition3", "cascade", "optimal", "shortest")
@@ -238,7 +238,7 @@ class _Field:
             given = np.full(len(self.share), time)
             counts = np.maximum(whole_intervals(given, machine.interval), 1)
         self.task = task.after(counts)
-        self.conventional = task.conventional.general()
+        self.conventional = task.conventional
         self.weights = self.share @ self.modes.participation.T
         self.laws: dict[str, Laws] = {}
         self.notes: dict[str, str] = {}

@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion import (
     Laws,
     Objective,
     SymmetricLaws,
-    conventional_laws,
     design_condition3,
     design_four_segments,
     four_segment_range,
@@ -34,6 +33,7 @@ from gcodejerk.motion.programme import require_solver
 from gcodejerk.motion.rivals import design_condition
 from gcodejerk.optima import Progress, Question, answers
 from gcodejerk.plans import Modes, Plans
+from gcodejerk.today import conventional_limits, todays_laws, unit_limits
 
 ALLOWED = 0.97
 """Share of the tolerance that a law may use; rounding to the resolution needs some, too."""
@@ -51,8 +51,10 @@ class Task:
         T_SUM. [intervals]
     limits : tuple of ndarray, shape (n,)
         Velocity, acceleration and jerk of the unit laws. [1/s], [1/s^2], [1/s^3]
-    conventional : SymmetricLaws
+    conventional : Laws
         What the controller does today.
+    symmetric : SymmetricLaws
+        The fastest symmetric laws within the same limits: what the controller does, but for a bell.
     objective : Objective
         What they are judged by.
     interval, band, tolerance : float
@@ -63,7 +65,8 @@ class Task:
 
     counts: NDArray[np.int64]
     limits: tuple[Array, Array, Array]
-    conventional: SymmetricLaws
+    conventional: Laws
+    symmetric: SymmetricLaws
     objective: Objective
     interval: float
     band: float
@@ -74,6 +77,7 @@ class Task:
     def of(
         cls, machine: Machine, modes: Modes, share: Array, counts: NDArray[np.int64] | None = None,
         progress: Progress | None = None, speed: Array | None = None,
+        lone: NDArray[np.bool_] | None = None,
     ) -> Task:  # fmt: skip
         """Moves on a machine.
 
@@ -91,15 +95,17 @@ class Task:
             See `Progress`.
         speed : ndarray, shape (n,), optional
             Speed of unit laws that the program states, which no law exceeds; NaN for none. [1/s]
+        lone : ndarray of bool, shape (n,), optional
+            No other motion follows directly (`Axis.conventional`); all of them by default.
 
         Returns
         -------
         Task
         """
-        rapid, limits = (unit_limits(machine, share, which) for which in ("rapid", "limit"))
+        rapid, limits = conventional_limits(machine, share, lone), unit_limits(machine, share)
         if speed is not None:
             rapid, limits = ((np.fmin(V, speed), A, J) for V, A, J in (rapid, limits))
-        conventional = conventional_laws(*rapid)
+        symmetric, conventional = todays_laws(machine, rapid)
         if counts is None:
             counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
         weights = np.abs(share @ modes.participation.T)
@@ -107,6 +113,7 @@ class Task:
             counts=counts,
             limits=limits,
             conventional=conventional,
+            symmetric=symmetric,
             objective=Objective(modes.poles, weights, modes.group),
             interval=machine.interval,
             band=machine.design.band,
@@ -129,38 +136,13 @@ class Task:
             counts=self.counts[index],
             limits=(self.limits[0][index], self.limits[1][index], self.limits[2][index]),
             conventional=self.conventional.take(index),
+            symmetric=self.symmetric.take(index),
             objective=self.objective.take(index),
         )
 
     def after(self, counts: NDArray[np.int64]) -> Task:
         """The same moves in other times."""
         return replace(self, counts=counts)
-
-
-def unit_limits(machine: Machine, share: Array, which: str) -> tuple[Array, Array, Array]:
-    """Limits of unit laws: each axis's, divided by its displacement.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    share : ndarray, shape (n, 9)
-        Displacement of each axis. [mm] or [deg]
-    which : str
-        `rapid` or `limit`.
-
-    Returns
-    -------
-    velocity, acceleration, jerk : ndarray, shape (n,)
-        [1/s], [1/s^2], [1/s^3]
-    """
-    limits = {axis.name: getattr(axis, which) for axis in machine.axes}
-    columns = []
-    for quantity in ("velocity", "acceleration", "jerk"):
-        axes = np.array([getattr(limits[a], quantity) if a in limits else np.inf for a in AXES])
-        with np.errstate(divide="ignore"):
-            columns.append((axes / np.abs(share)).min(axis=1, initial=np.inf))
-    return columns[0], columns[1], columns[2]
 
 
 Design = Callable[[Task], tuple[Laws, Array]]
@@ -170,7 +152,7 @@ Design = Callable[[Task], tuple[Laws, Array]]
 def condition3(task: Task) -> tuple[Laws, Array]:
     """Condition III, or its generalisation where a limit binds."""
     V, A, J = task.limits
-    conventional, total = task.conventional, task.total
+    conventional, total = task.symmetric, task.total
     # Four segments where the conventional law has them: it is then a member of the family.
     four = (conventional.Ta == 0.0) & (conventional.Tv == 0.0)
     low, high = four_segment_range(total, V, A, J, task.interval)
@@ -205,7 +187,7 @@ def condition2(task: Task) -> tuple[Laws, Array]:
 def cascade(task: Task) -> tuple[Laws, Array]:
     """Moving averages as wide as the modes' periods, in the unchanged time."""
     laws, worst = design_cascade(task.total, *task.limits, task.objective, task.interval)
-    return _with(task.conventional.general(), np.isfinite(worst), laws), worst
+    return _with(task.conventional, np.isfinite(worst), laws), worst
 
 
 def optimal(task: Task) -> tuple[Laws, Array]:
@@ -214,7 +196,7 @@ def optimal(task: Task) -> tuple[Laws, Array]:
     The programme knows jerks that change at whole intervals only. Where a law of another design,
     whose segments need not end there, is better still, that one is taken.
     """
-    laws, worst = task.conventional.general(), np.full(len(task), np.inf)
+    laws, worst = task.conventional, np.full(len(task), np.inf)
     rows = np.nonzero(task.objective.weights.any(axis=1))[0]
     reference = task.objective.of(task.conventional)
     found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)

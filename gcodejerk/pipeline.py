@@ -17,6 +17,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
 from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
@@ -28,12 +29,13 @@ from gcodejerk.expanded import (
     written_out,
 )
 from gcodejerk.foreign import HEAD, refuse_foreign
-from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine, resolution_warnings
+from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
+from gcodejerk.settling import Left, left_alone
 from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
 from gcodejerk.start import program_start
 from gcodejerk.stream import Residuals, make_streams
@@ -78,6 +80,8 @@ class Result:
         The stream is the conventional law: nothing better was found.
     deviation : ndarray, shape (n,)
         Under independent positioning, how far the path leaves the control's own, at most. [mm]
+    rest : Left
+        What rapids leave today that were left alone.
     verification : Verification or None
         None where it was switched off, or where nothing was written.
     edits : ndarray of int, shape (k, 3)
@@ -102,6 +106,7 @@ class Result:
     conventional_residual: Array
     kept: NDArray[np.bool_]
     deviation: Array
+    rest: Left
     verification: Verification | None
     edits: NDArray[np.int64]
     hunks: NDArray[np.int64]
@@ -260,6 +265,7 @@ def _process(
         dialect=settings.dialect or machine.dialect,
         start=program_start(machine),
         progress=lambda done: report("reading", done, size),
+        neighbours=machine.planner == LINUXCNC,
     )
     if program.stamp is not None and not settings.force:
         raise ProgramError(
@@ -276,6 +282,9 @@ def _process(
         machine,
         settings.profile,
         lambda done, total: report("planning", done, total),
+        # Controllers of other packages need not know of this.
+        getattr(emitter, "unblended", "") if emitter.in_place else "",
+        only_gains=True,
     )
     collected = Residuals(plans)
     deviation = np.zeros(len(plans))
@@ -321,7 +330,6 @@ def _process(
             "how the program's control follows its streams was not measured"
         )
     notes += dogleg_notes(plans, deviation)
-    notes += [f"{machine.source}: {warning}" for warning in resolution_warnings(machine)]
     return Result(
         program=program,
         plans=plans,
@@ -332,12 +340,36 @@ def _process(
         conventional_residual=collected.conventional,
         kept=collected.kept,
         deviation=deviation,
+        rest=left_alone(program.rapids, plans),
         verification=verification,
         edits=edits,
         hunks=differences,
         expansion=expansion,
-        notes=(*notes, *emitter.notes(program.rapids, plans)),
+        notes=(
+            *_operator_notes(emitter, machine, plans),
+            *notes,
+            *emitter.notes(program.rapids, plans),
+        ),
     )
+
+
+def _operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[str]:
+    """What comes first: for whoever stands at the machine, then for whoever reads the figures."""
+    notes = []
+    if emitter.in_place and plans.planned.any():
+        notes.append(at_the_machine(emitter.name))
+    if not plans.modes.modes:
+        notes.append(NO_MODES)
+    elif plans.planned.any():
+        notes.append(ABSOLUTE)
+    if machine.warnings:
+        first = machine.warnings[0]
+        more = f", and {len(machine.warnings) - 1} more" if len(machine.warnings) > 1 else ""
+        notes.append(
+            f"the machine file is doubtful: {first.place}: {first.problem}{more}; see "
+            "`gcodejerk machine check`"
+        )
+    return notes
 
 
 def _judged(

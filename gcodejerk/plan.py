@@ -27,40 +27,17 @@ from gcodejerk.motion.laws import Array
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.nc import Rapids
 from gcodejerk.optima import Progress
-from gcodejerk.plans import Modes, Plans
+from gcodejerk.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.refusals import limit_error, time_error
+from gcodejerk.today import least_time
 
 PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
-STANDSTILL = 1e-9
-"""An axis that moves less than this does not move [mm] or [deg]."""
 FARTHEST = 1e8
 """Where no axis ever is [mm] or [deg]; what is farther away could not be written exactly."""
 MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
-
-
-def path_length(displacement: Array, machine: Machine) -> Array:
-    """Length of straight moves: of the linear axes, or of the rotary ones where only they move.
-
-    Parameters
-    ----------
-    displacement : ndarray, shape (n, 9)
-        Of each axis. [mm] or [deg]
-    machine : Machine
-        Tells which axes are rotary.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        [mm] or [deg]
-    """
-    rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
-    linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
-    turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
-    length: Array = np.where(linear > STANDSTILL, linear, turning)
-    return length
 
 
 def plan_moves(
@@ -72,6 +49,7 @@ def plan_moves(
     T1: float | None = None,
     progress: Progress | None = None,
     speed: Array | None = None,
+    lone: NDArray[np.bool_] | None = None,
 ) -> Plans:
     """Plan moves, all of them together.
 
@@ -94,6 +72,8 @@ def plan_moves(
     speed : ndarray, shape (n,), optional
         What the controller's own rapid keeps to along the path, NaN where only the axes limit it.
         [mm/s]
+    lone : ndarray of bool, shape (n,), optional
+        No other motion follows directly (`Axis.conventional`); all of them by default.
 
     Returns
     -------
@@ -120,13 +100,15 @@ def plan_moves(
     _rule_out(reason, (length == 0.0), Reason.NO_MOTION)
     _rule_out(reason, (displacement[:, ~known] != 0.0).any(axis=1), Reason.AXIS_UNKNOWN)
     longest = MOST_INTERVALS * machine.interval
-    _rule_out(reason, _least_time(displacement, machine) > longest, Reason.TOO_LONG)
+    _rule_out(reason, least_time(displacement, machine) > longest, Reason.TOO_LONG)
     if time is not None and time > longest:
         raise PlanError(
             f"the time is {time:g} s, more than {MOST_INTERVALS} intervals ({longest:g} s)",
             "give a shorter one",
         )
-    return _Planner(machine, profile, displacement, length, reason, time, T1, progress, speed).run()
+    return _Planner(
+        machine, profile, displacement, length, reason, time, T1, progress, speed, lone
+    ).run()
 
 
 def plan_rapids(
@@ -134,6 +116,8 @@ def plan_rapids(
     machine: Machine,
     profile: str | None = None,
     progress: Progress | None = None,
+    unblended: str = "",
+    only_gains: bool = False,
 ) -> Plans:
     """Plan the rapids of a program, all of them together.
 
@@ -147,6 +131,10 @@ def plan_rapids(
         The machine's own by default.
     progress : callable, optional
         Called while optima are computed.
+    unblended : str, optional
+        Axes whose rapids are left alone, since the controller stops between their blocks.
+    only_gains : bool, optional
+        Leave all rapids alone where nothing is known to vibrate, so that nothing can be gained.
 
     Returns
     -------
@@ -187,25 +175,17 @@ def plan_rapids(
     displacement = np.where((reason == CERTAIN)[:, np.newaxis], rapids.target - rapids.start, 0.0)
     length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
     _rule_out(reason, length == 0.0, Reason.NO_MOTION)
+    moves = np.abs(displacement) > STANDSTILL
+    stops: NDArray[np.bool_] = moves & np.array([axis in unblended for axis in AXES])
+    _rule_out(reason, np.asarray(stops.any(axis=1)), Reason.NO_BLENDING)
     _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
-    return plan_moves(displacement, machine, profile, reason, progress=progress, speed=rapids.speed)
-
-
-def _least_time(displacement: Array, machine: Machine) -> Array:
-    """What moves take at least [s]: at full speed, and at full acceleration to the middle."""
-    out = np.zeros(len(displacement))
-    for axis in machine.axes:
-        size = np.abs(displacement[:, AXES.index(axis.name)])
-        out = np.maximum(out, size / axis.rapid.velocity)
-        out = np.maximum(out, 2.0 * np.sqrt(size / axis.rapid.acceleration))
-    return out
-
-
-def _is_rotary(machine: Machine, axis: str) -> bool:
-    """Whether an axis turns; one that the machine lacks is what its letter says."""
-    if axis in machine.axis_names:
-        return machine.axis(axis).rotary
-    return axis in "ABC"
+    if only_gains and profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
+        # Those keep the law or save time; all others do nothing but keep modes still.
+        _rule_out(reason, length > 0.0, Reason.NO_MODE)
+    return plan_moves(
+        displacement, machine, profile, reason,
+        progress=progress, speed=rapids.speed, lone=rapids.lone,
+    )  # fmt: skip
 
 
 def _rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -> None:
@@ -227,6 +207,7 @@ class _Planner:
         T1: float | None,
         progress: Progress | None,
         speed: Array | None,
+        lone: NDArray[np.bool_] | None,
     ) -> None:
         self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
         self.displacement, self.length, self.reason = displacement, length, reason
@@ -242,7 +223,10 @@ class _Planner:
             self.share[np.arange(len(index)), axis] = displacement[self.move, axis]
         self.move = self.move.astype(np.int64)
         cap = None if speed is None else speed[self.move] / length[self.move]
-        self.task = Task.of(machine, self.modes, self.share, progress=progress, speed=cap)
+        alone = None if lone is None else lone[self.move]
+        self.task = Task.of(
+            machine, self.modes, self.share, progress=progress, speed=cap, lone=alone
+        )
         self.limits, self.conventional = self.task.limits, self.task.conventional
 
     def run(self) -> Plans:
@@ -270,15 +254,15 @@ class _Planner:
         """The controller's own laws; a trapezoid cannot be written with finite jerk."""
         laws = self.conventional
         if self.time is not None:
-            stretch = counts * self.interval / laws.total
-            laws = SymmetricLaws(*(column * stretch for column in laws.columns()))
-        return laws.general(), self._within_limits(laws)
+            laws = laws.stretched(counts * self.interval / laws.total)
+        return laws, self._within_limits(laws)
 
-    def _within_limits(self, laws: SymmetricLaws) -> NDArray[np.bool_]:
+    def _within_limits(self, laws: Laws) -> NDArray[np.bool_]:
         """Whether laws keep the limits of a designed profile."""
         V, A, J = (limit * (1.0 + 1e-9) for limit in self.limits)
-        jerk = laws.jerk
-        return (laws.velocity <= V) & (laws.acceleration <= A) & (jerk <= J) & np.isfinite(jerk)
+        jerk = laws.peak_jerk
+        fits: NDArray[np.bool_] = (laws.peak_velocity <= V) & (laws.peak_acceleration <= A)
+        return fits & (jerk <= J) & np.isfinite(jerk)
 
     def _shaped(self) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_]]:
         """The conventional laws behind an input shaper, for the mode that shakes most."""
@@ -287,7 +271,7 @@ class _Planner:
                 f"the time of profile {self.profile} follows from its shaper",
                 "leave out --time, or choose another profile",
             )
-        laws = self.conventional.general()
+        laws = self.conventional
         modes = self.modes
         if len(modes.poles):
             frequency = np.abs(modes.poles[self.task.objective.dominant(laws)]) / (2.0 * np.pi)
@@ -351,9 +335,9 @@ class _Planner:
         kept = np.zeros(len(counts), dtype=bool)
         fits = self._within_limits(self.conventional)
         if self.time is None:
-            reference = self._judged(self.task.after(counts), self.conventional.general())
+            reference = self._judged(self.task.after(counts), self.conventional)
             keep = fits & (worst >= reference - self._worthwhile())
-            laws = laws.replaced(keep, self.conventional.take(keep).general())
+            laws = laws.replaced(keep, self.conventional.take(keep))
             worst = np.where(keep, reference, worst)
             kept |= keep
             laws, counts, worst = self._extend(laws, counts, worst)
@@ -436,7 +420,7 @@ class _Planner:
             move=self.move[keep],
             share=self.share[keep],
             laws=laws.take(keep),
-            conventional=self.conventional.take(keep).general(),
+            conventional=self.conventional.take(keep),
             law_counts=counts[keep],
             kept=kept[keep],
             designed=self.profile,

@@ -18,6 +18,9 @@ from gcodejerk.motion.laws import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.reasons import CERTAIN
 
+STANDSTILL = 1e-9
+"""An axis that moves less than this does not move [mm] or [deg]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
@@ -161,3 +164,32 @@ class Plans:
         """The laws of a move."""
         begin, end = np.searchsorted(self.move, [move, move + 1])
         return range(int(begin), int(end))
+
+
+def path_length(displacement: Array, machine: Machine) -> Array:
+    """Length of straight moves: of the linear axes, or of the rotary ones where only they move.
+
+    Parameters
+    ----------
+    displacement : ndarray, shape (n, 9)
+        Of each axis. [mm] or [deg]
+    machine : Machine
+        Tells which axes are rotary.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        [mm] or [deg]
+    """
+    rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
+    linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
+    turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
+    length: Array = np.where(linear > STANDSTILL, linear, turning)
+    return length
+
+
+def _is_rotary(machine: Machine, axis: str) -> bool:
+    """Whether an axis turns; one that the machine lacks is what its letter says."""
+    if axis in machine.axis_names:
+        return machine.axis(axis).rotary
+    return axis in "ABC"

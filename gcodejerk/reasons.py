@@ -38,6 +38,8 @@ class Reason(enum.StrEnum):
     FEED_UNKNOWN = "feed to restore unknown"
     BEAM = "a beam may be on, which G0 darkens"
     AXIS_UNKNOWN = "axis not in the machine file"
+    NO_MODE = "no modes in the machine file"
+    NO_BLENDING = "the control does not blend blocks of this axis"
     TOO_SHORT = "shorter than minimum_length"
     TOO_LONG = "too long for a stream"
     BEYOND_TRAVEL = "beyond travel"

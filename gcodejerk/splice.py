@@ -2,6 +2,8 @@
 
 Rule 1: what is not a planned rapid's block is copied from the source, byte for byte.
 
+Below the stamp stands one line for the operator: which override acts on streams.
+
 Rule 2: the stamp carries a sum of the whole output, itself left out, so that every later change of
 it shows, however small: an F that is 1 % off at low speed moves no point and breaks no limit.
 """
@@ -14,6 +16,7 @@ from collections.abc import Sequence
 from typing import BinaryIO
 
 from gcodejerk import __version__
+from gcodejerk.advice import stamp_note
 from gcodejerk.emit import Controller, Options
 from gcodejerk.errors import EmitError
 from gcodejerk.expanded import TERMINATOR_LENGTH
@@ -107,7 +110,8 @@ class Splicer:
         self.stamp = b""
         if emitter.in_place and options.dialect.writing is not None:
             opens, closes = options.dialect.writing.comment
-            self.stamp = opens + stamp + closes + program.newline
+            note = stamp_note(emitter.name).encode()
+            self.stamp = b"".join(opens + text + closes + program.newline for text in (stamp, note))
         self.digest = hashlib.blake2b(digest_size=16)
         self.written = hashlib.blake2b(digest_size=SUM_DIGITS // 2)
         self.sum_at: int | None = None

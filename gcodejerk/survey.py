@@ -12,21 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.designs import Task
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import Axis, Machine, Mode
+from gcodejerk.machine import AXES, Axis, Machine, Mode
 from gcodejerk.motion import (
-    SymmetricLaws,
-    conventional_laws,
+    Laws,
+    laws_response,
     mode_poles,
     residual_displacement,
-    symmetric_response,
     whole_intervals,
 )
 from gcodejerk.motion.amplitudes import null_curve
 from gcodejerk.motion.conditions import Condition, Peaks, condition_peaks, feasible, limit_use
+from gcodejerk.motion.laws import Array
 from gcodejerk.motion.maps import amplitude_map, displacement_map
-
-Array = NDArray[np.float64]
+from gcodejerk.plans import Modes
 
 ALL = "all"
 """In place of a mode: the worst displacement over all of them."""
@@ -155,7 +155,10 @@ class Survey:
         """What the controller's own G0 reaches; the jerk of a trapezoid is infinite."""
         law = self._conventional()
         return Peaks(
-            *(self.length * peak[0] for peak in (law.velocity, law.acceleration, law.jerk))
+            *(
+                self.length * peak[0]
+                for peak in (law.peak_velocity, law.peak_acceleration, law.peak_jerk)
+            )
         )
 
     def values(self, T1: Array, T_SUM: Array) -> Array:
@@ -199,7 +202,7 @@ class Survey:
     def conventional_amplitude(self, mode: Mode) -> float:
         """What one mode keeps of the controller's own G0, for participation 1 [mm/s^2]."""
         poles = mode_poles([mode.frequency], [mode.damping])
-        unit = residual_displacement(symmetric_response(self._conventional(), poles), poles)
+        unit = residual_displacement(laws_response(self._conventional(), poles), poles)
         return float(unit[0, 0] * self.length * (2.0 * np.pi * mode.frequency) ** 2)
 
     @property
@@ -250,10 +253,11 @@ class Survey:
             low, high = T1[max(best - 1, 0)], T1[min(best + 1, len(T1) - 1)]
         return Chosen(float(T1[best]), T, float(value[best]))
 
-    def _conventional(self) -> SymmetricLaws:
+    def _conventional(self) -> Laws:
         """The unit law of the controller's own G0."""
-        rapid, L = self.axis.rapid, self.length
-        return conventional_laws([rapid.velocity / L], [rapid.acceleration / L], [rapid.jerk / L])
+        share = np.zeros((1, len(AXES)))
+        share[0, AXES.index(self.axis.name)] = self.length
+        return Task.of(self.machine, Modes.of(self.machine), share).conventional
 
     def nulls(self, T_SUM: Array) -> Array:
         """T1 at which the dominant mode without damping would keep nothing; see `null_curve`."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from typing import Annotated
 
 import typer
@@ -20,12 +19,13 @@ def machine_check(
     """Validate a machine file; every problem with its line and column."""
     described = load_machine(machine, None)
     axes = ", ".join(f"{axis.name} ({len(axis.modes)})" for axis in described.axes)
-    from gcodejerk.machine import resolution_warnings
-
-    for warning in resolution_warnings(described):
-        print(f"{described.source}: warning: {warning}", file=sys.stderr)
     structure = f", and {len(described.modes)} of the structure" if described.modes else ""
-    print(f"{described.source}: {described.name}: good; axes (modes): {axes}{structure}")
+    for warning in described.warnings:
+        place, text = str(warning.place), str(warning)
+        print(text.replace(place, f"{place}: warning", 1))
+    count = len(described.warnings)
+    doubts = "" if not count else f"; {count} warning{'' if count == 1 else 's'}"
+    print(f"{described.source}: {described.name}: good{doubts}; axes (modes): {axes}{structure}")
 
 
 def machine_schema() -> None:

@@ -199,7 +199,7 @@ def inspect(
     from gcodejerk.batch import record_of
     from gcodejerk.files import open_input
     from gcodejerk.pipeline import Settings, process_file
-    from gcodejerk.report.tables import rapids_table, summary_line
+    from gcodejerk.report.tables import rapids_table, summary_line, whole_line
 
     described = load_machine(machine, file)
     settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
@@ -213,6 +213,8 @@ def inspect(
     for note in record["notes"]:
         print(f"note: {note}")
     print(summary_line(file, record["summary"]).replace(" rewritten", " would be rewritten"))
+    if whole := whole_line(record["summary"]):
+        print(whole)
 
 
 def verify(

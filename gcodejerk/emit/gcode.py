@@ -60,6 +60,8 @@ class GcodeController:
     api = 1
     in_place = True
     suffix = ""
+    unblended = ""
+    """Axes between whose blocks the control stops: their rapids are left alone."""
     forms: tuple[Form, ...] = ()
 
     def stride(self, interval: float) -> int:

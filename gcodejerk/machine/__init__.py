@@ -3,6 +3,12 @@
 from gcodejerk.machine.find import find_machine
 from gcodejerk.machine.model import (
     AXES,
+    BELL,
+    JERK_LIMITED,
+    LINUXCNC,
+    LONE_SHARE,
+    PLANNERS,
+    TRAPEZOIDAL,
     Axis,
     Design,
     Limits,
@@ -12,14 +18,19 @@ from gcodejerk.machine.model import (
     Spectrum,
 )
 from gcodejerk.machine.problems import MachineFileError
-from gcodejerk.machine.resolution import resolution_warnings
 from gcodejerk.machine.schema import machine_schema
 from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.writer import machine_yaml
 
 __all__ = [
     "AXES",
+    "BELL",
     "DIALECT_OF_CONTROLLER",
+    "JERK_LIMITED",
+    "LINUXCNC",
+    "LONE_SHARE",
+    "PLANNERS",
+    "TRAPEZOIDAL",
     "Axis",
     "Design",
     "Limits",
@@ -31,5 +42,4 @@ __all__ = [
     "find_machine",
     "machine_schema",
     "machine_yaml",
-    "resolution_warnings",
 ]

@@ -56,6 +56,10 @@ class Checker:
         """Where the value of a key stands."""
         return self.document.place(self._nodes[path])
 
+    def given(self, path: KeyPath) -> bool:
+        """Whether the file says something of a key."""
+        return path in self._nodes
+
     def key_place(self, path: KeyPath) -> Place:
         """Where a key itself stands."""
         return self.document.place(self._keys[path])

@@ -23,8 +23,9 @@ from gcodejerk.machine.model import (
     ProgramStart,
     Spectrum,
 )
-from gcodejerk.machine.problems import Problems
-from gcodejerk.machine.resolution import COARSEST
+from gcodejerk.machine.planner import choose_planners, planner_warnings
+from gcodejerk.machine.plausibility import COARSEST_RESOLUTION, plausibility_warnings
+from gcodejerk.machine.problems import Problems, place_order
 from gcodejerk.machine.spectrum import load_spectrum
 from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 
@@ -60,8 +61,9 @@ def load_text(text: str, name: str) -> Machine:
     spectra = _spectra(values, Path(name).parent, checker)
     _check_frequencies(values, checker)
     _check_participations(values, checker)
+    planners = choose_planners(values, checker)
     problems.raise_any()
-    return _machine(values, spectra, name, checker)
+    return _machine(values, spectra, planners, name, checker)
 
 
 def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
@@ -91,11 +93,11 @@ def _check_resolutions(values: dict[str, Any], checker: Checker) -> None:
     """Refuse steps so coarse that no rapid could be written in them."""
     for name, axis in values.get("axes", {}).items():
         resolution = axis.get("resolution")
-        if isinstance(resolution, float) and resolution > COARSEST:
+        if isinstance(resolution, float) and resolution > COARSEST_RESOLUTION:
             unit = "deg" if axis.get("type") == "rotary" or name in "ABC" else "mm"
             checker.problems.add(
                 checker.place(("axes", name, "resolution")),
-                f"axes.{name}.resolution is {resolution:g}, expected at most {COARSEST:g} [{unit}]",
+                f"axes.{name}.resolution is {resolution:g}, expected at most {COARSEST_RESOLUTION:g} [{unit}]",
                 "give the control's least increment, for example 0.001; a steps-per-mm figure is "
                 "its inverse",
             )
@@ -175,7 +177,11 @@ def _spectra(values: dict[str, Any], folder: Path, checker: Checker) -> dict[str
 
 
 def _machine(
-    values: dict[str, Any], spectra: dict[str, Spectrum], name: str, checker: Checker
+    values: dict[str, Any],
+    spectra: dict[str, Spectrum],
+    planners: dict[str, str],
+    name: str,
+    checker: Checker,
 ) -> Machine:
     controller = values["controller"]
     axes = values["axes"]
@@ -187,7 +193,9 @@ def _machine(
         positioning=values["positioning"],
         spindle=values.get("spindle"),
         axes=tuple(
-            _axis(a, axes[a], a in checker.rotary, spectra.get(a)) for a in AXES if a in axes
+            _axis(a, axes[a], a in checker.rotary, spectra.get(a), planners[a])
+            for a in AXES
+            if a in axes
         ),
         modes=tuple(
             _mode(mode, mode["participation"]) for mode in values.get("modes", {}).values()
@@ -196,10 +204,21 @@ def _machine(
         program=_program(values["program"]),
         inch=checker.inch,
         source=name,
+        warnings=tuple(
+            sorted(
+                [
+                    *planner_warnings(values, planners, checker),
+                    *plausibility_warnings(values, checker),
+                ],
+                key=place_order,
+            )
+        ),
     )
 
 
-def _axis(name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | None) -> Axis:
+def _axis(
+    name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | None, planner: str
+) -> Axis:
     return Axis(
         name=name,
         rotary=rotary,
@@ -213,6 +232,7 @@ def _axis(name: str, values: dict[str, Any], rotary: bool, spectrum: Spectrum | 
             _mode(mode, {name: mode["participation"]}) for mode in values.get("modes", {}).values()
         ),
         spectrum=spectrum,
+        planner=planner,
     )
 
 

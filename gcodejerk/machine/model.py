@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,17 @@ OSCILLATORS = 4
 """That a line of a spectrum stands for."""
 AXES = "XYZABCUVW"
 """Every axis letter, in the order in which axes are listed, written and reported."""
+LINUXCNC, TRAPEZOIDAL, JERK_LIMITED, BELL = PLANNERS = (
+    "linuxcnc-2.9", "trapezoidal", "jerk-limited", "bell",
+)  # fmt: skip
+"""The laws that a control's own rapid may follow (`Axis.conventional`)."""
+LONE_SHARE = 0.5
+"""Share of MAX_ACCELERATION that LinuxCNC 2.9 gives a lone G0.
+
+Played (2.9, 1 ms): under G64 a G0 that nothing follows in the queue (a dwell, an M code, a change
+of tool or offset, the program's end) has half, since half is kept back for a blend that never
+comes. One that another motion follows, and every one under G61 and G61.1, has all of it.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +125,7 @@ class Axis:
     resolution: float
     """The smallest step that is written. [mm] or [deg]"""
     rapid: Limits
-    """What the controller's own G0 does: this sets the conventional time."""
+    """What the controller's own G0 is set to; `conventional` is what it then does."""
     limit: Limits
     """What a designed profile may use."""
     travel: tuple[float, float] | None
@@ -125,6 +137,26 @@ class Axis:
     wrap: str | None = None
     """How it goes to an absolute position, if it is rotary: ``none``, ``shortest`` or ``sign`` as
     `gcodejerk.nc.Start` has them; None where the file does not say."""
+    planner: str = JERK_LIMITED
+    """Which law the controller's own G0 follows, one of `PLANNERS`; all axes' are alike."""
+
+    def conventional(self, lone: bool = True) -> Limits:
+        """What the controller's own G0 does: this sets the conventional time.
+
+        Parameters
+        ----------
+        lone : bool
+            No other motion follows the rapid directly; only `linuxcnc-2.9` makes a difference.
+
+        Returns
+        -------
+        Limits
+            Under `bell`, the acceleration and the jerk of a ramp that is long enough for both.
+        """
+        own = self.rapid
+        share = LONE_SHARE if lone and self.planner == LINUXCNC else 1.0
+        jerk = own.jerk if self.planner in (JERK_LIMITED, BELL) else math.inf
+        return Limits(own.velocity, share * own.acceleration, jerk)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +221,8 @@ class Machine:
     """The file's lengths are inches."""
     source: str = field(default="<machine>", compare=False)
     """The file, as it was named."""
+    warnings: tuple[MachineError, ...] = field(default=(), compare=False, repr=False)
+    """What the file says that is possible, but hardly meant; each with its place."""
 
     @classmethod
     def load(cls, path: str | Path) -> Machine:
@@ -257,6 +291,15 @@ class Machine:
     def axis_names(self) -> tuple[str, ...]:
         """Letters of the axes, in the order of `AXES`."""
         return tuple(axis.name for axis in self.axes)
+
+    @property
+    def planner(self) -> str:
+        """Which law the controller's own rapids follow; `jerk-limited` where any axis has a jerk.
+
+        `trapezoidal` is `jerk-limited` without a jerk, so that axes of both may move together.
+        """
+        found = {axis.planner for axis in self.axes}
+        return min(found, key=(JERK_LIMITED, TRAPEZOIDAL, LINUXCNC, BELL).index)
 
     @property
     def settings_hash(self) -> str:

@@ -29,7 +29,7 @@ class MachineFileError(MachineError):
     """
 
     def __init__(self, problems: Iterable[MachineError]) -> None:
-        self.problems = tuple(sorted(problems, key=_order))
+        self.problems = tuple(sorted(problems, key=place_order))
         first = self.problems[0]
         super().__init__(first.problem, first.remedy, first.place)
 
@@ -77,6 +77,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     return by_folded[close[0]] if close else None
 
 
-def _order(problem: MachineError) -> tuple[int, int]:
+def place_order(problem: MachineError) -> tuple[int, int]:
+    """Line and column of a problem, to list problems in the order of the file."""
     place = problem.place or Place("")
     return place.line or 0, place.column or 0

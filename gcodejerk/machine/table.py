@@ -13,7 +13,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gcodejerk.machine.model import AXES
+from gcodejerk.machine.model import AXES, PLANNERS
 
 SCHEMA_VERSION = 1
 
@@ -177,6 +177,14 @@ _AXIS_NAMES = f"an axis: {', '.join(AXES)}"
 _POSITIONS = Table(((_LETTERS, _LENGTH),), _AXIS_NAMES, tuple(AXES))
 
 
+_PLANNER = Key("planner", Choice(PLANNERS),
+    "Which law the controller's own G0 follows. linuxcnc-2.9: trapezoidal velocity, with half of "
+    "the acceleration (MAX_ACCELERATION) where no other motion follows; trapezoidal; jerk-limited; "
+    "bell: a trapezoid of velocity averaged over acceleration/jerk. Left out: linuxcnc-2.9 with "
+    "controller: linuxcnc and no jerk; else jerk-limited with a jerk, trapezoidal without.",
+    example="jerk-limited")  # fmt: skip
+
+
 def _limits(required: bool, doc: str) -> Section:
     """Keys of `rapid` (required) and of `limit`, which falls back on it."""
     return Section(
@@ -189,6 +197,7 @@ def _limits(required: bool, doc: str) -> Section:
                 "Left out: the controller moves with trapezoidal velocity." if required else
                 "Left out: ten times that of rapid, or no limit where rapid has none."),
                 example="5.0e+5"),
+            *((_PLANNER,) if required else ()),
         )
     )  # fmt: skip
 
@@ -235,7 +244,7 @@ _AXIS = Section(
         Key("resolution", Number("mm", above=0.0), "The smallest step that is written.",
             default=1e-4, example="1.0e-4"),
         Key("rapid", _limits(True, "of the controller's own G0"),
-            "What the controller's own G0 does today: this sets the conventional time.",
+            "What the controller's own G0 is set to today: with planner, the conventional time.",
             required=True, example="{velocity: 600, acceleration: 5000, jerk: 5.0e+5}"),
         Key("limit", _limits(False, "that a designed profile may use"),
             "What a designed profile may use; what is left out is as in rapid."),

@@ -101,7 +101,7 @@ def _axis(axis: Axis) -> list[str]:
         f"    type: {'rotary' if axis.rotary else 'linear'}",
         f"    diameter: {'true' if axis.diameter else 'false'}",
         f"    resolution: {_number(axis.resolution)}",
-        f"    rapid: {_limits(axis.rapid)}",
+        f"    rapid: {_limits(axis.rapid, axis.planner)}",
         f"    limit: {_limits(axis.limit)}",
     ]
     if axis.rotary and axis.wrap is not None:
@@ -140,12 +140,13 @@ def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> lis
     return lines
 
 
-def _limits(limits: Limits) -> str:
+def _limits(limits: Limits, planner: str | None = None) -> str:
     """Limits in braces; an infinite jerk is written by leaving it out."""
     values = {"velocity": limits.velocity, "acceleration": limits.acceleration}
     if math.isfinite(limits.jerk):
         values["jerk"] = limits.jerk
-    return _flow(values)
+    law = {} if planner is None else {"planner": planner}
+    return _braces({key: _number(value) for key, value in values.items()} | law)
 
 
 def _flow(values: Mapping[str, float]) -> str:

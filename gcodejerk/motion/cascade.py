@@ -79,7 +79,7 @@ def design_cascade(
         w2[part], w3[part], worst[part] = search.run(boxes)
     feasible = np.isfinite(worst)
     w2, w3 = np.where(feasible, w2, total / 3.0), np.where(feasible, w3, total / 6.0)
-    return _laws(total - w2 - w3, w2, w3), worst
+    return box_laws(total - w2 - w3, w2, w3), worst
 
 
 def box_response(width: Array, poles: Complex) -> Complex:
@@ -168,8 +168,18 @@ class _Search:
         return value
 
 
-def _laws(w1: Array, w2: Array, w3: Array) -> Laws:
-    """Laws of boxes: a step of the jerk, up or down, at the sum of every subset of the widths."""
+def box_laws(w1: Array, w2: Array, w3: Array) -> Laws:
+    """Laws of boxes: a step of the jerk, up or down, at the sum of every subset of the widths.
+
+    Parameters
+    ----------
+    w1, w2, w3 : ndarray, shape (n,)
+        Widths, in any order. [s]
+
+    Returns
+    -------
+    Laws
+    """
     chosen = np.array(list(itertools.product((0, 1), repeat=3)))
     widths = np.stack([w1, w2, w3], axis=1)
     times = widths @ chosen.T

@@ -188,6 +188,11 @@ class Laws:
         order[index] = len(self) + np.arange(len(other))
         return joined([self, other]).take(order)
 
+    def stretched(self, factor: Array) -> Laws:
+        """The same laws slower by a factor each, shape (n,)."""
+        by = factor[self.owner]
+        return Laws.of(self.first, self.duration * by, self.acceleration / by**2, self.jerk / by**3)
+
     def _columns(self) -> tuple[Array, ...]:
         """The columns of segments, in the order of the attributes."""
         return (

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 import numpy as np
@@ -23,6 +23,7 @@ from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
 from gcodejerk.nc.lexer import read_lines
 from gcodejerk.nc.modal import NAN, State
+from gcodejerk.nc.neighbours import with_neighbours
 from gcodejerk.nc.outline import find_outline, read_body, refers, seekable
 from gcodejerk.nc.rapids import Rapids
 from gcodejerk.nc.reader import Reader
@@ -99,6 +100,7 @@ def read_program(
     start: Start = NOTHING_KNOWN,
     progress: Callable[[int], None] | None = None,
     fast: bool = True,
+    neighbours: bool = False,
 ) -> Program:
     r"""Read a program and find its rapids.
 
@@ -116,6 +118,8 @@ def read_program(
         Called with the number of bytes read so far.
     fast : bool, optional
         False sends every line the careful way; the result is the same.
+    neighbours : bool, optional
+        Look at what follows each rapid, for `Rapids.lone`; the file is seekable.
 
     Returns
     -------
@@ -138,7 +142,11 @@ def read_program(
     array([False,  True])
     """
     reader, file = open_reader(file, name, dialect, start)
-    return follow(read_chunks(file, name), reader, progress, fast)
+    origin = file.tell() if neighbours else 0
+    program = follow(read_chunks(file, name), reader, progress, fast)
+    if not neighbours:
+        return program
+    return replace(program, rapids=with_neighbours(file, origin, program.rapids))
 
 
 def open_reader(

@@ -22,6 +22,8 @@ CERTAIN = 255
 """Entry of `Rapids.reason` for a rapid whose start, end and path are known."""
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
 FEED_UNKNOWN = _INDEX[Reason.FEED_UNKNOWN]
+EXACT = (61, 62)
+"""Path modes (G61, G61.1) in which no motion blends with the next."""
 NO_FEED, USES_FEED, GIVES_FEED = 0, 1, 2
 """What a block means for an F word in front of it: nothing, it may be used, it is replaced."""
 
@@ -66,6 +68,9 @@ class Rapids:
     path_p: NDArray[np.float64]
     """P and Q of G64 in the program's own unit, NaN absent."""
     path_q: NDArray[np.float64]
+    lone: NDArray[np.bool_]
+    """Under G64, or in a path mode that is not known; and nothing that moves follows directly,
+    where `neighbours` has looked. LinuxCNC 2.9 gives such a rapid half of its acceleration."""
     offset: NDArray[np.float64]
     """Shape (n, 9): machine = program + offset [mm, deg]; NaN where unknown."""
     turned: NDArray[np.uint16]
@@ -88,7 +93,7 @@ _TYPES: dict[str, tuple[type, int]] = {
         name: (np.bool_, 0)
         for name in (
             *("inch", "incremental", "diameter", "distance_stated"),
-            *("feed_mode_stated", "feed_needed", "feed_whole", "beam"),
+            *("feed_mode_stated", "feed_needed", "feed_whole", "beam", "lone"),
         )
     },
 }
@@ -107,6 +112,7 @@ def common_columns(state: State) -> dict[str, object]:
         "path": state.path or 0,
         "path_p": state.path_p,
         "path_q": state.path_q,
+        "lone": state.path not in EXACT,
         "offset": unknown,
         "feed_whole": bool(state.feed_whole),
         "speed": np.nan,

@@ -25,6 +25,7 @@ from gcodejerk.nc import Rapids
 from gcodejerk.pipeline import Result
 from gcodejerk.plans import Plans
 from gcodejerk.reasons import REASONS
+from gcodejerk.settling import Left, settling_times
 
 Record = dict[str, Any]
 DIGITS = 10
@@ -42,6 +43,7 @@ class Records:
         conventional: Array,
         limit: Array | None = None,
         deviation: Array | None = None,
+        rest: Left | None = None,
     ) -> None:
         self.plans, self.kept = plans, kept
         self.deviation = np.zeros(len(plans)) if deviation is None else deviation
@@ -56,6 +58,8 @@ class Records:
         self.extension = extra * interval
         written = kept[plans.move] if len(plans) else np.zeros(0, dtype=bool)
         self.laws = plans.laws.replaced(written, plans.conventional.take(written))
+        self.rest = rest
+        self.oscillators = (residual, conventional)
         self.peaks = (self.laws.peak_velocity, self.laws.peak_acceleration, self.laws.peak_jerk)
 
     def summary(self) -> Record:
@@ -73,7 +77,33 @@ class Records:
             "extended": int(np.count_nonzero(self.extension)),
             "worst_residual": _largest(self.residual[planned]),
             "worst_conventional_residual": _largest(self.conventional[planned]),
+            **self._everything(),
         }
+
+    def _everything(self) -> Record:
+        """What the whole program leaves and lasts, rapids left alone included; today beside it."""
+        plans, planned, rest = self.plans, self.plans.planned, self.rest
+        unknown = 0 if rest is None else int(np.count_nonzero(rest.unknown))
+        left = np.full_like(self.oscillators[0], np.nan) if rest is None else rest.residual
+        same = 0.0 if rest is None else float(rest.time.sum())
+        now, then = (
+            np.where(planned[:, np.newaxis], amplitude, left) for amplitude in self.oscillators
+        )
+        modes, tolerance = plans.modes, plans.machine.design.tolerance
+        motion = float(plans.counts.sum()) * plans.machine.interval
+        today = float(plans.conventional_time[planned].sum())
+        out: Record = {
+            "worst_residual_share": _share(self.residual[planned], self.conventional[planned]),
+            "worst_residual_all": _largest(modes.grouped(now)),
+            "worst_conventional_residual_all": _largest(modes.grouped(then)),
+            "left_unknown": unknown,
+            "rapid_time_all": number(motion + same),
+            "conventional_time_all": number(today + same),
+        }
+        for name, amplitude in (("settling_time", now), ("conventional_settling_time", then)):
+            waiting = settling_times(amplitude, modes, tolerance)
+            out[name] = number(float(np.nansum(waiting)))
+        return out | {"tolerance": number(tolerance)}
 
     def motion(self, row: int) -> Record:
         """Status, times, segments, peaks and residuals of one move."""
@@ -167,7 +197,9 @@ class Records:
 
 def summary_of(result: Result) -> Record:
     """The summary of a report, without the records of its rapids."""
-    records = Records(result.plans, result.kept, result.residual, result.conventional_residual)
+    records = Records(
+        result.plans, result.kept, result.residual, result.conventional_residual, rest=result.rest
+    )
     summary = {"blocks": result.program.blocks} | records.summary()
     if result.expansion is not None:
         summary["cycles"] = result.expansion.holes
@@ -323,5 +355,11 @@ def _positions(rapids: Rapids, position: Any, row: int) -> Record:
 
 
 def _largest(residual: Array) -> float | None:
-    """The largest residual of all rapids and modes [mm]."""
-    return number(float(residual.max())) if residual.size else None
+    """The largest residual of all rapids and modes, as far as they are known [mm]."""
+    return None if np.isnan(residual).all() else number(float(np.nanmax(residual)))
+
+
+def _share(planned: Array, today: Array) -> float | None:
+    """The worst residual as a share of the worst today [-]."""
+    largest = float(today.max(initial=0.0))
+    return number(float(planned.max(initial=0.0)) / largest) if largest else None

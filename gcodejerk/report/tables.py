@@ -76,7 +76,8 @@ def summary_line(name: str, summary: Record) -> str:
     if summary["planned"] and summary["worst_conventional_residual"]:
         now = summary["worst_conventional_residual"] * UM_PER_MM
         then = summary["worst_residual"] * UM_PER_MM
-        parts.append(f"worst residual {now:.1f} -> {then:.1f} um")
+        share = 100.0 * summary["worst_residual_share"]
+        parts.append(f"worst residual {share:.2g} % of today's ({now:.1f} -> {then:.1f} um)")
     if summary["extended"]:
         extra = (summary["rapid_time"] - summary["conventional_time"]) * MS_PER_S
         parts.append(f"{summary['extended']} longer than today, {extra:.0f} ms in all")
@@ -84,6 +85,27 @@ def summary_line(name: str, summary: Record) -> str:
         why = ", ".join(f"{count} {reason}" for reason, count in summary["left_by_reason"].items())
         parts.append(f"{summary['left']} left alone ({why})")
     return "; ".join(parts)
+
+
+def whole_line(summary: Record) -> str:
+    """One line on the whole program: what stays, and the time that a shop pays for."""
+    if not summary["planned"] or summary["worst_residual_all"] is None:
+        return ""
+    worst = [
+        f"{summary[key] * UM_PER_MM:.1f}"
+        for key in ("worst_conventional_residual_all", "worst_residual_all")
+    ]
+    motion = [f"{summary[key]:.2f}" for key in ("conventional_time_all", "rapid_time_all")]
+    waiting = [
+        "without end" if summary[key] is None else f"{summary[key]:.2f}"
+        for key in ("conventional_settling_time", "settling_time")
+    ]
+    unknown = f", {summary['left_unknown']} not known" if summary["left_unknown"] else ""
+    return (
+        f"  all rapids, those left alone too{unknown}: worst {worst[0]} -> {worst[1]} um; "
+        f"in motion {motion[0]} -> {motion[1]} s; then until all is within "
+        f"{summary['tolerance'] * UM_PER_MM:g} um {waiting[0]} -> {waiting[1]} s"
+    )
 
 
 def move_tables(record: Record, conventional: Record) -> list[Table]:

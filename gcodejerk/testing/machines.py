@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import AXES, BELL, JERK_LIMITED, Machine
 
 
 @st.composite
@@ -20,6 +20,7 @@ def machines(
     positioning: str | None = None,
     jerk_limited: bool | None = None,
     interval: float | None = None,
+    planner: str | None = None,
 ) -> Machine:
     """Strategy for machines over the range that is found in workshops.
 
@@ -36,6 +37,9 @@ def machines(
         Whether `rapid` has a jerk, or moves with trapezoidal velocity. Drawn for each axis.
     interval : float, optional
         Control command interval. Drawn between 0.0005 and 0.004. [s]
+    planner : str, optional
+        The law of the control's own rapids, one of `gcodejerk.machine.PLANNERS`; the limits alone
+        say it where left out. It decides `jerk_limited`.
 
     Returns
     -------
@@ -51,6 +55,8 @@ def machines(
     ...     assert machine.axis_names == ("X", "Z")
     >>> check()
     """
+    if planner is not None:
+        jerk_limited = planner in (JERK_LIMITED, BELL)
     letters = axes if axes is not None else draw(_letters)
     dt = interval if interval is not None else draw(st.sampled_from(_INTERVALS))
     lines = [
@@ -59,7 +65,7 @@ def machines(
         "axes:",
     ]
     for letter in letters:
-        lines += draw(_axis(letter, modes, dt, jerk_limited))
+        lines += draw(_axis(letter, modes, dt, jerk_limited, planner))
     if len(letters) > 1 and modes[1] > 0:
         lines += ["modes:", *draw(_structure_modes(letters, dt))]
     lines += [
@@ -84,8 +90,9 @@ def _number(low: float, high: float) -> st.SearchStrategy[str]:
 
 @st.composite
 def _axis(
-    draw: st.DrawFn, letter: str, modes: tuple[int, int], dt: float, jerk_limited: bool | None
-) -> list[str]:
+    draw: st.DrawFn, letter: str, modes: tuple[int, int], dt: float, jerk_limited: bool | None,
+    planner: str | None,
+) -> list[str]:  # fmt: skip
     velocity = draw(_number(5.0, 2000.0))
     acceleration = draw(_number(100.0, 30000.0))
     rapid = f"velocity: {velocity}, acceleration: {acceleration}"
@@ -94,6 +101,8 @@ def _axis(
         # Full acceleration after 2 to 100 ms.
         jerk = float(acceleration) / float(draw(_number(0.002, 0.1)))
         rapid += f", jerk: {jerk:.4e}"
+    if planner is not None:
+        rapid += f", planner: {planner}"
     reserve = float(draw(st.sampled_from(["1.0", "1.2", "2.0", "3.0"])))
     limit = f"acceleration: {reserve * float(acceleration)!r}"
     if draw(st.booleans()):

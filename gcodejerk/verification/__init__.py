@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from gcodejerk.errors import VerifyError
-from gcodejerk.machine import Machine
+from gcodejerk.machine import LINUXCNC, Machine
 from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
 from gcodejerk.start import program_start
 from gcodejerk.verification.agreement import confirm
@@ -236,6 +236,7 @@ def _read(
         name=name,
         dialect=dialect or machine.dialect,
         start=start,
+        neighbours=machine.planner == LINUXCNC,
     )
     original.seek(begin)
     return program

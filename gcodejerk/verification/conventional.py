@@ -8,6 +8,9 @@ the length 1. With peak velocity v the ramp lasts
 and both ramps together cover v r(v), since each is odd about its middle. Where V r(V) <= 1 the
 rest is cruise; otherwise v solves v r(v) = 1, found by bisection: no closed form that could be
 mistaken.
+
+A control with bell-shaped acceleration (`bell`) is judged by what its filter does: the trapezoid of
+velocity within V and A, and from its position the mean over the last A/J.
 """
 
 from __future__ import annotations
@@ -20,8 +23,15 @@ Array = NDArray[np.float64]
 HALVINGS = 64
 
 
-def peak_velocity(velocity: Array, acceleration: Array, jerk: Array) -> Array:
-    """Highest velocity [1/s] of a move of length 1 within limits, as for `rapid_time`."""
+def peak_velocity(
+    velocity: Array, acceleration: Array, jerk: Array, *, bell: bool = False
+) -> Array:
+    """Highest velocity [1/s] of a move of length 1 within limits, as for `rapid_time`.
+
+    A bell's is that of the trapezoid in front of the filter.
+    """
+    if bell:
+        return np.minimum(velocity, np.sqrt(acceleration))
     low, high = np.zeros_like(velocity), velocity.copy()
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -30,11 +40,17 @@ def peak_velocity(velocity: Array, acceleration: Array, jerk: Array) -> Array:
     return high
 
 
-def rapid_speed(t: Array, total: Array, peak: Array, acceleration: Array, jerk: Array) -> Array:
+def rapid_speed(
+    t: Array, total: Array, peak: Array, acceleration: Array, jerk: Array, *, bell: bool = False
+) -> Array:
     """Speed [1/s] of such moves at moments t, their own durations and peaks being known.
 
     Jerk must be finite: a trapezoid is never written.
     """
+    if bell:
+        t, width = np.clip(t, 0.0, total), acceleration / jerk
+        before, now = (_trapezoid(at, peak, acceleration, 2) for at in (t - width, t))
+        return np.asarray(np.maximum(now - before, 0.0) / width)
     t = np.minimum(t, total - t)
     full = np.minimum(acceleration, np.sqrt(peak * jerk))
     ramp, rise = _ramp(peak, acceleration, jerk), full / jerk
@@ -45,7 +61,17 @@ def rapid_speed(t: Array, total: Array, peak: Array, acceleration: Array, jerk: 
     return np.where(t <= 0.0, 0.0, np.where(t >= ramp, peak, speed))
 
 
-def box_widths(velocity: Array, acceleration: Array, jerk: Array) -> tuple[Array, Array, Array]:
+def _trapezoid(t: Array, peak: Array, acceleration: Array, power: int) -> Array:
+    """Position (power 2), or its integral (3), of a trapezoid of velocity over the length 1."""
+    rise, wide = peak / acceleration, 1.0 / peak
+    parts = [np.maximum(t - at, 0.0) ** power for at in (0.0, rise, wide, wide + rise)]
+    out: Array = (parts[0] - parts[1] - parts[2] + parts[3]) * acceleration / (2.0, 6.0)[power - 2]
+    return out
+
+
+def box_widths(
+    velocity: Array, acceleration: Array, jerk: Array, *, bell: bool = False
+) -> tuple[Array, Array, Array]:
     """Widths [s] of the boxes that such a move's velocity is folded of, as for `rapid_time`.
 
     Examples
@@ -55,16 +81,25 @@ def box_widths(velocity: Array, acceleration: Array, jerk: Array) -> tuple[Array
     >>> [float(w[0].round(9)) for w in box_widths(*np.array([[600.0], [5000.0], [5e5]]))]
     [0.02, 0.01, 0.01]
     """
-    peak = peak_velocity(velocity, acceleration, jerk)
+    peak = peak_velocity(velocity, acceleration, jerk, bell=bell)
+    if bell:
+        return 1.0 / peak, peak / acceleration, acceleration / jerk
     ramp = _ramp(peak, acceleration, jerk)
     rise = np.minimum(acceleration, np.sqrt(peak * jerk)) / jerk
     cruise = np.maximum(1.0 - peak * ramp, 0.0) / peak
     return ramp + cruise, ramp - rise, rise
 
 
-def rapid_position(t: Array, velocity: Array, acceleration: Array, jerk: Array) -> Array:
+def rapid_position(
+    t: Array, velocity: Array, acceleration: Array, jerk: Array, *, bell: bool = False
+) -> Array:
     """Position [-] of such moves at moments t since their start."""
-    peak = peak_velocity(velocity, acceleration, jerk)
+    peak = peak_velocity(velocity, acceleration, jerk, bell=bell)
+    if bell:
+        width = acceleration / jerk
+        total = 1.0 / peak + peak / acceleration + width
+        before, now = (_trapezoid(at, peak, acceleration, 3) for at in (t - width, t))
+        return np.where(t >= total, 1.0, (now - before) / width)
     wide, narrow, rise = box_widths(velocity, acceleration, jerk)
     ramp, total = narrow + rise, wide + narrow + rise
     u = np.clip(np.minimum(t, total - t), 0.0, None)
@@ -84,13 +119,15 @@ def _ramp(v: Array, acceleration: Array, jerk: Array) -> Array:
     return np.where(v * jerk >= acceleration**2, full, 2.0 * np.sqrt(v / jerk))
 
 
-def rapid_time(velocity: Array, acceleration: Array, jerk: Array) -> Array:
+def rapid_time(velocity: Array, acceleration: Array, jerk: Array, *, bell: bool = False) -> Array:
     """Duration [s] of a move of length 1 within limits.
 
     Parameters
     ----------
     velocity, acceleration, jerk : ndarray, shape (n,)
         Limits of axes divided by their displacement; jerk may be infinite. [1/s], ...
+    bell : bool, optional
+        The acceleration is bell-shaped.
 
     Returns
     -------
@@ -104,6 +141,8 @@ def rapid_time(velocity: Array, acceleration: Array, jerk: Array) -> Array:
     >>> rapid_time(V, A, J).round(9)
     array([0.04, 1.5 ])
     """
+    if bell:
+        return np.asarray(np.sum(box_widths(velocity, acceleration, jerk, bell=bell), axis=0))
     peak = peak_velocity(velocity, acceleration, jerk)
     ramp = _ramp(peak, acceleration, jerk)
     cruise = np.maximum(1.0 - peak * ramp, 0.0) / peak

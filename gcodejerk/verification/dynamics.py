@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import Machine
+from gcodejerk.machine import BELL, Machine
 from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import rapid_time
 from gcodejerk.verification.feeds import NOT_OWN, judge_feeds, rapid_limits
@@ -57,7 +57,7 @@ def limits_of(machine: Machine) -> Array:
 def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
     displacement = paths.displacement
-    total = _move_time(rapid_limits(paths, machine), displacement, machine)
+    total = _move_time(rapid_limits(paths, machine), displacement, machine, machine.planner == BELL)
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
     longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
     if machine.design.profile == "shortest":
@@ -66,26 +66,26 @@ def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     return usual.astype(np.int64), most.astype(np.int64)
 
 
-def _move_time(limits: Array, displacement: Array, machine: Machine) -> Array:
+def _move_time(limits: Array, displacement: Array, machine: Machine, bell: bool = False) -> Array:
     """Duration [s] of the fastest symmetric moves within limits, shape (3, moves, 9)."""
     if machine.positioning == "linear":
-        return rapid_time(*limits.min(axis=2))
-    total: Array = _axis_times(limits, displacement).max(axis=1, initial=0.0)
+        return rapid_time(*limits.min(axis=2), bell=bell)
+    total: Array = _axis_times(limits, displacement, bell).max(axis=1, initial=0.0)
     return total
 
 
-def _axis_times(limits: Array, displacement: Array) -> Array:
+def _axis_times(limits: Array, displacement: Array, bell: bool = False) -> Array:
     """The same for each axis by itself, shape (moves, 9)."""
     moving = displacement != 0.0
     each = np.zeros(displacement.shape)
-    each[moving] = rapid_time(*limits[:, moving])
+    each[moving] = rapid_time(*limits[:, moving], bell=bell)
     return each
 
 
 def _own_times(paths: Paths, machine: Machine) -> tuple[Array, Array]:
     """What each axis takes by itself [s], shape (moves, 9): conventionally, and at most."""
     dt, displacement = machine.interval, paths.displacement
-    each = _axis_times(rapid_limits(paths, machine), displacement)
+    each = _axis_times(rapid_limits(paths, machine), displacement, machine.planner == BELL)
     usual = np.ceil(each / dt - ON_GRID)
     if machine.design.profile == "shortest":
         alone = _axis_times(_own_limits(displacement, machine), displacement)
@@ -224,6 +224,7 @@ def _take(paths: Paths, streams: Index) -> Paths:
         unit=paths.unit[streams],
         speed=paths.speed[streams],
         step=paths.step[streams],
+        lone=paths.lone[streams],
     )
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import Machine
+from gcodejerk.machine import BELL, LINUXCNC, LONE_SHARE, Machine
 from gcodejerk.nc import AXES
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.conventional import peak_velocity, rapid_speed, rapid_time
@@ -76,10 +76,12 @@ def rapid_limits(paths: Paths, machine: Machine) -> Array:
     """Limits of the controller's own rapid over the displacement, shape (3, moves, 9)."""
     rapid = np.full((3, len(AXES)), np.inf)
     for axis in machine.axes:
-        own = axis.rapid
+        own = axis.conventional(lone=False)
         rapid[:, AXES.index(axis.name)] = own.velocity, own.acceleration, own.jerk
     with np.errstate(divide="ignore"):
         out: Array = rapid[:, np.newaxis, :] / np.abs(paths.displacement)
+        if machine.planner == LINUXCNC:
+            out[1] *= np.where(paths.lone, LONE_SHARE, 1.0)[:, np.newaxis]
         # A rapid that runs at F does so along its path, in which all axes share.
         length = np.sqrt((paths.displacement[:, LINEAR] ** 2).sum(axis=1))
         out[0] = np.fmin(out[0], (paths.speed / length)[:, np.newaxis])
@@ -208,10 +210,11 @@ class _Judge:
         V, A, J = rapid_limits(self.paths, self.machine).min(axis=2)
         law = np.isfinite(J)
         J = np.where(law, J, 1.0)
-        total, peak = rapid_time(V, A, J), peak_velocity(V, A, J)
+        bell = self.machine.planner == BELL
+        total, peak = rapid_time(V, A, J, bell=bell), peak_velocity(V, A, J, bell=bell)
         t = self.t - self.t[self.paths.begin][self.owner]
         columns = (column[self.owner] for column in (total, peak, A, J))
-        v = rapid_speed(t, *columns) * self.length[self.owner]
+        v = rapid_speed(t, *columns, bell=bell) * self.length[self.owner]
         expected = np.where(self.first, 0.0, np.maximum(v, np.roll(v, 1)))
         bad = self._odd_ones(expected, few=1) & law[self.owner]
         return Kind.FEED, bad, NOT_OWN

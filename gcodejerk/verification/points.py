@@ -60,6 +60,8 @@ class Paths:
     """What the controller's own rapid keeps to; NaN where only the axes limit it. [mm/s]"""
     step: Array
     """Smallest step that is written of each axis, shape (k, 9). [mm] or [deg]"""
+    lone: NDArray[np.bool_]
+    """As in `nc.Rapids`."""
 
     @property
     def count(self) -> Index:
@@ -185,6 +187,7 @@ class Reader:
             unit=unit,
             speed=rapids.speed[index],
             step=np.where(rapids.inch[index, np.newaxis], self.inch_step, self.step),
+            lone=rapids.lone[index],
         )
 
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import Machine
+from gcodejerk.machine import BELL, Machine
 from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import box_widths, rapid_position
 from gcodejerk.verification.oscillators import Oscillators
@@ -111,7 +111,7 @@ class _Streams:
         """Streams whose own rapid no stream can be: a design need be better over the band only."""
         out = np.zeros(len(self.count), dtype=np.bool_)
         for axis in self.machine.axes:
-            own, limit = axis.rapid, axis.limit
+            own, limit = axis.conventional(lone=False), axis.limit
             fits = np.isfinite(own.jerk) and own.jerk <= limit.jerk
             fits = fits and own.acceleration <= limit.acceleration
             moves = self.paths.displacement[:, AXES.index(axis.name)] != 0.0
@@ -144,7 +144,7 @@ class _Streams:
         for a in self.axes:
             moves = displacement[:, a] != 0.0
             V, A, J = (np.where(moves, limit[:, a], 1.0) for limit in self.limits)
-            widths[a] = box_widths(V, A, J)
+            widths[a] = box_widths(V, A, J, bell=self.machine.planner == BELL)
             ends[:, a] = np.where(moves, np.sum(widths[a], axis=0), 0.0)
         rest = ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
         for m, pole in enumerate(modes.poles):
@@ -165,7 +165,8 @@ class _Streams:
         for a in self.axes:
             D = self.paths.displacement[:, a]
             V, A, J = (np.where(D != 0.0, limit[:, a], 1.0) for limit in self.limits)
-            share = rapid_position(t, *(column[self.owner] for column in (V, A, J)))
+            bell = self.machine.planner == BELL
+            share = rapid_position(t, *(column[self.owner] for column in (V, A, J)), bell=bell)
             out[:, a] = self.paths.start[self.owner, a] + share * D[self.owner]
         return out
 

@@ -167,4 +167,5 @@ class TableReader:
             unit=np.ones(len(index)),
             speed=self.rapids.speed[index],
             step=np.tile(resolutions(self.machine), (len(index), 1)),
+            lone=self.rapids.lone[index],
         )

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gcodejerk.advice import STAMP_NOTES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, REASONS, Program, find_dialect
 from gcodejerk.verification.allowed import decimals_of, line_limit
@@ -153,6 +154,10 @@ class Walk:
         if line[len(body) :] != self.program.newline:
             self._complain(Kind.STAMP, "stamp does not end as the lines of the original do")
         self.processed.skip(len(line))
+        below = self.processed.peek_line()
+        notes = [opens + note.encode() + closes + self.program.newline for note in STAMP_NOTES]
+        if below in notes and below != self.original.peek(len(below)):
+            self.processed.skip(len(below))
 
     def _different(self) -> None:
         """Say how the files differ where they stand."""

@@ -8,12 +8,13 @@ from __future__ import annotations
 import io
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.errors import GcodejerkError
-from gcodejerk.machine import Machine, find_machine
+from gcodejerk.machine import PLANNERS, Machine, find_machine
 from gcodejerk.pipeline import process
 from gcodejerk.testing.machines import machines
 from gcodejerk.testing.programs import programs
@@ -55,6 +56,32 @@ def test_every_output_is_accepted(machine, data, known):
     assert found.violations == ()
     assert (found.rapids, found.rewritten) == (len(result.program.rapids), result.planned)
     assert found.kept == result.program.lines - result.planned
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@settings(parent=CALM, max_examples=25)
+@given(st.data(), st.booleans(), st.sampled_from(["condition3", "cascade", "conventional"]))
+def test_every_output_is_accepted_whatever_law_todays_rapids_follow(planner, data, known, profile):
+    machine = ready(data.draw(machines(axes="XYZ", planner=planner)), known)
+    assert machine.planner == planner
+    program = data.draw(programs())
+    try:
+        result = process(program, machine, verify=False, controller="linuxcnc", profile=profile)
+    except GcodejerkError:
+        return
+    design = replace(machine.design, profile=profile)
+    found = verify(program, result.output, replace(machine, design=design))
+    assert found.violations == ()
+    assert found.rewritten == result.planned
+    # No rapid is longer than the law of its control allows.
+    planned = result.plans.planned
+    today = result.plans.conventional_time[planned]
+    most = np.maximum(
+        np.ceil(today / machine.interval - 1e-6) * machine.interval,
+        today * (1.0 + machine.design.max_extension),
+    )
+    time = result.plans.counts[planned] * machine.interval
+    assert (time <= most * (1.0 + 1e-9) + 1e-9).all()
 
 
 @CALM

@@ -64,7 +64,7 @@ def test_the_table_has_everyone_and_fits_a_terminal(run):
 
 
 def test_what_the_user_gains_is_the_last_word(run):
-    code, said = run("-m", "vmc", "Z=1")
+    code, said = run("-m", "centre", "Z=1")
     assert code == 0
     assert "shortest is settled 64 ms after the start" in said.splitlines()[-2]
     assert "the controller's own G0 is settled after 1.6 s" in said.splitlines()[-2]
@@ -98,7 +98,7 @@ def test_json_on_standard_output_is_nothing_else(run):
     ("arguments", "name"),
     [
         (("-m", "paper", "Z=1"), "a.png"),
-        (("-m", "vmc", "x=2", "Y=-5"), "b.PNG"),
+        (("-m", "centre", "x=2", "Y=-5"), "b.PNG"),
         (("-m", "router", "X=2"), "c.png"),
         (("-m", "drill", "Z=3", "--shaper-damping", "mode"), "d.png"),
     ],
@@ -176,10 +176,10 @@ def test_what_is_refused_leaves_nothing(run, tmp_path, arguments, code, message)
 
 
 def test_shapers_are_made_for_the_damping_that_is_asked_for(run):
-    code, said = run("-m", "vmc", "Z=1", "--shaper-damping", "mode")
+    code, said = run("-m", "centre", "Z=1", "--shaper-damping", "mode")
     assert code == 0
     assert "made for 30 Hz with damping 0.02" in said
-    code, said = run("-m", "vmc", "Z=1", "--shaper-damping", "0.01")
+    code, said = run("-m", "centre", "Z=1", "--shaper-damping", "0.01")
     assert "made for 30 Hz with damping 0.01" in said
 
 
@@ -208,7 +208,7 @@ def test_without_the_solver_the_rest_is_shown_with_the_remedy(run, tmp_path, mon
 
 
 def test_axes_on_their_own_are_compared_too(run, tmp_path):
-    text = find_machine("vmc").read_text(encoding="utf-8")
+    text = find_machine("centre").read_text(encoding="utf-8")
     text = text.replace("positioning: linear", "positioning: independent")
     (tmp_path / "own.yaml").write_text(text, encoding="utf-8")
     code, said = run("-m", "own.yaml", "X=6", "Z=1", "--json", "c.json", "--plot", "c.png")

@@ -51,7 +51,7 @@ def pixels(path):
 
 
 def test_the_table_is_the_formula_at_every_point(run, tmp_path):
-    code, said = run("-m", "vmc", *MOVE, "-o", "map.csv")
+    code, said = run("-m", "centre", *MOVE, "-o", "map.csv")
     assert (code, "rocking" in said) == (0, True)
     header, (T1, T, A) = table(tmp_path / "map.csv")
     assert header == ["T1", "T_SUM", "amplitude"]
@@ -79,7 +79,7 @@ def test_the_table_of_another_condition_and_another_mode(run, tmp_path, conditio
 
 def test_a_mode_is_named_or_counted(run, tmp_path):
     for mode, file in (("column", "a.csv"), ("3", "b.csv")):
-        assert run("-m", "vmc", *MOVE, "--mode", mode, "-o", file)[0] == 0
+        assert run("-m", "centre", *MOVE, "--mode", mode, "-o", file)[0] == 0
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
     _, (T1, T, A) = table(tmp_path / "a.csv")
     expected = residual_acceleration(*condition3(T1[500], T[500]), 90.0, 0.03)
@@ -87,10 +87,10 @@ def test_a_mode_is_named_or_counted(run, tmp_path):
 
 
 def test_all_modes_are_their_worst_displacement(run, tmp_path):
-    assert run("-m", "vmc", *MOVE, "--mode", "all", "-o", "all.csv")[0] == 0
+    assert run("-m", "centre", *MOVE, "--mode", "all", "-o", "all.csv")[0] == 0
     header, (T1, T, D) = table(tmp_path / "all.csv")
     assert header == ["T1", "T_SUM", "displacement"]
-    modes = Machine.load(find_machine("vmc")).axis("Z").modes
+    modes = Machine.load(find_machine("centre")).axis("Z").modes
     for k in (0, 700, 1500):
         worst = max(
             m.participation_of("Z") / (2 * np.pi * m.frequency) ** 2
@@ -108,7 +108,7 @@ def test_the_grid_is_the_users_where_one_is_given(run, tmp_path):
 
 
 def test_a_long_move_has_a_table_of_moderate_size(run, tmp_path):
-    assert run("-m", "vmc", "--axis", "Z", "--length", 1500, "-o", "m.csv")[0] == 0
+    assert run("-m", "centre", "--axis", "Z", "--length", 1500, "-o", "m.csv")[0] == 0
     _, (_, T, _) = table(tmp_path / "m.csv")
     assert 300 < len(np.unique(T)) <= 1001
 
@@ -119,8 +119,8 @@ def test_a_long_move_has_a_table_of_moderate_size(run, tmp_path):
         (("-m", "paper", *MOVE), "a.png"),
         (("-m", "router", "--axis", "X", "--length", "-20", "--condition", "II"), "b.PNG"),
         (("-m", "drill", "--axis", "z", "--length", 2, "--condition", "I", "--mode", 1), "c.png"),
-        (("-m", "vmc", "--axis", "Z", "--length", 1500), "d.png"),
-        (("-m", "vmc", *MOVE, "--longest", 0.03), "e.png"),
+        (("-m", "centre", "--axis", "Z", "--length", 1500), "d.png"),
+        (("-m", "centre", *MOVE, "--longest", 0.03), "e.png"),
     ],
 )
 def test_a_picture_is_a_png_that_shows_something(run, tmp_path, arguments, name):
@@ -159,7 +159,7 @@ def test_a_picture_as_svg_names_what_it_shows(run, tmp_path, monkeypatch):
 
 
 def test_a_picture_as_pdf(run, tmp_path):
-    assert run("-m", "vmc", *MOVE, "-o", "map.pdf", "--points", 60)[0] == 0
+    assert run("-m", "centre", *MOVE, "-o", "map.pdf", "--points", 60)[0] == 0
     assert (tmp_path / "map.pdf").read_bytes().startswith(b"%PDF-")
 
 
@@ -173,7 +173,7 @@ def test_the_summary_has_the_papers_numbers(run):
 
 
 def test_the_summary_of_a_move_that_needs_more_than_its_time(run):
-    code, said = run("-m", "vmc", "--axis", "Z", "--length", "8", "--mode", "rocking")
+    code, said = run("-m", "centre", "--axis", "Z", "--length", "8", "--mode", "rocking")
     assert code == 0
     assert "90.6226" in said
     assert "  99 " in said
@@ -204,7 +204,7 @@ def test_the_summary_of_a_move_that_needs_more_than_its_time(run):
     ],
 )
 def test_what_is_refused_leaves_nothing(run, tmp_path, arguments, code, message):
-    status, said = run("-m", "vmc", *arguments)
+    status, said = run("-m", "centre", *arguments)
     assert status == code
     assert message in " ".join(said.split())
     assert not list(tmp_path.iterdir())

@@ -46,7 +46,7 @@ def damped():
 
 def independent():
     return compared(
-        "vmc", ("X", 6.0), ("Z", 1.0),
+        "centre", ("X", 6.0), ("Z", 1.0),
         change=(("positioning: linear", "positioning: independent"),),
     )  # fmt: skip
 
@@ -122,11 +122,11 @@ def test_conditions_compete_without_limits_and_say_so():
 
 @pytest.mark.parametrize(
     ("case", "name"),
-    [("vmc", "conventional"), ("vmc", "optimal"), ("vmc", "zv"), ("both", "conventional"),
+    [("centre", "conventional"), ("centre", "optimal"), ("centre", "zv"), ("both", "conventional"),
      ("both", "condition3"), ("both", "mzv")],
 )  # fmt: skip
 def test_settling_is_where_a_simulated_envelope_stays_below_the_tolerance(case, name):
-    found = independent() if case == "both" else compared("vmc", ("Z", 1.0))
+    found = independent() if case == "both" else compared("centre", ("Z", 1.0))
     contender = found[name]
     tolerance = found.machine.design.tolerance
     settled = contender.time
@@ -168,9 +168,9 @@ def test_a_mode_without_damping_never_settles_unless_it_is_still_enough():
 
 
 @pytest.mark.parametrize("name", ["conventional", "condition1", "optimal", "zvd", "shortest"])
-@pytest.mark.parametrize("case", ["vmc", "both"])
+@pytest.mark.parametrize("case", ["centre", "both"])
 def test_worst_in_band_is_that_of_a_dense_scan(case, name):
-    found = independent() if case == "both" else compared("vmc", ("Z", 1.0))
+    found = independent() if case == "both" else compared("centre", ("Z", 1.0))
     shares = np.linspace(0.90, 1.10, 161)
     near = np.abs(shares - 1.0) < 0.05 + 1e-9
     worst = np.zeros(2)
@@ -188,9 +188,9 @@ def test_worst_in_band_is_that_of_a_dense_scan(case, name):
     assert found[name].worst_band == pytest.approx(tuple(worst), **RATIO)
 
 
-@pytest.mark.parametrize("case", ["vmc", "both"])
+@pytest.mark.parametrize("case", ["centre", "both"])
 def test_residuals_are_those_of_an_integral(case):
-    found = independent() if case == "both" else compared("vmc", ("Z", 1.0))
+    found = independent() if case == "both" else compared("centre", ("Z", 1.0))
     for name in CONTENDERS:
         for g, mode in enumerate(found.modes.modes):
             expected = integral(
@@ -201,7 +201,7 @@ def test_residuals_are_those_of_an_integral(case):
 
 @pytest.mark.parametrize(
     ("name", "moves"),
-    [("paper", [("Z", 1.0)]), ("vmc", [("Z", 1.0)]), ("vmc", [("X", 30.0), ("Y", -12.0)]),
+    [("paper", [("Z", 1.0)]), ("centre", [("Z", 1.0)]), ("centre", [("X", 30.0), ("Y", -12.0)]),
      ("router", [("X", 2.0)]), ("drill", [("Z", 3.0)])],
 )  # fmt: skip
 def test_optimal_is_never_worse_in_its_band_than_others_of_its_time(name, moves):
@@ -349,7 +349,7 @@ def test_axes_on_their_own_ring_on_until_the_last_has_arrived():
     assert both.laws.total[0] != pytest.approx(both.laws.total[1])
     late, early = float(both.laws.total.max()), float(both.laws.total.min())
     alone = compared(
-        "vmc", ("Z", 1.0), change=(("positioning: linear", "positioning: independent"),)
+        "centre", ("Z", 1.0), change=(("positioning: linear", "positioning: independent"),)
     )["conventional"]
     assert alone.time == pytest.approx(early)
     g = [mode.name for mode in found.modes.modes].index("rocking")

@@ -18,7 +18,7 @@ from gcodejerk.report.records import move_record
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 SAME_TIME = ("condition1", "condition2", "condition3", "cascade", "optimal")
-VMC = Machine.load(find_machine("vmc"))
+VMC = Machine.load(find_machine("centre"))
 PAPER = Machine.load(find_machine("paper"))
 
 

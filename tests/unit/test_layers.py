@@ -17,9 +17,10 @@ import gcodejerk
 ROOT = Path(gcodejerk.__file__).parent
 
 PICTURE = """
-    errors units reasons foreign
+    errors units reasons foreign advice
  <- nc | machine | motion
- <- start plans solutions optima designs refusals plan stream move survey arrival comparison dogleg
+ <- start plans today solutions optima designs refusals plan stream move survey arrival
+    comparison dogleg settling
  <- emit | verification | testing
  <- expanded splice
  <- pipeline

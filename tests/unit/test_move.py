@@ -9,7 +9,7 @@ from gcodejerk.motion import mode_poles, polyline_response
 from gcodejerk.move import plan_move
 
 PAPER = Machine.load(find_machine("paper"))
-VMC = Machine.load(find_machine("vmc"))
+VMC = Machine.load(find_machine("centre"))
 ROUTER = Machine.load(find_machine("router"))
 OMEGA = 2.0 * np.pi * 30.0
 

@@ -109,7 +109,8 @@ def test_independent_positioning_on_linuxcnc_is_noted():
 
 def test_a_path_mode_that_nobody_states_is_noted():
     assert not any("G64" in note for note in process(PROGRAM, VMC).notes)
-    (note,) = process(PROGRAM.replace(b" G64", b""), VMC).notes
+    notes = process(PROGRAM.replace(b" G64", b""), VMC).notes
+    (note,) = [note for note in notes if "G64" in note]
     assert note.startswith("line 3: no G61 or G64")
 
 

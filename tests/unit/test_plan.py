@@ -9,7 +9,8 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import AXES, Machine
 from gcodejerk.motion import Laws, laws_response, mode_poles
 from gcodejerk.nc import read_program
-from gcodejerk.plan import MOST_INTERVALS, path_length, plan_moves, plan_rapids
+from gcodejerk.plan import MOST_INTERVALS, plan_moves, plan_rapids
+from gcodejerk.plans import path_length
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.start import program_start
 

@@ -1,0 +1,53 @@
+"""What an operator has to know of streams at the machine: one text each, wherever it is shown.
+
+A stream is made of feed moves, so that other knobs act on it than on the rapid that it replaces.
+What is known of that was measured on LinuxCNC 2.9 only. The page `PAGE` says it at length.
+"""
+
+from __future__ import annotations
+
+PAGE = "docs/at-the-machine.md"
+MEASURED = f"G1, rapid override does nothing, measured: {PAGE}"
+UNTESTED = f"G1, rapid override does nothing, untested: {PAGE}"
+STAMP_NOTES = (MEASURED, UNTESTED)
+"""The comment below the stamp: at most 67 characters, without a parenthesis."""
+_FEED_MOVES = "streams are feed moves (G1): rapid override does nothing to them"
+_FEED = "feed override does, keep it at 100 %"
+ABSOLUTE = (
+    "um are the real machine's only if participation was measured with the servo on; the % of "
+    "today's holds for any linear servo"
+)
+"""Of every figure in um (residues of the closed loop: the servo's gain is in the participation)."""
+NO_MODES = (
+    "the machine file has no modes: nothing is known to vibrate, so nothing can be gained, and "
+    "every rapid is left alone"
+)
+
+
+def stamp_note(controller: str) -> str:
+    """The comment below the stamp of a program written for a controller."""
+    return MEASURED if controller == "linuxcnc" else UNTESTED
+
+
+def at_the_machine(controller: str) -> str:
+    """What is known of overrides, feed hold and single block on a controller.
+
+    Parameters
+    ----------
+    controller : str
+        Its name.
+
+    Returns
+    -------
+    str
+        One note, for every program in which streams stand.
+    """
+    if controller == "linuxcnc":
+        return (
+            f"{_FEED_MOVES} (measured: at 0 % X60 ran at 100 mm/s), {_FEED}; feed hold brakes at "
+            f"MAX_ACCELERATION, single step stops at every block ({PAGE})"
+        )
+    return (
+        f"{_FEED_MOVES}, {_FEED}; overrides, feed hold and single block were not measured on "
+        f"{controller} ({PAGE})"
+    )

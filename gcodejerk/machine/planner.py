@@ -1,0 +1,120 @@
+"""Which law the controller's own rapids follow: as the file states it, or as its control has it.
+
+Rule: what the file states stands. A control that has no jerk limit cannot follow a `rapid.jerk`;
+then the file contradicts itself, which is told at the jerk: nobody but the user knows whether the
+number or the name of the control is wrong.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gcodejerk.errors import MachineError
+from gcodejerk.machine.checker import Checker
+from gcodejerk.machine.model import AXES, BELL, JERK_LIMITED, LINUXCNC, TRAPEZOIDAL
+
+WITHOUT_JERK = {
+    "linuxcnc": (LINUXCNC, "LinuxCNC 2.9"),
+    "grbl": (TRAPEZOIDAL, "grbl"),
+}
+"""Controls whose G0 has no jerk limit: their law, and what messages call them."""
+
+
+def choose_planners(values: dict[str, Any], checker: Checker) -> dict[str, str]:
+    """The law of each axis; refuses laws that do not fit together or lack their jerk.
+
+    Parameters
+    ----------
+    values : dict
+        Of the whole file.
+    checker : Checker
+        Takes what is wrong.
+
+    Returns
+    -------
+    dict of str to str
+        Axis -> one of `PLANNERS`.
+    """
+    rapids = {a: axis["rapid"] for a, axis in values.get("axes", {}).items() if "rapid" in axis}
+    # A control that the file does not name has no habits: the limits alone say what it does.
+    own = WITHOUT_JERK.get(values.get("controller", "")) if checker.given(("controller",)) else None
+    stated = {a: rapid["planner"] for a, rapid in rapids.items() if "planner" in rapid}
+    free = own is not None and not any("jerk" in rapid for rapid in rapids.values())
+    chosen = {}
+    for a, rapid in rapids.items():
+        plain = JERK_LIMITED if "jerk" in rapid else TRAPEZOIDAL
+        # One control moves all axes: what is said of one holds for those of which nothing is.
+        others = LINUXCNC if LINUXCNC in stated.values() else None
+        chosen[a] = stated.get(a, others or (own[0] if own and free and not stated else plain))
+        path = ("axes", a, "rapid", "planner")
+        if chosen[a] in (JERK_LIMITED, BELL) and "jerk" not in rapid and a in stated:
+            checker.problems.add(
+                checker.place(path),
+                f"axes.{a}.rapid.planner is {chosen[a]!r}, which needs axes.{a}.rapid.jerk",
+                "add the jerk, or say planner: trapezoidal",
+            )
+    kinds = {LINUXCNC: "1", BELL: "2"}
+    first = next((a for a in AXES if a in stated), None)
+    for a in stated:
+        if first is not None and kinds.get(chosen[a]) != kinds.get(chosen[first]):
+            checker.problems.add(
+                checker.place(("axes", a, "rapid", "planner")),
+                f"axes.{a}.rapid.planner is {chosen[a]!r}, that of {first} is {chosen[first]!r}: "
+                "one control makes the rapids of all axes",
+                "state the same planner for all axes",
+            )
+        elif chosen[a] == BELL and set(rapids) - set(stated):
+            other = min(set(rapids) - set(stated), key=AXES.index)
+            checker.problems.add(
+                checker.place(("axes", other, "rapid")),
+                f"axes.{other}.rapid names no planner, axis {a} moves by {BELL!r}",
+                "state the same planner for all axes",
+            )
+    return chosen
+
+
+def planner_warnings(
+    values: dict[str, Any], planners: dict[str, str], checker: Checker
+) -> list[MachineError]:
+    """Where the figures for today are not those of the control.
+
+    Parameters
+    ----------
+    values : dict
+        Of the whole file, all of it right.
+    planners : dict of str to str
+        Of `choose_planners`.
+    checker : Checker
+        Knows the places.
+
+    Returns
+    -------
+    list of MachineError
+    """
+    out = []
+    control = values["controller"]
+    own = WITHOUT_JERK.get(control) if checker.given(("controller",)) else None
+    for a, axis in values["axes"].items():
+        rapid, law = axis["rapid"], planners[a]
+        stated = checker.given(("axes", a, "rapid", "planner"))
+        jerk = ("axes", a, "rapid", "jerk")
+        if "jerk" in rapid and law not in (JERK_LIMITED, BELL):
+            out.append(
+                MachineError(
+                    f"axes.{a}.rapid.jerk stands beside planner: {law}, which has no jerk limit: "
+                    "it is not used",
+                    "leave it out, or state the planner that keeps it",
+                    checker.place(jerk),
+                )
+            )
+        elif "jerk" in rapid and own is not None and not stated:
+            out.append(
+                MachineError(
+                    f"axes.{a}.rapid.jerk stands beside controller: {control}, and {own[1]} has no "
+                    "jerk limit: what is said of today's rapids is not what that control does",
+                    f"leave the jerk out (planner: {own[0]}), or state planner: {JERK_LIMITED} if "
+                    "the control has one",
+                    checker.place(jerk),
+                )
+            )
+    return out

@@ -1,0 +1,169 @@
+r"""How long a machine shakes after its rapids, and what the rapids leave that stay as they are.
+
+A mode that a rapid leaves with the envelope D decays as :math:`D e^{-\zeta\omega t}`, so that it is
+within the tolerance d after :math:`t = \ln(D/d) / (\zeta\omega)`; the tool is settled when the last
+mode is. That is what a careful program dwells for, and what the surface shows where none does. The
+lines of a measured spectrum count together: the root of the sum of their squares, by bisection.
+
+Rule: what a rapid leaves that is left alone is known only where its start, its end and its path
+are; what is not known is counted, never taken for zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.arrival import arrival_response
+from gcodejerk.designs import Task
+from gcodejerk.machine import AXES
+from gcodejerk.motion.laws import Array
+from gcodejerk.nc import Rapids
+from gcodejerk.plans import STANDSTILL, Modes, Plans
+from gcodejerk.reasons import REASONS, Reason
+
+KNOWN = tuple(
+    REASONS.index(reason)
+    for reason in (
+        Reason.BLOCK_DELETE, Reason.MIXED_AXES, Reason.OTHER_WORDS, Reason.FEED_UNKNOWN,
+        Reason.TOO_SHORT, Reason.TOO_LONG, Reason.LIMITS, Reason.NOT_BETTER, Reason.NO_MODE,
+        Reason.NO_BLENDING,
+    )
+)  # fmt: skip
+"""Reasons of rapids that run once, on a straight line from their start to their end."""
+NOTHING = tuple(REASONS.index(reason) for reason in (Reason.NO_MOTION, Reason.AFTER_END))
+"""Reasons of blocks that do not move."""
+HALVINGS = 60
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Left:
+    """What rapids leave today that are left alone; entry i of every array is rapid i.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (n, m)
+        Displacement envelopes, NaN where planned or not known. [mm]
+    time : ndarray, shape (n,)
+        Conventional time, 0 where planned or not known. [s]
+    unknown : ndarray of bool, shape (n,)
+        Left alone, and what it leaves cannot be computed.
+    """
+
+    residual: Array
+    time: Array
+    unknown: NDArray[np.bool_]
+
+
+def left_alone(rapids: Rapids, plans: Plans) -> Left:
+    """What is left by the rapids that are left alone.
+
+    Parameters
+    ----------
+    rapids : Rapids
+        Of the program.
+    plans : Plans
+        Row i is rapid i.
+
+    Returns
+    -------
+    Left
+    """
+    machine, modes = plans.machine, plans.modes
+    residual = np.full((len(plans), len(modes.poles)), np.nan)
+    time = np.zeros(len(plans))
+    moved = rapids.target - rapids.start
+    named = (rapids.words[:, np.newaxis] >> np.arange(len(AXES)) & 1).astype(bool)
+    has = np.array([axis in machine.axis_names for axis in AXES])
+    moved = np.where(named, moved, 0.0)
+    moved = np.where(np.abs(moved) > STANDSTILL, moved, 0.0 * moved)
+    certain = np.isfinite(moved).all(axis=1) & ~(named & ~has).any(axis=1)
+    certain &= np.isin(plans.reason, KNOWN) & (moved != 0.0).any(axis=1)
+    rows = np.flatnonzero(certain & ~plans.planned)
+    if len(rows):
+        residual[rows], time[rows] = _today(plans, moved[rows], rapids.lone[rows])
+    still = np.isin(plans.reason, NOTHING)
+    return Left(residual, time, ~plans.planned & ~still & ~certain)
+
+
+def _today(plans: Plans, moved: Array, lone: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Residual and time of the controller's own rapids."""
+    machine, modes = plans.machine, plans.modes
+    if machine.positioning == "linear":
+        move, share = np.arange(len(moved)), moved
+    else:
+        move, axis = np.nonzero(moved)
+        share = np.zeros((len(move), len(AXES)))
+        share[np.arange(len(move)), axis] = moved[move, axis]
+    laws = Task.of(machine, modes, share, lone=lone[move]).conventional
+    weights = share @ modes.participation.T
+    residual, time = np.zeros((len(moved), len(modes.poles))), np.zeros(len(moved))
+    for row in range(len(moved)):
+        own = np.flatnonzero(move == row) if machine.positioning != "linear" else np.array([row])
+        part = laws.take(own)
+        response = arrival_response(part, weights[own], modes.poles)
+        residual[row] = np.abs(response) / modes.poles.imag
+        time[row] = float(part.total.max())
+    return residual, time
+
+
+def settling_times(residual: Array, modes: Modes, tolerance: float) -> Array:
+    """How long it takes until every mode's envelope stays within the tolerance.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n, m)
+        Envelopes at arrival. [mm]
+    modes : Modes
+        Their damping.
+    tolerance : float
+        [mm]
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        After arrival; infinite where a mode without damping keeps more, NaN where a residual is
+        not known. [s]
+
+    Examples
+    --------
+    30 Hz with damping 0.02 decay from 0.3 mm to 0.001 mm in ln(300)/3.77:
+
+    >>> from gcodejerk.machine import Machine, find_machine
+    >>> modes = Modes.of(Machine.load(find_machine("vmc")))
+    >>> D = np.zeros((1, len(modes.poles)))
+    >>> D[0, 2] = 0.3
+    >>> float(settling_times(D, modes, 0.001)[0].round(3))
+    1.513
+    """
+    out = np.zeros(len(residual))
+    rate = np.abs(modes.poles.real)
+    for entry in range(len(modes.modes)):
+        index = np.flatnonzero(modes.group == entry)
+        D = residual[:, index]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if len(index) == 1:
+                need = np.log(D[:, 0] / tolerance) / rate[index[0]]
+                time = np.where(D[:, 0] > tolerance, need, 0.0)
+            else:
+                time = _together(D, rate[index], tolerance)
+        out = np.maximum(out, np.where(np.isnan(D).any(axis=1), np.nan, time))
+    return out
+
+
+def _together(D: Array, rate: Array, tolerance: float) -> Array:
+    """The same of oscillators that count together."""
+    largest = np.sqrt((D**2).sum(axis=1))
+    slowest = float(rate.min())
+    high = np.log(np.maximum(largest / tolerance, 1.0)) / slowest
+    low = np.zeros(len(D))
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        left = np.sqrt(((D * np.exp(-rate * middle[:, np.newaxis])) ** 2).sum(axis=1))
+        low, high = (
+            np.where(left > tolerance, middle, low),
+            np.where(left > tolerance, high, middle),
+        )
+    return np.where(largest > tolerance, high, 0.0)

@@ -1,0 +1,145 @@
+"""How long the machine shakes: the closed form beside an envelope that is followed step by step."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gcodejerk.machine import Machine, find_machine
+from gcodejerk.pipeline import process
+from gcodejerk.plans import Modes
+from gcodejerk.report.records import summary_of
+from gcodejerk.report.tables import summary_line, whole_line
+from gcodejerk.settling import settling_times
+
+VMC = Machine.load(find_machine("vmc"))
+PROGRAM = b"""G21 G90 G94 G17 G64 P0.01
+G0 X0 Y0 Z0
+G0 Z12.5
+G1 Z12 F200
+G0 Z12.04
+G1 Z12 F200
+/G0 Z2
+G0 Z20
+G91 G28 Z0
+G90
+G0 X[#5]
+M2
+"""
+
+
+def followed(residual, modes, tolerance, step=1e-5, longest=20.0):
+    """When the last envelope passes the tolerance, looked for from behind on a fine grid."""
+    t = np.arange(0.0, longest, step)
+    late = 0.0
+    for entry in range(len(modes.modes)):
+        index = np.flatnonzero(modes.group == entry)
+        square = sum((residual[k] * np.exp(modes.poles[k].real * t)) ** 2 for k in index)
+        above = np.flatnonzero(np.sqrt(square) > tolerance)
+        late = max(late, t[above[-1]] + step if len(above) else 0.0)
+    return late
+
+
+def test_settling_is_where_the_followed_envelope_stays_within_the_tolerance():
+    modes, rng = Modes.of(VMC), np.random.default_rng(5)
+    residual = 10.0 ** rng.uniform(-5.0, 0.0, (12, len(modes.poles)))
+    found = settling_times(residual, modes, 0.001)
+    for row in range(len(residual)):
+        assert found[row] == pytest.approx(followed(residual[row], modes, 0.001), abs=2e-5)
+
+
+def test_an_envelope_is_that_of_a_simulated_oscillator():
+    # 30 Hz, damping 0.02, left alone with 0.3 mm: a step of 10 us, no closed form.
+    omega, zeta, x, v, dt = 2 * np.pi * 30.0, 0.02, 0.3, 0.0, 1e-5
+    last = 0.0
+    for k in range(200_000):
+        a = -2 * zeta * omega * v - omega**2 * x
+        v += a * dt
+        x += v * dt
+        if abs(x) > 0.001:
+            last = k * dt
+    modes = Modes.of(VMC)
+    residual = np.zeros((1, len(modes.poles)))
+    residual[0, [mode.frequency for mode in modes.modes].index(30.0)] = 0.3
+    # The last time that the swing itself passes is at most half a period before the envelope's.
+    assert 0.0 <= float(settling_times(residual, modes, 0.001)[0]) - last <= 0.5 / 30.0
+
+
+def test_lines_of_a_spectrum_settle_together(tmp_path):
+    (tmp_path / "x.csv").write_text(
+        "frequency,PSD\n" + "".join(f"{f},{40 - abs(f - 30)}\n" for f in range(20, 41, 2))
+    )
+    text = "interval: 0.001\npositioning: linear\naxes:\n  X:\n    spectrum: x.csv\n"
+    text += "    rapid: {velocity: 300, acceleration: 3000, jerk: 1.0e+5}\n"
+    (tmp_path / "m.yaml").write_text(text)
+    modes = Modes.of(Machine.load(tmp_path / "m.yaml"))
+    residual = np.random.default_rng(2).uniform(0.0, 0.2, (4, len(modes.poles)))
+    found = settling_times(residual, modes, 0.001)
+    for row in range(4):
+        expected = followed(residual[row], modes, 0.001, longest=5.0)
+        assert found[row] == pytest.approx(expected, abs=2e-5)
+
+
+def test_a_mode_without_damping_never_settles_unless_it_keeps_too_little():
+    paper = Machine.load(find_machine("paper"))
+    residual = np.array([[0.3], [0.0005], [np.nan]])
+    found = settling_times(residual, Modes.of(paper), 0.001)
+    assert np.isinf(found[0])
+    assert found[1] == 0.0
+    assert np.isnan(found[2])
+    summary = summary_of(process(b"G21 G90 G94 G64\nG0 Z0\nG0 Z1\nM2\n", paper))
+    assert summary["conventional_settling_time"] is None
+    assert "without end" in whole_line(summary)
+
+
+def test_the_summary_counts_what_stays_and_the_time_of_the_whole_program():
+    result = process(PROGRAM, VMC)
+    plans, summary = result.plans, summary_of(result)
+    left = {
+        int(line): (
+            bool(np.isfinite(result.rest.residual[row]).all()),
+            bool(result.rest.unknown[row]),
+        )
+        for row, line in enumerate(result.program.rapids.line.tolist())
+        if not plans.planned[row]
+    }
+    # Of line 5 (too short) and 7 (block delete) all is known, of homing and of #5 nothing.
+    assert left[5] == (True, False)
+    assert left[7] == (True, False)
+    assert left[9] == (False, True)
+    assert summary["left_unknown"] == sum(unknown for _, unknown in left.values())
+    today = np.nanmax(result.conventional_residual[plans.planned])
+    stays = np.nanmax(result.rest.residual)
+    assert summary["worst_residual_all"] == pytest.approx(
+        max(stays, np.nanmax(result.residual[plans.planned]))
+    )
+    assert summary["worst_conventional_residual_all"] == pytest.approx(max(today, stays))
+    short = 2.0 * np.sqrt(0.04 / 5000.0)
+    row = result.program.rapids.line.tolist().index(5)
+    assert result.rest.time[row] == pytest.approx(short)
+    assert summary["conventional_time_all"] == pytest.approx(
+        summary["conventional_time"] + result.rest.time.sum()
+    )
+    known = np.where(plans.planned[:, None], result.conventional_residual, result.rest.residual)
+    waiting = np.nansum(settling_times(known, plans.modes, VMC.design.tolerance))
+    assert summary["conventional_settling_time"] == pytest.approx(waiting)
+    assert summary["settling_time"] < summary["conventional_settling_time"]
+    line = summary_line("p.nc", summary)
+    share = 100 * summary["worst_residual"] / summary["worst_conventional_residual"]
+    assert f"worst residual {share:.2g} % of today's (" in line
+
+
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+def test_what_stays_leaves_what_its_stream_would_have_replaced(positioning):
+    # The same rapid, once planned and once too short to be: today's residual is the same.
+    machine = dataclasses.replace(VMC, positioning=positioning)
+    design = dataclasses.replace(VMC.design, minimum_length=100.0)
+    shy = dataclasses.replace(machine, design=design)
+    text = b"G21 G90 G94 G17 G64 P0.01\nG0 X0 Y0 Z0\nG0 X3 Y9 Z12.5\nG1 Z12 F200\nM2\n"
+    done, left = process(text, machine), process(text, shy)
+    assert done.planned == 1
+    assert left.planned == 0
+    # That of the stream is of samples, which end at a whole interval: fast modes decay till then.
+    worst = left.rest.residual[1].max()
+    assert worst == pytest.approx(done.conventional_residual[1].max(), rel=0.02)
+    assert left.rest.time[1] == pytest.approx(done.plans.conventional_time[1])
