@@ -97,7 +97,8 @@ def _check_resolutions(values: dict[str, Any], checker: Checker) -> None:
             unit = "deg" if axis.get("type") == "rotary" or name in "ABC" else "mm"
             checker.problems.add(
                 checker.place(("axes", name, "resolution")),
-                f"axes.{name}.resolution is {resolution:g}, expected at most {COARSEST_RESOLUTION:g} [{unit}]",
+                f"axes.{name}.resolution is {resolution:g}, expected at most "
+                f"{COARSEST_RESOLUTION:g} [{unit}]",
                 "give the control's least increment, for example 0.001; a steps-per-mm figure is "
                 "its inverse",
             )

@@ -32,6 +32,7 @@ KLIPPER = replace(
     groups={code: group for code, group in MARLIN.groups.items() if code != 200},
     defaults={**MARLIN.defaults, "units": 210},
     bare_set="zero",
+    dark_rapids=False,  # M3 is a macro there, if anything; a laser is declared
     names={
         **dict.fromkeys(
             (
