@@ -171,7 +171,7 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             target = stack.enter_context(tempfile.TemporaryFile())
         result = process_file(source, target, machine, settings, job.input, progress)
         summary = summary_line(job.input, summary_of(result))
-        if job.strict and result.left:
+        if job.strict and (result.left or result.read_once):
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
             report.write(dump(record_of(result, machine, job.output, source, progress)))

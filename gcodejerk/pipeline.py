@@ -124,6 +124,12 @@ class Result:
         """Number of rapids that were left alone."""
         return len(self.plans) - self.planned
 
+    @property
+    def read_once(self) -> int:
+        """Rewritten rapids of which the second reading of the program does not know all."""
+        found = self.verification
+        return 0 if found is None else found.rewritten - found.confirmed
+
 
 def process(
     data: bytes,

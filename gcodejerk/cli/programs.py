@@ -55,7 +55,10 @@ def process(
     ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
     strict: Annotated[
-        bool, typer.Option("--strict", help="refuse a program with rapids left alone")
+        bool,
+        typer.Option(
+            "--strict", help="refuse rapids left alone, and rapids that only one reader knows"
+        ),
     ] = False,
     check: Annotated[
         bool, typer.Option("--check", help="write nothing; exit 1 if anything would change")
@@ -280,11 +283,20 @@ def verify(
             f"{processed}: is {original} with {cycles}{found.rewritten} of its {found.rapids} "
             "rapids re-timed and nothing else changed; "
             f"{found.confirmed} of {found.rewritten} confirmed by a second reading"
+            + _read_once(found.rewritten - found.confirmed)
         )
         return
     more = " or more" if len(found.violations) >= most else ""
     print(f"{processed}: {len(found.violations)}{more} violations: do not run it")
     raise typer.Exit(1)
+
+
+def _read_once(count: int) -> str:
+    """What rests on one reading alone: not refused, and not as certain as the rest."""
+    if not count:
+        return ""
+    whom = "the other rests" if count == 1 else f"the other {count} rest"
+    return f"; {whom} on one reading alone, which the second could not follow"
 
 
 def _suffix(in_place: bool, machine: Machine, settings: Settings) -> str:

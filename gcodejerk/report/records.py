@@ -201,6 +201,7 @@ def summary_of(result: Result) -> Record:
         result.plans, result.kept, result.residual, result.conventional_residual, rest=result.rest
     )
     summary = {"blocks": result.program.blocks} | records.summary()
+    summary["read_once"] = result.read_once
     if result.expansion is not None:
         summary["cycles"] = result.expansion.holes
         summary["cycles_expanded"] = result.expansion.written

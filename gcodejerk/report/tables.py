@@ -81,6 +81,8 @@ def summary_line(name: str, summary: Record) -> str:
     if summary["extended"]:
         extra = (summary["rapid_time"] - summary["conventional_time"]) * MS_PER_S
         parts.append(f"{summary['extended']} longer than today, {extra:.0f} ms in all")
+    if summary.get("read_once"):
+        parts.append(f"{summary['read_once']} of them rest on one reading of the program alone")
     if summary["left"]:
         why = ", ".join(f"{count} {reason}" for reason, count in summary["left_by_reason"].items())
         parts.append(f"{summary['left']} left alone ({why})")
