@@ -26,6 +26,7 @@ class Reason(enum.StrEnum):
     SYSTEM_WRITTEN = "offsets or parameters written by the program"
     LOOK_AHEAD = "look-ahead limited by the program"
     FEED_GROUP = "F is the speed of some axes only"
+    FEED_SCALED = "adaptive or programmed override of the feed"
     NO_MOTION = "no axis moves"
     DISTANCE_MODE_UNKNOWN = "distance mode unknown"
     UNITS_UNKNOWN = "units unknown"

@@ -61,6 +61,7 @@ Effect = Literal[
     "either",  # it is one or the other, depending on the word
     "written",  # writes offsets, tool data or parameters of the control
     "feed group",  # F means the speed of the axes that it names; of all, where it names none
+    "feed override",  # scales F, and not G0
 ]
 """What a code, or a name such as ``TRANS``, does besides changing its modal group."""
 
@@ -254,6 +255,10 @@ class Dialect:
     bars: Mapping[int, tuple[str, bool | Literal["P"]]] = field(default_factory=dict)
     """G code -> a name in `judge.BARS`, and whether it begins or ends; "P": it begins where P is
     given and not 0."""
+    m_bars: Mapping[int, str] = field(default_factory=dict)
+    """M code -> a name in `judge.BARS`, which begins unless P is 0."""
+    tool_word_moves: bool = False
+    """T may call a program of the builder's."""
     dark_rapids: bool = False
     """The control also drives beams, which are dark in G0 and on in G1."""
     beam_codes: frozenset[int] = frozenset()

@@ -165,6 +165,11 @@ class Executor:
         for m in codes.m:
             if run_m_code(state, m, dialect, step):
                 self._leave(step)
+            if m in dialect.m_bars:
+                p = values.get("P", 1.0)
+                state.put("bars", {**state.bars, dialect.m_bars[m]: None if p != p else p != 0.0})
+        if dialect.tool_word_moves and "T" in values:
+            state.forget_positions()
         if dialect.length_word in values and "tool length" not in g:
             frames.tool_length(state, 0, values, {}, dialect)
         if not dialect.tool_frame.isdisjoint(values):
@@ -201,6 +206,8 @@ class Executor:
             for effect in effects:
                 if effect == "flow":
                     continue
+                if effect == "feed override":
+                    state.put("bars", {**state.bars, effect: True})
                 if effect == "feed group":
                     self._feed_group(codes.names)
                 self._effect(effect, 0, values, step)

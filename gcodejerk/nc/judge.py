@@ -42,6 +42,8 @@ BARS = {
     "parameters written": Reason.SYSTEM_WRITTEN,  # for good
     "look-ahead": Reason.LOOK_AHEAD,
     "feed group": Reason.FEED_GROUP,
+    "feed override": Reason.FEED_SCALED,
+    "another language": Reason.NOT_UNDERSTOOD,
 }
 """What makes rapids unfit while it is, or may be, in force (`State.bars`), and the reason."""
 

@@ -196,6 +196,12 @@ class Tracker(Codes):
         if "F" in values and not taken:
             self.feed, self.feed_whole = values["F"], self._matters(block.feed_whole)
         ends = self.machine_codes(block)
+        for m in block.m:
+            if m in dialect.m_bars:
+                p = values.get("P", 1.0)
+                self.bars[dialect.m_bars[m]] = None if p != p else p != 0.0
+        if dialect.tool_word_moves and "T" in values:
+            self.lose()
         if dialect.length_word in values and "tool length" not in g:
             self.lengthen(0, NAN, block.axes)
         if not dialect.tool_frame.isdisjoint(values):

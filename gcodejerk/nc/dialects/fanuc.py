@@ -35,6 +35,7 @@ _EFFECTS: dict[int, Effect] = {
     530: "machine",
     920: "set",
     921: "frames",
+    220: "words",  # limits of travel
     650: "flow",
     **dict.fromkeys((660, 661), "modal cycle"),
 }
@@ -112,6 +113,7 @@ FANUC = Dialect(
     length_axes="Z",
     length_moves=True,  # 5006#6
     length_word="H",
+    tool_word_moves=True,  # 6001#5: T calls O9000
     p_selects=frozenset(SYSTEMS),
     transforms={
         **dict.fromkeys((680, 682), ("rotation", True)),
@@ -170,6 +172,7 @@ _LATHE_EFFECTS: dict[int, Effect] = {
     100: "data",
     520: "frames",
     530: "machine",
+    220: "words",
     650: "flow",
     660: "modal cycle",
     **dict.fromkeys(_LATHE_CYCLES, "cycle"),
@@ -205,6 +208,7 @@ _LATHE = replace(
     contours=frozenset({710, 720, 730}),
     drilling=Drilling(),
     length_moves=False,
+    tool_word_moves=False,
     length_word="",
     lathe="yes",
 )

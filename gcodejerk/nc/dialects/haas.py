@@ -34,6 +34,10 @@ HAAS = replace(
                 "cylinder": (1070,),
                 "probe": (310, 350, 360, 370, 1360),
                 "smoothness": (1030, 1870),
+                "mirror": (1000, 1010),
+                "polar interpolation": (1120, 1130),
+                "work offset": (2540, 2550),
+                "feature": (2680, 2690),
                 "tool length": (1410, 1430, 2340),
             }
         ),
@@ -49,12 +53,17 @@ HAAS = replace(
     transforms={
         **FANUC.transforms,
         1070: ("cylinder", True),
+        **{1010: ("mirror", True), 1000: ("mirror", False)},
+        **{1120: ("polar interpolation", True), 1130: ("polar interpolation", False)},
+        **{2540: ("dynamic work offset", True), 2550: ("dynamic work offset", False)},
+        **{2680: ("feature", True), 2690: ("feature", False)},
         **dict.fromkeys((1410, 1430, 2340), ("tool centre point", True)),
     },
     m_groups={**FANUC.m_groups, 97: "stop", 96: "stop"},
     # G103 P1 lets the control look only one block ahead, so that no stream is blended.
     bars={1030: ("look-ahead", "P")},
     packed_repeats=False,
+    tool_word_moves=False,
     tool_cancelled_by_return=True,
     harmless=FANUC.harmless | {1030, 1870},
 )

@@ -125,6 +125,7 @@ LINUXCNC = Dialect(
     diameter_codes=True,
     lathe="either",
     same_after_stop=True,
+    m_bars={52: "feed override"},  # adaptive feed acts on G1, not on G0
     feed_before_units=True,
     incremental_set=True,
     redrawn=frozenset({331, 382, 383, 384, 385, 52, 53}),

@@ -18,7 +18,7 @@ _SILENT = (
     *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "SPOS", "SPOSA", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
     *("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM", "SF", "SCC"),  # corners: the end stays
-    *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE", "ACC"),
+    *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
 )
 _TURNED = (
     *("ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CRPL", "SUPA"),
@@ -47,7 +47,9 @@ NAMES: dict[str, Effect] = {
     "MCALL": "modal cycle",
     "DIAMON": "diameter",
     "DIAMOF": "radius",
-    "DIAM90": "either",
+    **dict.fromkeys(("DIAM90", "DIAMONA", "DIAMOFA", "DIAM90A", "DIACYCOFA"), "either"),
+    **dict.fromkeys(("DIAMCHAN", "DIAMCHANA", "DIAMCYCOF", "DIARAD", "DIARADA"), "either"),
+    "OVR": "feed override",
 }
 
 SIEMENS = Dialect(
@@ -85,6 +87,7 @@ SIEMENS = Dialect(
             "corner": (4500, 4510),
             "non-modal": (40, 90, 250, 260, 530, 580, 590, 740, 750, 1530),
             "pole": (1100, 1110, 1120),
+            "language": (2900, 2910),
             "approach": (1470, 1480, 2470, 2480, 3470, 3480, 1400, 1410, 1420, 1430),
         }
     ),
@@ -121,6 +124,7 @@ SIEMENS = Dialect(
     # G70 and G71 leave F in the unit of the control, G700 and G710 do not (NC programming p. 170).
     lengths_only=frozenset({700, 710}),
     path_has_to_be_stated=True,
+    bars={2910: ("another language", True), 2900: ("another language", False)},
     tool_frame=frozenset("TD"),
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
