@@ -422,6 +422,7 @@ class _Walker(Reader):
             words = (
                 [(w.letter, decimal(w)) for w in block.words if w.letter in "PQ"] if sure else []
             )
+            sure = sure and (self.state.unit is not None or not words)
             known = sure and all(number >= 0 for _, number in words)
             self.path = PathWords(tuple(words), self.state.unit) if known else None
 
