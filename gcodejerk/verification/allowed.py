@@ -23,6 +23,8 @@ FINER = 3
 INCH_FINER = 2
 """Decimals more in inches: a thousandth of a millimetre is some 0.00004 in."""
 MOST_DECIMALS = 12
+STANDSTILL = 1e-9
+"""An axis that moves less does not move. [mm] or [deg]"""
 FEED_DIGITS, FEED_DECIMALS = 9, 8
 Words = list[tuple[str, Decimal]]
 
@@ -57,6 +59,8 @@ class Allowed:
     """F stands in the tail."""
     behind: tuple[tuple[str, float], ...]
     """M words behind it all."""
+    unknown_m: tuple[float, ...]
+    """M words of the block that have no place in front of the points nor behind."""
     axes: frozenset[str]
     """Axes of the points but the last: those that move."""
     limit: int
@@ -92,7 +96,12 @@ class Allowed:
                 for w in block.words
                 if w.letter == "M" and w.value in dialect.after_m
             ),
-            axes=frozenset(AXES[k] for k in range(len(AXES)) if step[k] and step[k] == step[k]),
+            unknown_m=tuple(
+                float("nan" if w.value is None else w.value)
+                for w in block.words
+                if w.letter == "M" and w.value not in dialect.before_m | dialect.after_m
+            ),
+            axes=frozenset(AXES[k] for k in range(len(AXES)) if abs(step[k]) > STANDSTILL),
             limit=line_limit(dialect),
         )
 

@@ -177,6 +177,8 @@ class StreamReader:
     def read(self) -> Stream | None:
         """Read all of it; None where that is not possible."""
         self._comment()
+        for m in self.allowed.unknown_m:
+            self.complain(Kind.NOT_CERTAIN, f"nobody knows when M{m:g} runs beside this rapid")
         if not self._head() or not self._setup():
             return None
         stream = self._points()
@@ -287,11 +289,13 @@ class StreamReader:
                 size *= 4
             stream.text = window.data[window.at : end]
             window.skip(len(stream.text))
-        ending = None
+        ending, early = None, False
         while _IS_POINT.match(line := self.peek()):
             words = read_words(line)
+            early |= ending is not None
+            ending = None
             if words and words[1:2] and words[1][0] == "G":
-                ending = int(words.pop(1)[1] * 10) if ending is None else -1
+                ending = int(words.pop(1)[1] * 10)
             by_letter = dict(words[1:]) if words else {}
             if not words or words[0] != ("G", Decimal(1)) or len(by_letter) != len(words) - 1:
                 self.complain(Kind.FORM, f"this is no point: '{line[:60].decode('latin-1')}'")
@@ -308,10 +312,10 @@ class StreamReader:
                 self.complain(Kind.FORM, f"{number[:20].decode()}... has more digits than any word")
             self.next()
         self._points_in(stream.text)
-        if len(stream.rest) > 1 and stream.letters:
+        if len(stream.rest) > 1 or early:
             self.complain(Kind.FORM, "points before the last are not written alike", first)
-        if set(stream.letters) - self.allowed.axes and len(stream.rest) == 1:
-            self.complain(Kind.AXES, "points name axes that stand still", first)
+        if stream.text and stream.rest and set(stream.letters) != self.allowed.axes:
+            self.complain(Kind.AXES, "points name other axes than those that move", first)
         self._measure(max(map(len, stream.text.splitlines()), default=0))
         self._end_of_points(ending)
         self.modes.motion, self.modes.feed = 1, None

@@ -232,6 +232,18 @@ def _before(t, p, line):
     return t.cut(first, line + end, t.lines[first])
 
 
+def _moved_stop(t, p):
+    """The exact stop of a last point, on the first one instead."""
+    for run in t.runs():
+        found = re.search(rb" G(9|6[01](\.1)?)(?= )", t.lines[run[-1]])
+        if found and len(run) > 1:
+            lines = list(t.lines)
+            lines[run[-1]] = lines[run[-1]].replace(found[0], b"", 1)
+            lines[run[0]] = lines[run[0]].replace(b"G1", b"G1" + found[0], 1)
+            return b"".join(lines)
+    return None
+
+
 def _whole(t, p, e):
     """The decimal point lost, where the control may then count increments."""
     if t.dialect.split("-")[0] not in ("fanuc", "haas"):
@@ -300,6 +312,7 @@ DAMAGE = {
     "G61 not restored": lambda t, p, e: _of(t, t.points, rb" G6[01](\.1)?(?= )", b""),
     "exact stop lost": lambda t, p, e: _of(t, t.points, rb" G9(?= )", b""),
     "exact stop too early": lambda t, p, e: t.sub(p, rb"G1 ", b"G1 G9 "),
+    "exact stop on the first point": lambda t, p, e: _moved_stop(t, p),
     "exact stop within a stream": lambda t, p, e: t.sub(p, rb"G1 ", b"G1 G61 "),
     "exact stop twice": lambda t, p, e: _of(t, t.points, rb"( G(?:9|61))(?= )", rb"\1\1"),
     "exact stop behind the points": lambda t, p, e: t.sub(e, rb"G0", b"G0 G61"),

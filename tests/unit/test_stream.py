@@ -1,5 +1,7 @@
 """Streams: whole steps, exact ends, and the residual of exactly what is written."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -274,10 +276,12 @@ def test_a_move_has_kept_the_conventional_law_only_if_all_of_its_axes_have():
 def test_a_conventional_law_that_does_not_fit_the_time_is_never_written():
     # Steps of 0.3 mm spoil the design; the conventional law takes 58 ms and would be cut off.
     machine = Machine.loads(
-        "interval: 0.001\npositioning: linear\naxes:\n  Z: {resolution: 0.3, "
+        "interval: 0.001\npositioning: linear\naxes:\n  Z: {resolution: 0.1, "
         "rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}, limit: {acceleration: 20000}, "
         "modes: [{frequency: 170, damping: 0.0}]}\n"
     )
+    # Such steps are refused in a file.
+    machine = replace(machine, axes=(replace(machine.axes[0], resolution=0.3),))
     plan = plan_move({"Z": 3.0}, machine, time=0.045)
     assert plan.residual.max() > plan.conventional_residual.max()
     assert plan.profile == "condition3"
