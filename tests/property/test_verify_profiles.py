@@ -69,7 +69,7 @@ def ready(machine, profile, **changes):
     )
 
 
-SHIPPED = {name: Machine.load(find_machine(name)) for name in ("vmc", "router", "drill", "paper")}
+SHIPPED = {name: Machine.load(find_machine(name)) for name in ("centre", "router", "drill", "paper")}
 
 
 @st.composite
@@ -270,10 +270,10 @@ def test_a_stream_that_shakes_more_than_the_controllers_own_rapid_is_refused():
 
 
 def test_only_shortest_may_take_longer_than_the_controllers_own_rapid():
-    machine = ready(SHIPPED["vmc"], "shortest")
+    machine = ready(SHIPPED["centre"], "shortest")
     data = b"G21 G90 G94 G64\nF60\nG0 Z0.1\nM2\n"
     result = process(data, machine, verify=False, controller="linuxcnc")
     assert result.plans.counts[0] * machine.interval > result.plans.conventional_time[0] + 0.002
     assert verify(data, result.output, machine).ok
-    kept = ready(SHIPPED["vmc"], "optimal")
+    kept = ready(SHIPPED["centre"], "optimal")
     assert Kind.TIME in {v.kind for v in verify(data, result.output, kept).violations}
