@@ -69,7 +69,9 @@ def ready(machine, profile, **changes):
     )
 
 
-SHIPPED = {name: Machine.load(find_machine(name)) for name in ("centre", "router", "drill", "paper")}
+SHIPPED = {
+    name: Machine.load(find_machine(name)) for name in ("centre", "router", "drill", "paper")
+}
 
 
 @st.composite
