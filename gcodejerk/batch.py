@@ -70,6 +70,8 @@ class Done:
     summary: str = ""
     notes: tuple[str, ...] = ()
     diff: bytes = b""
+    whole: str = ""
+    """What the whole program leaves and lasts, where that is known."""
     error: str | None = None
 
     @property
@@ -184,9 +186,8 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}"
     whole = whole_line(summary_of(result))
-    summary += f"\n{whole}" if whole else ""
     written = 0 if result.expansion is None else result.expansion.written
-    return Done(job.input, result.planned, result.left, written, summary, result.notes, diff)
+    return Done(job.input, result.planned, result.left, written, summary, result.notes, diff, whole)
 
 
 def record_of(

@@ -130,7 +130,7 @@ def process(
         )
         for k, program in enumerate(found)
     ]
-    tally = _Tally(mode, quiet, aside=diff or "-" in outputs)
+    tally = _Tally(mode, quiet, aside=diff or "-" in outputs, many=many)
     for problem in problems:
         tally.fail(str(problem))
     with progress(quiet) as show, closing(run_jobs(batch, described, settings, jobs, show)) as runs:
@@ -145,8 +145,8 @@ def process(
 class _Tally:
     """Prints what became of each program, and counts."""
 
-    def __init__(self, mode: str, quiet: bool, aside: bool) -> None:
-        self.mode, self.quiet = mode, quiet
+    def __init__(self, mode: str, quiet: bool, aside: bool, many: bool) -> None:
+        self.mode, self.quiet, self.many = mode, quiet, many
         self.out = sys.stderr if aside else sys.stdout
         self.programs = self.planned = self.left = self.failed = 0
         self.changed = False
@@ -175,6 +175,9 @@ class _Tally:
             print(f"{done.input}: would be changed")
         elif not self.quiet:
             print(done.summary, file=self.out)
+            # Of many programs each has one line.
+            if done.whole and not self.many:
+                print(done.whole, file=self.out)
 
     def finish(self) -> None:
         """Print the line for the whole run."""

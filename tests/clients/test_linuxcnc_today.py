@@ -101,7 +101,7 @@ def test_todays_rapids_from_rest_to_rest_leave_what_the_report_says(tmp_path):
     assert lone == {4: True, 6: True, 8: True, 11: False, 13: False, 16: False, 18: False}
     for row, left in recordings.items():
         stated = result.conventional_residual[row].max()
-        assert left.max() == pytest.approx(stated, rel=0.05), row
+        assert left.max() == pytest.approx(stated, rel=0.05, abs=0.0015), row
 
 
 def test_the_readmes_program_shakes_today_as_its_first_line_says(tmp_path):

@@ -36,7 +36,9 @@ def load():
     from gcodejerk.pipeline import process
     from gcodejerk.verification import verify
 
-    machines = [Machine.load(find_machine(name)) for name in ("vmc", "router", "drill", "paper")]
+    machines = [
+        Machine.load(find_machine(name)) for name in ("vmc", "centre", "router", "drill", "paper")
+    ]
     machines += [replace(machine, positioning="independent") for machine in machines]
     ways = list(product(machines, ("linuxcnc", "linuxcnc", "csv"), PROFILES, DIALECTS))
 

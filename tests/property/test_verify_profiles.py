@@ -69,7 +69,9 @@ def ready(machine, profile, **changes):
     )
 
 
-SHIPPED = {name: Machine.load(find_machine(name)) for name in ("vmc", "router", "drill", "paper")}
+SHIPPED = {
+    name: Machine.load(find_machine(name)) for name in ("centre", "router", "drill", "paper")
+}
 
 
 @st.composite
@@ -139,7 +141,7 @@ class Output:
 
     def __init__(self, name, profile):
         self.machine = ready(SHIPPED[name], profile)
-        self.text = process(PROGRAM, self.machine, verify=False).output
+        self.text = process(PROGRAM, self.machine, verify=False, controller="linuxcnc").output
         self.streams = []
         for found in re.finditer(rb"\(gcodejerk: [^\n]*\n(?:G[^1][^\n]*\n)*", self.text):
             points, at = [], found.end()
@@ -258,7 +260,7 @@ def test_a_stream_that_shakes_more_than_the_controllers_own_rapid_is_refused():
     data = b"G21 G90 G94 G64\nF60\nG0 Z1.\nM2\n"
     calm = SHIPPED["paper"]
     # The controller's own 40 ms leave a mode of 50 Hz at rest; a design for 30 Hz does not.
-    result = process(data, ready(calm, "optimal"), verify=False)
+    result = process(data, ready(calm, "optimal"), verify=False, controller="linuxcnc")
     axis = calm.axes[0]
     mode = replace(axis.modes[0], frequency=50.0)
     other = ready(replace(calm, axes=(replace(axis, modes=(mode,)),)), "optimal")
@@ -270,10 +272,10 @@ def test_a_stream_that_shakes_more_than_the_controllers_own_rapid_is_refused():
 
 
 def test_only_shortest_may_take_longer_than_the_controllers_own_rapid():
-    machine = ready(SHIPPED["vmc"], "shortest")
+    machine = ready(SHIPPED["centre"], "shortest")
     data = b"G21 G90 G94 G64\nF60\nG0 Z0.1\nM2\n"
-    result = process(data, machine, verify=False)
+    result = process(data, machine, verify=False, controller="linuxcnc")
     assert result.plans.counts[0] * machine.interval > result.plans.conventional_time[0] + 0.002
     assert verify(data, result.output, machine).ok
-    kept = ready(SHIPPED["vmc"], "optimal")
+    kept = ready(SHIPPED["centre"], "optimal")
     assert Kind.TIME in {v.kind for v in verify(data, result.output, kept).violations}

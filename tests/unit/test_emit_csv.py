@@ -95,7 +95,8 @@ def test_a_diameter_is_written_as_a_radius():
     lathe = Machine.loads(
         "interval: 0.002\npositioning: linear\naxes:\n"
         "  X: {diameter: true, resolution: 0.001, "
-        "rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}}\n"
+        "rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}, "
+        "modes: [{frequency: 30, damping: 0.02}]}\n"
     )
     _, blocks, _ = table(b"G21 G90 G94 G7\nG1 X10 F9\nG0 X30\n", lathe)
     assert [float(blocks[3][k][1]) for k in (0, -1)] == [5.0, 15.0]
