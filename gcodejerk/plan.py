@@ -157,6 +157,13 @@ def plan_rapids(
     foreign = (rapids.words & ~np.uint16(known)) != 0
     # The machine file is what the user can mend, whatever the program leaves open besides.
     reason[foreign & (reason == REASONS.index(Reason.START_UNKNOWN))] = CERTAIN
+    turning = reason == REASONS.index(Reason.ROTARY_WAY)
+    reason[foreign & turning] = CERTAIN
+    # Whatever way an axis turns: where its blocks are not blended, nobody needs to know it.
+    stopping = sum(1 << AXES.index(axis) for axis in unblended)
+    reason[turning & ((rapids.words & np.uint16(stopping)) != 0)] = REASONS.index(
+        Reason.NO_BLENDING
+    )
     _rule_out(reason, foreign, Reason.AXIS_UNKNOWN)
     for axis in machine.axes:
         if axis.travel is None:

@@ -17,7 +17,7 @@ axes:
     rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}
     modes: [{frequency: 22, damping: 0.02}]
   Z: {resolution: 0.001, rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}}
-  A: {type: rotary, resolution: 0.01, rapid: {velocity: 90, acceleration: 2000, jerk: 5.0e+4}}
+  A: {wrap: none, resolution: 0.01, rapid: {velocity: 90, acceleration: 2000, jerk: 5.0e+4}}
 program: {start: {X: 0, Z: 0, A: 0}}
 """
 MACHINE = Machine.loads(TEXT)

@@ -230,7 +230,7 @@ def test_a_tool_word_changes_the_frame_of_a_lathe_only():
     program = b"G0 X5. Z5.\nT0101\nX7. Z7.\nX8.\n"
     turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G21 G99")
     assert reasons(program, "fanuc-lathe-a", turned) == [None, "start unknown", None]
-    assert reasons(program, "fanuc") == [None, None, None]
+    assert reasons(program, "haas") == [None, None, None]
 
 
 @pytest.mark.parametrize(

@@ -23,13 +23,13 @@ HEADS = {
     "haas": "G21 G17 G40 G90 G94 G64 F100.",
     "fanuc-lathe-a": "G21 G18 G40 G98 G64 F100.",
     "fanuc-lathe-b": "G21 G18 G40 G90 G94 G64 F100.",
-    "siemens": "G71 G17 G40 G90 G94 G64 F100",
+    "siemens": "G710 G17 G40 G90 G94 G64 F100",
 }
 # What each table says, by hand: before the motion, after it, unknown.
 ORDER = {
     "linuxcnc": ([3, 4, 5, 7, 8, 9, 48, 49], [0, 1, 2, 30, 60], [6, 19, 62, 100]),
     "mach": ([3, 4, 5, 7, 8, 9, 48, 49], [0, 1, 2, 30], [6, 10, 100]),
-    "grbl": ([3, 4, 5, 7, 8, 9], [0, 1, 2, 30], [56]),
+    "grbl": ([3, 5, 7, 8, 9], [0, 1, 2, 30], [56]),  # M4 is a laser's
     "fanuc": ([], [0, 1, 2, 30], [3, 4, 5, 7, 8, 9, 6, 19, 29, 60]),
     "haas": ([], [0, 1, 2, 30], [3, 4, 5, 7, 8, 9, 6, 19, 60]),
     "fanuc-lathe-a": ([], [0, 1, 2, 30], [3, 5, 8, 9]),
@@ -49,7 +49,7 @@ def machine_for(dialect):
     axes = tuple(replace(a, travel=None, diameter=a.name == turned) for a in VMC.axes)
     start = dict.fromkeys("XYZ", 0.0)
     program = replace(VMC.program, start=start, decimal_point="calculator", startup="")
-    return replace(VMC, axes=axes, program=program, dialect=dialect)
+    return replace(VMC, axes=axes, program=program, dialect=dialect, spindle="mill")
 
 
 def made(dialect, block, head=None):
@@ -106,7 +106,7 @@ def test_the_spindle_does_not_stop_in_the_cut():
     """`G0 Z50. M5` on a control that stops it behind the motion, or nobody knows when."""
     for dialect in ("fanuc", "haas", "siemens"):
         assert "G0 Z50. M5" in made(dialect, "G0 Z50. M5")[3]
-    lines = made("linuxcnc", "G0 Z50. M5")[3]
+    lines = made("linuxcnc", "G0 Z9. M5")[3]
     assert lines.index("G0  M5") < next(k for k, x in enumerate(lines) if x.startswith("G1 Z"))
 
 
@@ -130,8 +130,8 @@ def test_g9_stands_on_the_last_point(dialect, block):
         ("linuxcnc", "G21 G17 G90 G94 G61.1 F100", "G61.1"),
         ("mach", "G21 G17 G90 G94 G61 F100", "G61"),
         ("fanuc", "G21 G17 G40 G90 G94 G61 F100.", "G61"),
-        ("siemens", "G71 G17 G40 G90 G94 G60 F100", "G60"),
-        ("siemens", "G71 G17 G40 G90 G94 G60 G601 F100", "G60"),
+        ("siemens", "G710 G17 G40 G90 G94 G60 F100", "G60"),
+        ("siemens", "G710 G17 G40 G90 G94 G60 G601 F100", "G60"),
     ],
 )
 def test_an_exact_stop_in_force_is_back_for_the_last_point(dialect, head, code):

@@ -92,10 +92,15 @@ def test_edits_name_every_byte_that_is_not_the_programs():
 
 
 def test_notes_tell_what_was_assumed():
-    result = process(b"G0 X0\nG0 X10\nM2\n", VMC)
+    result = process(b"G21 G0 X0\nG0 X10\nM2\n", VMC)
     assert result.planned == 1
-    assert any("G20" in note or "G21" in note for note in result.notes)
     assert any("G90" in note for note in result.notes)
+
+
+def test_a_note_says_what_would_settle_the_unit():
+    result = process(b"G0 X0\nG0 X10\nM2\n", VMC)
+    assert result.planned == 0
+    assert any("G21 or G20" in note and "program.startup" in note for note in result.notes)
 
 
 def test_independent_positioning_on_linuxcnc_is_noted():

@@ -82,7 +82,7 @@ NUMBER = re.compile(rb"([XYZ])(-?[0-9.]+)")
 @pytest.mark.parametrize("incremental", [False, True])
 @pytest.mark.parametrize("resolution", [0.001, 0.0005, 0.002, 0.01])
 def test_points_are_whole_steps_that_the_control_keeps(dialect, inch, incremental, resolution):
-    head = HEADS[dialect].format(u=20 if inch else 21, s=70 if inch else 71)
+    head = HEADS[dialect].format(u=20 if inch else 21, s=700 if inch else 710)
     unit = 25.4 if inch else 1.0
     mode = "G91" if incremental else "G90"
     cross = "Z" if "lathe" in dialect else "Y"
