@@ -298,12 +298,14 @@ class Reader:
                     "what the control starts with into program.startup of the machine file",
                 )
             )
-        if runner.asked_distance is not None:
-            found.append(
-                Finding(
-                    runner.asked_distance, "no G90 or G91 before the first rapid: G90 is assumed"
+        for line, codes, assumed in (
+            (runner.asked_distance, "G90 or G91", "G90"),
+            (runner.asked_feed_mode, "G93, G94 or G95", "G94"),
+        ):
+            if line is not None:
+                found.append(
+                    Finding(line, f"no {codes} before the first rapid: {assumed} is assumed")
                 )
-            )
         if not self.state.ended:
             found.append(Finding(None, "program ends without M2, M30 or a closing %"))
         return tuple(found)

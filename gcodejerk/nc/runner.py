@@ -46,6 +46,7 @@ class Runner:
         self.odd_lines: list[Finding] = []
         self.odd_count = 0
         self.asked_distance: int | None = None
+        self.asked_feed_mode: int | None = None
         self.call: Callable[[Call, Line], bool] | None = None
         """Runs a subprogram; whether the program goes on behind it."""
         self.left: Callable[[], None] = lambda: None
@@ -165,10 +166,14 @@ class Runner:
         self.state, self.executor.lengths = kept, lengths
 
     def ask(self, number: int) -> None:
-        """Note the first certain rapid that rests on an assumed distance mode."""
-        fixed = "distance" in self.state.fixed
-        if not (fixed or self.state.distance_stated) and self.asked_distance is None:
+        """Note the first certain rapid that rests on an assumed distance or feed mode."""
+        state = self.state
+        fixed = "distance" in state.fixed
+        if not (fixed or state.distance_stated) and self.asked_distance is None:
             self.asked_distance = number
+        fixed = "feed_mode" in state.fixed
+        if not (fixed or state.feed_mode_stated) and self.asked_feed_mode is None:
+            self.asked_feed_mode = number
 
     def odd(self, line: Line, problem: str, column: int | None = None) -> None:
         """Note a line that is not understood."""

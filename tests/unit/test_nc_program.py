@@ -196,14 +196,15 @@ def test_exact_stop_is_path_62():
 
 
 def test_startup_codes_count_as_stated():
-    program = read(b"G0 X1\nX2\nM2\n", start=Start(startup="G21 G90 G64 P0.01"))
+    program = read(b"G0 X1\nX2\nM2\n", start=Start(startup="G21 G90 G94 G64 P0.01"))
     assert program.findings == ()
     assert program.rapids.distance_stated.all()
 
 
-def test_assumed_distance_mode_is_found():
-    (finding,) = read(b"G21 G0 X1\nX2\nM2\n").findings
-    assert (finding.line, "G90 is assumed" in finding.message) == (2, True)
+def test_assumed_distance_and_feed_modes_are_found():
+    distance, feed = read(b"G21 G0 X1\nX2\nM2\n").findings
+    assert (distance.line, "G90 is assumed" in distance.message) == (2, True)
+    assert (feed.line, "G94 is assumed" in feed.message) == (2, True)
 
 
 @pytest.mark.parametrize("fast", [True, False])

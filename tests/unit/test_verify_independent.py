@@ -9,9 +9,12 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.pipeline import process
 from gcodejerk.verification import Kind, verify
 
-VMC = Machine.load(find_machine("vmc"))
+CENTRE = Machine.load(find_machine("centre"))
 MACHINE = replace(
-    VMC, positioning="independent", axes=tuple(replace(a, travel=None) for a in VMC.axes)
+    CENTRE,
+    controller="linuxcnc",
+    positioning="independent",
+    axes=tuple(replace(a, travel=None) for a in CENTRE.axes),
 )
 PROGRAM = b"G21 G90 G94 G64\nF600\nG0 X0 Y0 Z0\nG0 X150. Y20. Z6.\nM2\n"
 POINT = re.compile(rb"G1 X(\S+) Y(\S+) Z(\S+) F\S+")
