@@ -33,7 +33,7 @@ class Reason(enum.StrEnum):
     FEED_UNIT = "unit of F unknown, or not that of lengths"
     PATH_UNKNOWN = "path mode unknown"
     START_UNKNOWN = "start unknown"
-    ROTARY_WAY = "way of a rotary axis not stated"
+    ROTARY_WAY = "a rotary axis may turn another way"
     MIXED_AXES = "linear and rotary axes move together"
     OTHER_WORDS = "other words of the block cannot keep their order"
     FEED_UNKNOWN = "feed to restore unknown"

@@ -43,7 +43,8 @@ def _turn(state: State, axis: int, angle: float, step: Step) -> float:
         return angle
     end = way_round(stands, angle, wrap)
     step.way_unknown |= end != end
-    if end != stands and (wrap == "sign" or not 0.0 <= stands < 360.0 or end != angle):
+    moves = end != stands and (wrap == "sign" or not 0.0 <= stands < 360.0)
+    if moves or end != angle:
         step.turned |= 1 << axis
     return end
 

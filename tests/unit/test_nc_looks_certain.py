@@ -6,9 +6,11 @@ import math
 import pytest
 
 from gcodejerk.errors import ProgramError
+from gcodejerk.machine import Machine
 from gcodejerk.nc import AXES, CERTAIN, DIALECTS, Start, read_program
 from gcodejerk.nc.modal import FIELDS, State, agree, join, same
 from gcodejerk.nc.reader import Reader
+from gcodejerk.pipeline import process
 from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.verification.agreement import confirm
 from gcodejerk.verification.findings import Findings
@@ -229,6 +231,25 @@ def test_rotary_axes_in_runs_of_plain_lines(wrap, fast):
     assert (Reason.ROTARY_WAY in reasons) is (wrap is None)
     if wrap == "sign":
         assert rapids.rapids.target[-1, 3] == 59 * 7  # forwards all the time
+
+
+def test_an_axis_that_has_counted_turns_is_not_written_within_the_program():
+    text = """
+interval: 0.001
+positioning: linear
+controller: fanuc
+axes:
+  X: {rapid: &r {velocity: 500, acceleration: 3000, jerk: 5.0e+4}, modes: [{frequency: 22}]}
+  A: {wrap: shortest, rapid: *r, modes: [{frequency: 30}]}
+"""
+    program = b"G21 G17 G40 G90 G94 G64 F100.\nG0 X0. A300.\nG0 A90.\nG0 X50. A90.\nG0 A10.\nM30\n"
+    for controller, planned in (("fanuc", []), ("csv", [3, 4, 5])):
+        result = process(program, Machine.loads(text), controller=controller)
+        lines = result.program.rapids.line[result.plans.planned]
+        assert lines.tolist() == planned
+    plain = program.replace(b"A300.", b"A100.")
+    result = process(plain, Machine.loads(text))
+    assert result.program.rapids.line[result.plans.planned].tolist() == [3, 4, 5]
 
 
 # Mills and lathes
