@@ -50,7 +50,7 @@ class Codes(Known):
             or not self.dialect.beam_codes.isdisjoint(block.m)
             or ("I" in block.values and (3 in block.m or 4 in block.m))
         )
-        if self.dark and any(m in _OUTPUTS for m in block.m):
+        if self.facts.spindle in ("laser", "plasma") and any(m in _OUTPUTS for m in block.m):
             self.bars["outputs"] = True
         if not (self.dark and on):
             return False
@@ -131,7 +131,8 @@ class Codes(Known):
             self.lose_offsets()
             self.lose()
         elif effect in ("transform", "modal cycle"):
-            self.frames["a frame"] = True
+            # G67 ends a modal macro, under the name that the table of transforms gives it
+            self.frames["modal macro" if effect == "modal cycle" else "a frame"] = True
             self.lose()
         elif effect == "cycle":
             self.lose()

@@ -124,6 +124,9 @@ STILL_CERTAIN = {
     "a frame is written, then selected": ("siemens", b"$P_UIFR[1]=X5\nG54 D1\nG0 X5\nX6\n"),
     "parameters of LinuxCNC": ("linuxcnc", b"#5221=3\nG0 X5\n"),
     "G43 with its axis": ("fanuc", b"G43 H1 Z5.\nG0 Z9.\n"),
+    "behind a modal macro": (
+        "fanuc", b"G66 P9000\nX1.\nG67\nG21 G90 G94 G17 G40 G49 G54 G64 F9.\nG0 X5.\nX6.\n"
+    ),
     "look-ahead again": ("haas", b"G103 P1\nG103 P0\nG0 X5.\n"),
     "F of all axes": ("siemens", b"FGROUP(X,Y)\nFGROUP()\nG0 X5 Z9\n"),
     "LinuxCNC at M0": ("linuxcnc", b"M0\nG0 X9\n"),
