@@ -59,6 +59,16 @@ def test_the_second_reading_agrees_with_the_first(dialect, data, known):
     assert not violations
 
 
+@pytest.mark.parametrize(("spindle", "certain"), [(None, 1), ("mill", 1), ("laser", 0)])
+def test_outputs_may_fire_a_beam_only_where_there_is_one(spindle, certain):
+    """M106 is a fan, unless the machine file says that the machine burns."""
+    data = b"G21\nG90\nG0 F3000 X0 Y0 Z5\nM106 S20\nG0 X9 F2000\nM2\n"
+    start = replace(start_of("marlin", known=False), spindle=spindle)
+    rapids = read(data, "marlin", start)
+    assert judge(data, "marlin", start, rapids) == ([], certain)
+    assert np.count_nonzero(rapids.reason == CERTAIN) == certain
+
+
 @CALM
 @given(cycle_programs())
 def test_the_second_reading_agrees_behind_drilling_cycles(data):
