@@ -24,6 +24,12 @@ EQUAL = 0.0001
 """LinuxCNC's tolerance of EQ and NE (TOLERANCE_EQUAL)."""
 WHOLE = 0.0001
 """How far a computed index of a variable may be from a whole number."""
+LARGEST_TANGENT = 1e9
+"""Beyond it the last digit of pi decides, at 90 degrees even the sign."""
+NEARLY_ZERO = 1e-9
+"""What a zero may be after errors of rounding, on one side or the other."""
+LARGEST_DIVIDED = 1e8
+"""The rest that MOD leaves of more is made of errors of rounding."""
 LARGEST_ROUNDED = 2.0**31
 """ROUND goes through an integer of the control."""
 
@@ -184,7 +190,10 @@ class _Reader:
             if self.next() != b"/":
                 raise _Odd
             self.at += 1
-            angle = math.degrees(math.atan2(value, self.bracket()))
+            other = self.bracket()
+            if abs(value) <= NEARLY_ZERO * max(1.0, abs(other)) and other <= NEARLY_ZERO:
+                return NAN  # 180 or -180: the sign of a zero decides
+            angle = math.degrees(math.atan2(value, other))
             return angle if self.rules.angles or angle >= 0.0 else NAN
         if math.isnan(value):
             return NAN
@@ -209,6 +218,8 @@ def _apply(operator: str, a: float, b: float, rules: Arithmetic) -> float:
     if operator in ("AND", "OR", "XOR"):
         return NAN if rules.bits else float(_LOGIC[operator](a != 0.0, b != 0.0))
     if operator == "MOD":
+        if abs(a) >= LARGEST_DIVIDED:
+            return NAN
         left = math.fmod(a, b)
         if left < 0.0 and not rules.floor:
             return NAN
@@ -229,6 +240,12 @@ def _call(name: str, x: float, rules: Arithmetic) -> float:
 def _round(x: float) -> float:
     """Round to the nearest whole number, a half away from zero."""
     return math.copysign(math.floor(abs(x) + 0.5), x) if abs(x) < LARGEST_ROUNDED else NAN
+
+
+def _tangent(x: float) -> float:
+    """Compute the tangent, but not at its poles."""
+    value = math.tan(math.radians(x))
+    return value if abs(value) < LARGEST_TANGENT else NAN
 
 
 _LOGIC: dict[str, Callable[[bool, bool], bool]] = {
@@ -263,6 +280,6 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "ROUND": _round,
     "SIN": lambda x: math.sin(math.radians(x)),
     "SQRT": math.sqrt,
-    "TAN": lambda x: math.tan(math.radians(x)),
+    "TAN": _tangent,
     "TRUNC": math.trunc,
 }

@@ -50,7 +50,7 @@ class Codes(Known):
             or not self.dialect.beam_codes.isdisjoint(block.m)
             or ("I" in block.values and (3 in block.m or 4 in block.m))
         )
-        if self.facts.spindle in ("laser", "plasma") and any(m in _OUTPUTS for m in block.m):
+        if self.burns and any(m in _OUTPUTS for m in block.m):
             self.bars["outputs"] = True
         if not (self.dark and on):
             return False

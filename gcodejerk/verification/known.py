@@ -68,9 +68,9 @@ class Known:
         self.spindle: int | None = 5
         self.habits = False
         """The program was seen to behave like one for a laser."""
-        self.dark = facts.spindle in ("laser", "plasma") or (
-            dialect.dark_rapids and facts.spindle is None
-        )
+        self.burns = facts.spindle in ("laser", "plasma")
+        """The machine file says that it has a beam, which other outputs may fire too."""
+        self.dark = self.burns or (dialect.dark_rapids and facts.spindle is None)
         """Rapids have to stay G0 while M3 or M4 is on."""
         self.diameter: bool | None = facts.diameter
         self.turns = facts.diameter

@@ -102,3 +102,20 @@ def test_what_the_interpreter_refuses_is_unknown(tmp_path, text):
     _, refusal = interpret(path)
     assert refusal
     assert math.isnan(computed(text))
+
+
+@pytest.mark.parametrize("text", ["TAN[90]", "TAN[-270]", "ATAN[TAN[ACOS[0]]]/[FUP[+4]]"])
+def test_at_the_poles_of_the_tangent_nothing_is_known(tmp_path, text):
+    """The interpreter finds a number, but its sign is that of an error of rounding."""
+    path = tmp_path / "part.ngc"
+    path.write_text(f"{HEAD}X[ATAN[{text}]/[1]]\nM2\n")
+    ends, refusal = interpret(path)
+    assert not refusal
+    assert abs(ends[max(ends)]) == pytest.approx(90.0, abs=1.0)
+    assert math.isnan(computed(f"[{text}]"))
+
+
+@pytest.mark.parametrize("text", ["[ATAN[FIX[-[3 LT 2]]]/[-1]]", "[ATAN[0]/[-1]]", "[ATAN[0]/[0]]"])
+def test_where_the_sign_of_a_zero_decides_nothing_is_known(text):
+    """The interpreter's zero of the first has a sign: it turns to -180."""
+    assert math.isnan(computed(text))

@@ -144,7 +144,8 @@ def test_interpreter_finds_the_same_end_points_before_and_after(machine, tmp_pat
     assert sum(rewritten for rewritten, _ in accepted.values()) > 500
     if SHARED.exists():
         assert accepted["all__linuxcnc.ngc"][0] > 150
-        assert accepted["adaptive__linuxcnc.ngc"][0] > 300
+        # Of its short rapids many are left alone on this machine, for no other would be better.
+        assert accepted["adaptive__linuxcnc.ngc"][0] > 200
 
 
 @pytest.mark.skipif(

@@ -17,6 +17,8 @@ KNOWN = Start(
     positions=dict.fromkeys(AXES, 1.0),
     offsets={"G54": dict.fromkeys(AXES, 2.0)},
     tool_lengths={1: 3.0},
+    startup="G21",
+    wraps={"A": "none", "B": "shortest", "C": "sign"},
 )
 
 # What real lines are made of, so that drawn lines come near to them.

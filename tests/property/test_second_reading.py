@@ -32,7 +32,7 @@ def start_of(dialect, known=True):
         tool_lengths={1: 12.5},
         decimal_point="calculator",
         diameter="lathe" in dialect,
-        startup="G71" if dialect == "siemens" else "",
+        startup=("G71" if dialect == "siemens" else "G21") if known else "",
         wraps={"A": "none", "B": "shortest", "C": "sign"} if known else {},
         spindle="mill" if known else None,
     )
@@ -57,6 +57,16 @@ def test_the_second_reading_agrees_with_the_first(dialect, data, known):
     program, start = data.draw(programs(dialect)), start_of(dialect, known)
     violations, _ = judge(program, dialect, start, read(program, dialect, start))
     assert not violations
+
+
+@pytest.mark.parametrize(("spindle", "certain"), [(None, 1), ("mill", 1), ("laser", 0)])
+def test_outputs_may_fire_a_beam_only_where_there_is_one(spindle, certain):
+    """M106 is a fan, unless the machine file says that the machine burns."""
+    data = b"G21\nG90\nG0 F3000 X0 Y0 Z5\nM106 S20\nG0 X9 F2000\nM2\n"
+    start = replace(start_of("marlin", known=False), spindle=spindle)
+    rapids = read(data, "marlin", start)
+    assert judge(data, "marlin", start, rapids) == ([], certain)
+    assert np.count_nonzero(rapids.reason == CERTAIN) == certain
 
 
 @CALM
@@ -228,6 +238,12 @@ REAL = {
     **{"corpus/*TEST_TURN*": "fanuc-lathe-a", "corpus/*mach3*": "mach"},
     **{"corpus/*reprap*": "marlin", "corpus/gEdit__f*": "fanuc", "corpus/*.MPF": "siemens"},
 }
+STARTUP = {
+    **{"fanuc": "G90 G17 G21 G94", "fanuc-lathe-a": "G21 G99", "siemens": "G90 G71"},
+    **{"mach": "G90 G17 G21", "grbl": "G90 G17 G21"},
+}
+"""What shops of these files have set at their controls, and their programs do not say."""
+NONE_CERTAIN = ("corpus/*reprap*", "corpus/gEdit__f*", "corpus/*.MPF")
 EXAMPLES = Path("/usr/share/linuxcnc/ncfiles")
 
 
@@ -236,7 +252,7 @@ def test_the_second_reading_agrees_on_real_files(pattern):
     if not SHARED.is_dir():
         pytest.skip("no ../shared beside the repository")
     dialect = REAL[pattern]
-    start = replace(start_of(dialect), offsets={}, positions={}, startup="")
+    start = replace(start_of(dialect), offsets={}, positions={}, startup=STARTUP.get(dialect, ""))
     certain = agreed = 0
     for path in sorted(SHARED.glob(pattern)):
         data = path.read_bytes()
@@ -246,6 +262,7 @@ def test_the_second_reading_agrees_on_real_files(pattern):
         certain += int(np.count_nonzero(rapids.reason == CERTAIN))
         agreed += confirmed
     assert agreed == certain
+    assert (certain == 0) == (pattern in NONE_CERTAIN)
 
 
 @pytest.mark.skipif(not EXAMPLES.is_dir(), reason="LinuxCNC's examples are not installed")

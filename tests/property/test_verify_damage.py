@@ -11,7 +11,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.machine import Machine, find_machine
@@ -42,7 +42,9 @@ def machine_for(dialect):
     turned = "lathe" in dialect
     axes = tuple(replace(a, travel=None, diameter=turned and a.name == "X") for a in _VMC.axes)
     start = dict.fromkeys("XYZ", 0.0)
-    program = replace(_VMC.program, start=start, decimal_point="calculator")
+    # Of Siemens' F the basic unit decides, which no program says.
+    startup = "G71" if dialect == "siemens" else ""
+    program = replace(_VMC.program, start=start, startup=startup, decimal_point="calculator")
     return replace(_VMC, axes=axes, program=program)
 
 
@@ -463,12 +465,12 @@ APPLIED = set()
 
 
 def missed(dialect, program, pick):
-    """Kinds of damage to a processed program that nobody notices."""
+    """Kinds of damage to a processed program that nobody notices; None if it has no room for it."""
     machine, controller = machine_for(dialect), dialect.split("-")[0]
     output = process(program, machine, verify=False, controller=controller, dialect=dialect).output
     text = Damaged(program, output, dialect)
     if not (text.inner and text.tails and text.kept):
-        return []
+        return None
     assert verify(program, output, machine, dialect=dialect).ok
     out = []
     for name, damage in DAMAGE.items():
@@ -489,7 +491,9 @@ def missed(dialect, program, pick):
 @SETTINGS
 @given(st.data(), st.randoms(use_true_random=False))
 def test_every_damage_is_noticed(dialect, data, pick):
-    assert missed(dialect, data.draw(calm_programs(dialect)), pick) == []
+    found = missed(dialect, data.draw(calm_programs(dialect)), pick)
+    assume(found is not None)
+    assert found == []
 
 
 def test_every_kind_of_damage_is_done_to_programs_that_have_room_for_all():

@@ -29,11 +29,12 @@ CALM = settings(
 KNOWN = dict.fromkeys("XYZABC", 0.0)
 
 
-def ready(machine, known=True):
+def ready(machine, known=True, unit="G21"):
     """The machine without travel, from a known start: so that there is much to rewrite."""
     axes = tuple(replace(axis, travel=None) for axis in machine.axes)
-    program = replace(machine.program, start=KNOWN if known else {})
-    return replace(machine, axes=axes, program=program)
+    start, startup, spindle = (KNOWN, unit, "mill") if known else ({}, "", None)
+    program = replace(machine.program, start=start, startup=startup)
+    return replace(machine, axes=axes, program=program, spindle=spindle)
 
 
 VMC = ready(Machine.load(find_machine("vmc")))
@@ -100,7 +101,8 @@ def test_every_table_is_accepted(machine, data):
 @given(st.data(), st.booleans())
 def test_every_output_of_every_dialect_is_accepted(dialect, data, known):
     program = data.draw(programs(dialect))
-    machine = turning(ready(VMC, known)) if "lathe" in dialect else ready(VMC, known)
+    machine = ready(VMC, known, "G71" if dialect == "siemens" else "G21")
+    machine = turning(machine) if "lathe" in dialect else machine
     machine = replace(machine, program=replace(machine.program, decimal_point="calculator"))
     result = process(
         program, machine, verify=False, controller=dialect.split("-")[0], dialect=dialect
