@@ -33,7 +33,12 @@ class Evidence:
 
 def _code(dialect: str, pattern: bytes, why: str, sure: bool = True) -> Evidence:
     """Evidence in code, comments left out."""
-    return Evidence(dialect, re.compile(pattern, re.IGNORECASE | re.MULTILINE), why, sure)
+    return Evidence(dialect, _in_line(pattern, re.IGNORECASE), why, sure)
+
+
+def _in_line(pattern: bytes, flags: int = 0) -> re.Pattern[bytes]:
+    r"""Compile a pattern whose ``\s`` stays within the line: over line ends it is quadratic."""
+    return re.compile(pattern.replace(rb"\s", rb"[ \t]"), flags | re.MULTILINE)
 
 
 _IN_COMMENTS = (
@@ -78,18 +83,18 @@ CODE = (
     _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
           rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
 )  # fmt: skip
-_INCREMENTS = re.compile(rb"(?<![A-Z_#\[])[UW]\s*[-+]?[.\d]")
+_INCREMENTS = _in_line(rb"(?<![A-Z_#\[])[UW]\s*[-+]?[.\d]")
 LATHE = (
-    (re.compile(rb"(?<![A-Z_])T\d{4}(?!\d)"), "a tool with its offset, T0101"),
-    (re.compile(rb"(?<![A-Z_])G(50|92)\s*S\d"), "a limit of the spindle's speed, G50 S"),
-    (re.compile(rb"(?<![A-Z_])G96(?!\d)"), "constant surface speed, G96"),
+    (_in_line(rb"(?<![A-Z_])T\d{4}(?!\d)"), "a tool with its offset, T0101"),
+    (_in_line(rb"(?<![A-Z_])G(50|92)\s*S\d"), "a limit of the spindle's speed, G50 S"),
+    (_in_line(rb"(?<![A-Z_])G96(?!\d)"), "constant surface speed, G96"),
     (_INCREMENTS, "increments U and W"),
-    (re.compile(rb"^[^Y\n]*(?<![A-Z_])G7[1-6](?!\d)[^Y\n]*$", re.MULTILINE), "a turning cycle"),
+    (_in_line(rb"^[^Y\n]*(?<![A-Z_])G7[1-6](?!\d)[^Y\n]*$"), "a turning cycle"),
 )
 """What programs of lathes hold, and hardly any program of a mill that reads Fanuc's language."""
 _TURNING = re.compile(rb"\b(LATHE|TURN(?:ING)?|TURN POST)\b")
-_O_PROGRAM = re.compile(rb"^\s*[O:]\d+", re.MULTILINE)
-_KLARTEXT = re.compile(rb"^\s*\d+\s+BEGIN\s+PGM\b", re.MULTILINE)
+_O_PROGRAM = _in_line(rb"^\s*[O:]\d+")
+_KLARTEXT = _in_line(rb"^\s*\d+\s+BEGIN\s+PGM\b")
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 
 

@@ -26,7 +26,7 @@ KINDS = {
     **dict.fromkeys(("doubt", "turns", "habits"), "ever"),
     **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter", "selected"), "mode"),
     **dict.fromkeys(("cycle", "feed_whole", "spindle"), "mode"),
-    **dict.fromkeys(("dialect", "facts", "fixed", "dark"), "given"),
+    **dict.fromkeys(("dialect", "facts", "fixed", "dark", "burns"), "given"),
     # where in the file the reading is; a line that may be skipped changes none of these for good
     **dict.fromkeys(("ended", "opened", "begun", "started", "depth", "contour"), "place"),
 }
