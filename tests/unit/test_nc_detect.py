@@ -88,5 +88,5 @@ def test_no_pattern_runs_over_line_ends():
     """Beginning anew at every one of many line ends, such a pattern took minutes for 60 KB."""
     patterns = [e.pattern for e in detect.CODE] + [pattern for pattern, _ in detect.LATHE]
     patterns += [detect._KLARTEXT, detect._O_PROGRAM, detect._INCREMENTS]
-    assert len(patterns) > 30
+    assert len(patterns) > 20
     assert not [p.pattern for p in patterns if b"\\s" in p.pattern]
