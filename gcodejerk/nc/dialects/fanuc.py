@@ -5,6 +5,8 @@ sample programs of NC-PB/gEdit (comments that do not close, ``N120/G0``). What a
 is unknown until the machine file says it: whether ``X100`` is 100 mm (3401), the modes after
 power-on that 3402 chooses (G0 or G1, plane, G90 or G91, G94 or G95), the path of G0 (1401,
 `positioning`), and whether G43 alone moves (5006#6).
+Parameters by number without a page, the order of M codes and the check of the position behind G0
+are general knowledge that was not looked up: they are used to leave rapids alone, and to stop.
 A machine builder adds M codes of his own, which may be macros that move. FreeCAD's post writes the
 name of the file as the first line.
 """
@@ -150,13 +152,13 @@ FANUC = Dialect(
     ),
     quick=True,
     # Whether M3, M5, M8 and the like run with the motion of their block or behind it, the builder
-    # chooses (B-63944EN/02, "Auxiliary function"); M0, M1, M2, M30 act when the block is done.
+    # chooses; M0, M1, M2, M30 act when the block is done.
     before_m=frozenset(),
     after_m=frozenset({0, 1, 2, 30}),
     exact_stop=90,
-    # "Positioning (G00)": execution proceeds to the next block after confirming the in-position.
+    # Behind G0 the next block begins once the axes are in position, unless 1601 says otherwise.
     stops_after_rapid=True,
-    # "Decimal point programming": least increments of IS-B and IS-C leave eight digits.
+    # Eight digits of the least increment.
     writing=Writing((b"(", b")"), b"G4 P1", digits=8),
 )
 

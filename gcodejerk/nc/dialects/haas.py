@@ -2,7 +2,9 @@
 
 Sources: Haas, "Help with the decimal points" (setting 162; ``X5`` is 0.0005 inch without it);
 gcodes.net, G28 (without axes it moves all of them; it cancels the tool length); VF 96-8000 p. 182
-(positions between holes are rapids). Whether G0 goes straight is a setting: `positioning`.
+(positions between holes are rapids). Whether G0 goes straight is a setting: `positioning`. G100 to
+G103, G112, G113, G253 to G255, G268 and G269 are general knowledge that was not looked up; they are
+used to leave rapids alone.
 """
 
 from __future__ import annotations

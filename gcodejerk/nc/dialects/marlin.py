@@ -73,6 +73,6 @@ MARLIN = Dialect(
     harmless=frozenset({0}),
     before_m=frozenset(),
     after_m=frozenset(),
-    # Positions are single-precision floats (gcode/parser.h, value_float), good for seven digits.
+    # Positions are single-precision floats, good for seven digits (not looked up).
     writing=Writing((b"; ", b""), b"M400", digits=7),
 )

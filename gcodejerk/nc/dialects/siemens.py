@@ -138,7 +138,7 @@ SIEMENS = Dialect(
         | {6410, 6420, 6430, 6440, 6450, 6010, 6020, 6030}
     ),
     # M0, M1, M2, M17 and M30 act behind the motion of their block; for all others machine data says
-    # (22200 AUXFU_M_SYNC_TYPE).
+    # (22200; from general knowledge, not looked up).
     before_m=frozenset(),
     after_m=frozenset({0, 1, 2, 30}),
     exact_stop=90,
