@@ -39,6 +39,8 @@ def _turn(state: State, axis: int, angle: float, step: Step) -> float:
     stands = state.position[axis]
     wrap = state.wraps[axis]
     step.way_unknown |= wrap is None and stands != angle
+    if wrap is None and math.copysign(1.0, angle) < 0.0:
+        return NAN  # by its sign alone, some controls go backwards, to the positive angle
     if wrap in (None, "none"):
         return angle
     end = way_round(stands, angle, wrap)

@@ -66,7 +66,9 @@ def _sure(
         by_radius = (arc_words == BIT["R"]) & (letters & in_plane != 0)
         silent = letters & (_AXIS_BITS | _ARC_WORDS | BIT["G"]) == 0
         sure = np.where(is_arc, by_centre | by_radius | silent, sure)
-    counting = sum(1 << k for k, wrap in enumerate(state.wraps) if wrap in ("shortest", "sign"))
+    counting = sum(
+        1 << k for k, wrap in enumerate(state.wraps) if AXES[k] not in LINEAR and wrap != "none"
+    )
     if counting and state.distance == 900:
         sure = sure & (letters & np.uint32(counting) == 0)  # where they end, the way they go says
     if state.feed_mode == 93:

@@ -224,6 +224,8 @@ class Known:
     def turn(self, k: int, angle: float) -> float:
         """Where a rotary axis ends that was told an absolute angle."""
         wrap, here = self.facts.wraps.get(AXES[k]), self.at[k]
+        if wrap is None and math.copysign(1.0, angle) < 0.0:
+            return NAN
         if wrap not in ("shortest", "sign") or (here != here and wrap == "shortest"):
             return angle
         if here != here or (wrap == "sign" and not -360.0 < angle < 360.0):
