@@ -199,14 +199,9 @@ def _reasons(
     moving = is_named & (start != target)
     moves = moving.any(axis=1)
     reason = np.full(len(named), CERTAIN, dtype=np.uint8)
-    turning = np.array(
-        [axis not in LINEAR and wrap is None for axis, wrap in zip(AXES, state.wraps, strict=True)]
-    )
-    if state.distance == 900 and turning.any():
-        reason[moving[:, turning].any(axis=1)] = _INDEX[Reason.ROTARY_WAY]
     if not dialect.feed_of_mixed:
         both = moving[:, _IS_LINEAR].any(axis=1) & moving[:, ~_IS_LINEAR].any(axis=1)
-        reason[both & (reason == CERTAIN)] = _INDEX[Reason.MIXED_AXES]
+        reason[both] = _INDEX[Reason.MIXED_AXES]
     reason[~moves] = _INDEX[Reason.NO_MOTION]
     reason[unknown] = _INDEX[Reason.START_UNKNOWN]
     if state.unit is None:
