@@ -59,11 +59,14 @@ def judge_axes(
         size = np.where(moves, D, 1.0)
         step = paths.step[:, a]
         left = np.abs(paths.position[:, a] - (paths.start + paths.displacement)[owner, a])
-        late = moves[owner] & (t >= (most[:, a] - TINY)[owner]) & (left > (step + TINY)[owner])
+        own = most[owner, a]
+        late = moves[owner] & (t >= own - TINY) & (left > (step + TINY)[owner])
         out.append((Kind.TIME, late, f"{AXES[a]} arrives later than its own rapid may"))
-        # Rest at both ends: the trapezoids of all blocks add up to the integral.
+        # Rest at both ends: the trapezoids of all blocks add up to the integral. What an end that
+        # is no whole step leaves for the last block belongs to no time of the axis.
         before = np.roll(left, 1)
-        mean = np.add.reduceat(0.5 * (left + before) * h, paths.begin) / size
+        area = np.where(t <= own + TINY, 0.5 * (left + before) * h, 0.0)
+        mean = np.add.reduceat(area, paths.begin) / size
         error = machine.interval + step / size * most[:, a]
         off = (mean < 0.5 * low * usual[:, a] - error) | (mean > 0.5 * high * most[:, a] + error)
         rows = np.zeros(len(t), dtype=np.bool_)

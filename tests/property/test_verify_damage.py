@@ -504,8 +504,9 @@ def test_every_kind_of_damage_is_done_to_programs_that_have_room_for_all():
         ("linuxcnc", "G21 G90 G94 G61\nF60\nG0 X0 Y0 Z0\n"),
         ("linuxcnc", "G21 G90 G93 G61.1\nG0 X0 Y0 Z0\n"),
         ("fanuc", "G21 G17 G40 G90 G94 G64\nG0 X0. Y0. Z0. F200.\n"),
-        ("siemens", "G71 G17 G40 G90 G94 G61\nG0 X0. Y0. Z0. F200.\n"),
+        ("siemens", "G71 G17 G40 G90 G94 G60\nG0 X0. Y0. Z0. F200.\n"),
     ):
-        program = (head + moves).encode()
+        comment = "; cut" if dialect == "siemens" else "(cut)"
+        program = (head + moves.replace("(cut)", comment)).encode()
         assert missed(dialect, program, random.Random(3)) == []
     assert set(DAMAGE) == APPLIED

@@ -53,3 +53,13 @@ def test_an_axis_that_is_late_or_early_takes_another_path(axis, blocks):
     assert not found.ok
     if blocks > 0:
         assert Kind.TIME in {v.kind for v in found.violations}, found.violations
+
+
+@pytest.mark.parametrize("end", [0.6, 0.604, -0.2549, 1.2049])
+def test_what_an_end_between_two_steps_leaves_for_the_last_block_is_no_delay(end):
+    axes = tuple(replace(a, resolution=0.01 if a.name == "Z" else 0.001) for a in MACHINE.axes)
+    coarse = replace(MACHINE, axes=axes)
+    program = PROGRAM.replace(b"X150. Y20. Z6.", b"X800. Y20. Z%g" % end)
+    made = process(program, coarse, verify=False)
+    assert made.planned == 1
+    assert verify(program, made.output, coarse).violations == ()

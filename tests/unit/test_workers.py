@@ -62,11 +62,11 @@ def test_who_stops_listening_stops_the_workers():
 
 
 MASTER = """
-import os, sys, time
+import os, time
 from gcodejerk.workers import map_jobs
 
 def act(job):
-    print(os.getpid(), flush=True)
+    os.write(1, b"%d\\n" % os.getpid())  # in one piece: two workers write to one pipe
     time.sleep(job)
 
 if __name__ == "__main__":
