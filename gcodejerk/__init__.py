@@ -16,6 +16,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from gcodejerk._version import __version__ as __version__
+
 if TYPE_CHECKING:
     from gcodejerk.errors import (
         EmitError,
@@ -32,8 +34,6 @@ if TYPE_CHECKING:
     from gcodejerk.move import Plan, plan_move
     from gcodejerk.pipeline import Result, process
     from gcodejerk.verification import Verification, verify
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "gcodejerk.errors": (

@@ -21,9 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcodejerk.arrival import arrival_response, worst_in_bands
+from gcodejerk.axes import AXES
 from gcodejerk.designs import Task, condition1, condition2, known_limits
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion import Laws, joined, whole_intervals
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.programme import require_solver

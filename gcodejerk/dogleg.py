@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import AXES
+from gcodejerk.axes import AXES
 from gcodejerk.motion import sample_laws
 from gcodejerk.motion.laws import Array
 from gcodejerk.plans import Plans

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
 from gcodejerk.nc.expansion import Expansion, LineMap, expand
-from gcodejerk.start import program_start
 from gcodejerk.verification import Verification, Violation, require, verify_files
 from gcodejerk.verification.expansion import check_expansion
 
@@ -80,7 +79,7 @@ def written_out(
             between,
             name=name,
             dialect=dialect or machine.dialect,
-            start=program_start(machine),
+            start=machine.program_start(),
             comments=comments,
         )
         used = between if expansion.written else source
@@ -126,7 +125,7 @@ def prove_expansion(
         original,
         expanded,
         dialect=dialect or machine.dialect,
-        start=program_start(machine),
+        start=machine.program_start(),
         names=names,
         most=most,
     )

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion import laws_response
 from gcodejerk.motion.laws import Array, Laws
 from gcodejerk.plan import plan_moves

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk import __version__
+from gcodejerk._version import __version__
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.optimal import (
     Move,

@@ -37,7 +37,6 @@ from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
 from gcodejerk.settling import Left, left_alone
 from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
-from gcodejerk.start import program_start
 from gcodejerk.stream import Residuals, make_streams
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
 
@@ -269,7 +268,7 @@ def _process(
         source,
         name=name,
         dialect=settings.dialect or machine.dialect,
-        start=program_start(machine),
+        start=machine.program_start(),
         progress=lambda done: report("reading", done, size),
         neighbours=machine.planner == LINUXCNC,
     )
@@ -397,7 +396,7 @@ def _judged(
         replace(machine, design=design),
         names=(program.name, f"the output for {program.name}"),
         dialect=program.dialect,
-        start=program_start(machine),
+        start=machine.program_start(),
     )
 
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.designs import DESIGNS, Task, shortest, worst_in_band
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion import (
     GRID_TOLERANCE,
     Laws,

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import AXES, Machine, Mode
+from gcodejerk.axes import AXES
+from gcodejerk.machine import Machine, Mode
 from gcodejerk.motion import Laws, grouped, mode_poles
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.residual import Complex

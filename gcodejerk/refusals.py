@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion import SymmetricLaws, conventional_laws, whole_intervals
 from gcodejerk.motion.laws import Array
 

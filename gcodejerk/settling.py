@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.arrival import arrival_response
+from gcodejerk.axes import AXES
 from gcodejerk.designs import Task
-from gcodejerk.machine import AXES
 from gcodejerk.motion.laws import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.plans import STANDSTILL, Modes, Plans

@@ -15,7 +15,7 @@ import io
 from collections.abc import Sequence
 from typing import BinaryIO
 
-from gcodejerk import __version__
+from gcodejerk._version import __version__
 from gcodejerk.advice import stamp_note
 from gcodejerk.emit import Controller, Options
 from gcodejerk.errors import EmitError

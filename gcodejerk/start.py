@@ -1,50 +1,43 @@
-"""What a program may assume when it starts, as its machine file says it.
+"""What may be assumed when a program starts.
 
-Rule: `nc` knows no machines and `machine` no programs; the one place where they meet is here, so
-that everyone who reads a program for a machine reads it from the same start.
+Rule: without a word from the user only the dialect's documented modes are assumed, and no position.
+It stands on the ground because `machine` states it and `nc` starts from it, and neither knows the
+other: so everyone who reads a program for a machine reads it from the same start.
 """
 
 from __future__ import annotations
 
-from gcodejerk.machine import Machine
-from gcodejerk.nc import Start
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
-def program_start(machine: Machine) -> Start:
-    """Where and in which modes programs of a machine start.
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What may be assumed when the program starts; by default nothing but the dialect's modes."""
 
-    Parameters
-    ----------
-    machine : Machine
-        Its `program` section, its unit, and whether X is a diameter.
+    positions: Mapping[str, float] = field(default_factory=dict)
+    """Axis -> program coordinate [mm, deg]."""
+    offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """System, for example ``G54`` -> axis -> machine minus program coordinate [mm, deg]."""
+    tool_lengths: Mapping[int, float] = field(default_factory=dict)
+    """H number -> length along Z [mm]."""
+    startup: str = ""
+    """Codes in force when a program starts, for example LinuxCNC's RS274NGC_STARTUP_CODE."""
+    diameter: bool = False
+    """X is a diameter where the program does not say whether it is."""
+    decimal_point: str | None = None
+    """What X100 means where the dialect leaves it to the machine: ``calculator`` 100 mm,
+    ``standard`` 100 least increments of 0.001 mm; None unknown."""
+    wraps: Mapping[str, str] = field(default_factory=dict)
+    """Rotary axis -> how it goes to an absolute position: ``none``, through all angles, like a
+    linear axis; ``shortest``, the shorter way round; ``sign``, forwards to a positive number and
+    backwards to a negative one. Of an axis that is not listed, nobody knows."""
+    resume: str | None = None
+    """Where the axes stand behind M0 and M1: ``same`` place, ``unknown``; None: as the dialect's
+    controls do it."""
+    spindle: str | None = None
+    """What M3 turns on: a ``mill``, or a beam: ``laser``, ``plasma``; None: unknown where the
+    dialect's controls drive beams too, a mill elsewhere."""
 
-    Returns
-    -------
-    Start
-        For `nc.read_program`.
 
-    Examples
-    --------
-    >>> machine = Machine.loads('''
-    ... interval: 0.001
-    ... positioning: linear
-    ... axes:
-    ...   Z: {rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}}
-    ... program: {start: {Z: 100}, offsets: {H1: 87.2}}
-    ... ''')
-    >>> start = program_start(machine)
-    >>> dict(start.positions), dict(start.tool_lengths)
-    ({'Z': 100.0}, {1: 87.2})
-    """
-    program = machine.program
-    return Start(
-        positions=program.start,
-        offsets=program.offsets,
-        tool_lengths=program.tool_lengths,
-        startup=program.startup,
-        decimal_point=program.decimal_point,
-        wraps={axis.name: axis.wrap for axis in machine.axes if axis.wrap is not None},
-        resume=program.resume_after_stop,
-        spindle=machine.spindle,
-        diameter=any(axis.diameter for axis in machine.axes),
-    )
+NOTHING_KNOWN = Start()

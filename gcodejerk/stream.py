@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import AXES
+from gcodejerk.axes import AXES
 from gcodejerk.motion import (
     Grid,
     Laws,

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.designs import Task
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Axis, Machine, Mode
+from gcodejerk.machine import Axis, Machine, Mode
 from gcodejerk.motion import (
     Laws,
     laws_response,

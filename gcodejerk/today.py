@@ -13,7 +13,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import AXES, BELL, Limits, Machine
+from gcodejerk.axes import AXES
+from gcodejerk.machine import BELL, Limits, Machine
 from gcodejerk.motion import Laws, SymmetricLaws, conventional_laws
 from gcodejerk.motion.bell import bell_laws
 from gcodejerk.motion.laws import Array

@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from gcodejerk import __version__
+from gcodejerk._version import __version__
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.programs import inspect, process, verify

@@ -239,7 +239,6 @@ def verify(
     """Prove that a program is the original with only its rapids re-timed; list what it is not."""
     from gcodejerk.expanded import verify_expanded
     from gcodejerk.files import open_input
-    from gcodejerk.start import program_start
     from gcodejerk.verification import verify_csv, verify_files
     from gcodejerk.verification.stamp import read_stamp
 
@@ -272,7 +271,7 @@ def verify(
         else:
             found = (verify_csv if table else verify_files)(
                 one, other, described, names=names, dialect=dialect,
-                start=program_start(described), most=most,
+                start=described.program_start(), most=most,
             )  # fmt: skip
     for violation in found.violations:
         file, line = (

@@ -17,8 +17,9 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.nc import DIALECTS, Dialect, Rapids
 from gcodejerk.plans import Plans
 from gcodejerk.stream import Batch, Spelling

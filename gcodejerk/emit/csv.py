@@ -13,9 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Form, Options, decimal_step, step_sizes
 from gcodejerk.emit.digits import Column, format_lines
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.plans import Plans
 from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling

@@ -14,8 +14,9 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.emit.base import axis_steps
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, parse_block
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.units import MM_PER_INCH

@@ -31,10 +31,11 @@ from decimal import Decimal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Form, Options, axis_steps, step_sizes
 from gcodejerk.emit.digits import Column, format_lines
 from gcodejerk.errors import EmitError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
 from gcodejerk.nc.dialect import Writing, code_name
 from gcodejerk.plans import Plans

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Form
 from gcodejerk.emit.gcode import GcodeController
-from gcodejerk.machine import AXES, LINUXCNC
+from gcodejerk.machine import LINUXCNC
 from gcodejerk.nc import Rapids
 from gcodejerk.plans import Plans
 

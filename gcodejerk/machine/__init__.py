@@ -2,7 +2,6 @@
 
 from gcodejerk.machine.find import find_machine
 from gcodejerk.machine.model import (
-    AXES,
     BELL,
     JERK_LIMITED,
     LINUXCNC,
@@ -23,7 +22,6 @@ from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.writer import machine_yaml
 
 __all__ = [
-    "AXES",
     "BELL",
     "DIALECT_OF_CONTROLLER",
     "JERK_LIMITED",

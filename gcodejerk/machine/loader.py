@@ -10,11 +10,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import MachineError
 from gcodejerk.machine.checker import Checker, KeyPath, dotted
 from gcodejerk.machine.document import Document
 from gcodejerk.machine.model import (
-    AXES,
     Axis,
     Design,
     Limits,

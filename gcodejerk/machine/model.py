@@ -15,11 +15,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gcodejerk.errors import MachineError
+from gcodejerk.start import Start
 
 OSCILLATORS = 4
 """That a line of a spectrum stands for."""
-AXES = "XYZABCUVW"
-"""Every axis letter, in the order in which axes are listed, written and reported."""
 LINUXCNC, TRAPEZOIDAL, JERK_LIMITED, BELL = PLANNERS = (
     "linuxcnc-2.9", "trapezoidal", "jerk-limited", "bell",
 )  # fmt: skip
@@ -307,6 +306,39 @@ class Machine:
         from gcodejerk.machine.writer import settings_text
 
         return hashlib.sha256(settings_text(self).encode()).hexdigest()[:8]
+
+    def program_start(self) -> Start:
+        """Where and in which modes programs of this machine start.
+
+        Returns
+        -------
+        Start
+            For `nc.read_program`.
+
+        Examples
+        --------
+        >>> machine = Machine.loads('''
+        ... interval: 0.001
+        ... positioning: linear
+        ... axes:
+        ...   Z: {rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}}
+        ... program: {start: {Z: 100}, offsets: {H1: 87.2}}
+        ... ''')
+        >>> start = machine.program_start()
+        >>> dict(start.positions), dict(start.tool_lengths)
+        ({'Z': 100.0}, {1: 87.2})
+        """
+        return Start(
+            positions=self.program.start,
+            offsets=self.program.offsets,
+            tool_lengths=self.program.tool_lengths,
+            startup=self.program.startup,
+            decimal_point=self.program.decimal_point,
+            wraps={axis.name: axis.wrap for axis in self.axes if axis.wrap is not None},
+            resume=self.program.resume_after_stop,
+            spindle=self.spindle,
+            diameter=any(axis.diameter for axis in self.axes),
+        )
 
     def axis(self, name: str) -> Axis:
         """Find the axis of that letter.

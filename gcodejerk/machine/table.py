@@ -13,7 +13,8 @@ import re
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gcodejerk.machine.model import AXES, PLANNERS
+from gcodejerk.axes import AXES
+from gcodejerk.machine.model import PLANNERS
 
 SCHEMA_VERSION = 1
 

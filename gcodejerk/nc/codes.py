@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from gcodejerk.axes import AXES
 from gcodejerk.nc.block import Block, Name
-from gcodejerk.nc.dialect import AXES, Dialect
+from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.modal import NAN
 from gcodejerk.nc.variables import before_block, word_value
 
@@ -75,7 +76,7 @@ def sort_words(
     inch : bool
         Lengths are inches, unless the block itself says what they are.
     decimal_point : str or None
-        See `nc.start.Start`.
+        See `gcodejerk.start.Start`.
     variables : mapping of str to float
         Those that are known.
 

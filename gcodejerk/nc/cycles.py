@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gcodejerk.nc.dialect import AXES, PLANES, Drilling
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialect import PLANES, Drilling
 from gcodejerk.nc.modal import NAN, State
 
 

@@ -17,8 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-AXES = "XYZABCUVW"
-"""Column order of every position array."""
+from gcodejerk.axes import AXES
 
 LINEAR = frozenset("XYZUVW")
 

@@ -9,12 +9,13 @@ out, and whatever they touched is unknown afterwards.
 
 from __future__ import annotations
 
+from gcodejerk.axes import AXES
 from gcodejerk.nc import frames
 from gcodejerk.nc.beams import inline_power, shows_habits, uses_outputs
 from gcodejerk.nc.block import Block, Name
 from gcodejerk.nc.codes import Codes, sort_words
 from gcodejerk.nc.cycles import begin_cycle, run_cycle
-from gcodejerk.nc.dialect import AXES, Dialect, Effect
+from gcodejerk.nc.dialect import Dialect, Effect
 from gcodejerk.nc.judge import Call, Step, judge, looks_rapid
 from gcodejerk.nc.jumps import known_behind
 from gcodejerk.nc.mcodes import run_m_code
@@ -27,9 +28,9 @@ from gcodejerk.nc.moves import (
 )
 from gcodejerk.nc.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.rules import arc_words, is_complete, takes_axes
-from gcodejerk.nc.start import Start
 from gcodejerk.nc.tokenizer import CHECKSUM
 from gcodejerk.nc.variables import assign, assigned_values, reads_feed
+from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
 
 _TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})

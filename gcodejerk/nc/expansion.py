@@ -45,9 +45,9 @@ from gcodejerk.nc.series import (
     passes,
     write_block,
 )
-from gcodejerk.nc.start import NOTHING_KNOWN, Start
 from gcodejerk.nc.tokenizer import parse_line
 from gcodejerk.reasons import Reason
+from gcodejerk.start import NOTHING_KNOWN, Start
 
 # A cycle's code, blanks and zeros as the controller allows them; one that is computed is unknown.
 _CYCLE = re.compile(rb"[gG][0+ \t]*[78]")

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gcodejerk.axes import AXES
 from gcodejerk.nc.codes import Codes
-from gcodejerk.nc.dialect import AXES, Dialect, Effect
+from gcodejerk.nc.dialect import Dialect, Effect
 from gcodejerk.nc.modal import NAN, State
 
 Values = Mapping[str, float]

@@ -6,14 +6,15 @@ The unit is no such mode: whether 1 is a millimetre or an inch, the program says
 
 from __future__ import annotations
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.block import Block
-from gcodejerk.nc.dialect import AXES, Dialect
+from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.execute import Executor
 from gcodejerk.nc.frames import system_key
 from gcodejerk.nc.modal import GROUP_FIELDS, NAN, State
-from gcodejerk.nc.start import Start
 from gcodejerk.nc.tokenizer import parse_line
+from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from gcodejerk.axes import AXES
 from gcodejerk.nc.block import Block
 from gcodejerk.nc.codes import Codes
-from gcodejerk.nc.dialect import AXES, LINEAR, Dialect, Effect
+from gcodejerk.nc.dialect import LINEAR, Dialect, Effect
 from gcodejerk.nc.modal import State
 from gcodejerk.nc.rapids import NO_FEED
 from gcodejerk.reasons import Reason

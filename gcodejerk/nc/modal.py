@@ -21,7 +21,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from gcodejerk.nc.dialect import AXES, LINEAR
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialect import LINEAR
 
 NAN = math.nan
 MOST_VARIABLES = 1000
@@ -178,7 +179,7 @@ class State:
     fixed: frozenset[str]
     """Modes that no code of the dialect changes, so that nothing makes them unknown."""
     wraps: tuple[str | None, ...]
-    """How each axis turns: see `nc.start.Start`; None unknown."""
+    """How each axis turns: see `gcodejerk.start.Start`; None unknown."""
 
     def __init__(self) -> None:
         for field in FIELDS:

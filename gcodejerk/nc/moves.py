@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
+from gcodejerk.axes import AXES
 from gcodejerk.nc.codes import Codes
-from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Dialect
+from gcodejerk.nc.dialect import LINEAR, PLANES, Dialect
 from gcodejerk.nc.judge import Step
 from gcodejerk.nc.modal import NAN, State
 

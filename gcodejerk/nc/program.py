@@ -28,8 +28,8 @@ from gcodejerk.nc.outline import find_outline, read_body, refers, seekable
 from gcodejerk.nc.rapids import Rapids
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.runner import Finding
-from gcodejerk.nc.start import NOTHING_KNOWN, Start
 from gcodejerk.nc.tokenizer import parse_line
+from gcodejerk.start import NOTHING_KNOWN, Start
 
 STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.nc.dialect import AXES
+from gcodejerk.axes import AXES
 from gcodejerk.nc.modal import State
 from gcodejerk.nc.visits import Visits
 from gcodejerk.reasons import Reason

@@ -23,11 +23,11 @@ from gcodejerk.nc.passes import Passes
 from gcodejerk.nc.rapids import REASONS, USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.runner import Finding, Runner
 from gcodejerk.nc.runs import can_run, run_plain
-from gcodejerk.nc.start import Start
 from gcodejerk.nc.structures import Collector, Node
 from gcodejerk.nc.tokenizer import parse_line
 from gcodejerk.nc.words import Lines
 from gcodejerk.reasons import Reason
+from gcodejerk.start import Start
 
 _FILE_NAME = re.compile(rb"[ \t]*[A-Za-z_][\w-]*\.[A-Za-z]{1,5}[ \t]*(?:\([^()]*\)[ \t]*)?")
 

@@ -17,8 +17,8 @@ from gcodejerk.nc.initial import initial_state
 from gcodejerk.nc.judge import Call, Step
 from gcodejerk.nc.modal import NAN, State, join
 from gcodejerk.nc.rapids import GIVES_FEED, USES_FEED, RapidLog, common_columns
-from gcodejerk.nc.start import Start
 from gcodejerk.reasons import Reason
+from gcodejerk.start import Start
 from gcodejerk.units import SECONDS_PER_MINUTE
 
 _SHOWN = 20

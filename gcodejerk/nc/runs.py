@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.nc.dialect import ARC_CENTRES, AXES, LINEAR, PLANES, Dialect
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialect import ARC_CENTRES, LINEAR, PLANES, Dialect
 from gcodejerk.nc.judge import BARS
 from gcodejerk.nc.modal import State
 from gcodejerk.nc.rapids import CERTAIN, GIVES_FEED, REASONS, USES_FEED, RapidLog, common_columns

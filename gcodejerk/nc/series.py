@@ -24,8 +24,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Context, Decimal
 
+from gcodejerk.axes import AXES
 from gcodejerk.nc.block import Block, Word
-from gcodejerk.nc.dialect import AXES, PLANES
+from gcodejerk.nc.dialect import PLANES
 from gcodejerk.nc.drilling import (
     MOST_MOVES,
     Call,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gcodejerk.nc.dialect import AXES
+from gcodejerk.axes import AXES
 from gcodejerk.nc.modal import NAN, same
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.nc.dialect import AXES
+from gcodejerk.axes import AXES
 
 PLAIN_LETTERS = AXES + "NGFSIJKR"
 """Letters that a plain line may hold; letter k has bit k in `Lines.letters`."""

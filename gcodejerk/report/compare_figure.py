@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from gcodejerk.arrival import arrival_response
+from gcodejerk.axes import AXES
 from gcodejerk.comparison import Comparison, Contender
-from gcodejerk.machine import AXES, Mode
+from gcodejerk.machine import Mode
 from gcodejerk.motion import laws_response, mode_poles
 from gcodejerk.motion.laws import Array
 from gcodejerk.motion.shapers import SHAPERS

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gcodejerk import __version__
+from gcodejerk._version import __version__
 from gcodejerk.arrival import BANDS
+from gcodejerk.axes import AXES
 from gcodejerk.comparison import CONTENDERS, QUANTITIES, Comparison, Contender
-from gcodejerk.machine import AXES
 from gcodejerk.report.records import Record, number
 
 MOST_SEGMENTS = 400

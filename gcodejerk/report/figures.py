@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
-from gcodejerk.machine import AXES
 from gcodejerk.motion import sample_laws
 from gcodejerk.motion.laws import Array, Laws
 from gcodejerk.move import Plan

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk import __version__
+from gcodejerk._version import __version__
+from gcodejerk.axes import AXES
 from gcodejerk.designs import known_limits
 from gcodejerk.dogleg import arrivals, dogleg_notes, path_deviation
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.laws import Array
 from gcodejerk.move import Plan

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from gcodejerk.machine import AXES, BELL, JERK_LIMITED, Machine
+from gcodejerk.axes import AXES
+from gcodejerk.machine import BELL, JERK_LIMITED, Machine
 
 
 @st.composite

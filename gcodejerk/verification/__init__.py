@@ -27,7 +27,6 @@ from typing import BinaryIO
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import LINUXCNC, Machine
 from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
-from gcodejerk.start import program_start
 from gcodejerk.verification.agreement import confirm
 from gcodejerk.verification.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.findings import Findings, Kind, Verification, Violation, require
@@ -162,7 +161,7 @@ def verify_files(
     ProgramError
         The original cannot be a program.
     """
-    start = program_start(machine) if start is None else start
+    start = machine.program_start() if start is None else start
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
@@ -208,7 +207,7 @@ def verify_csv(
     ProgramError
         The original cannot be a program.
     """
-    start = program_start(machine) if start is None else start
+    start = machine.program_start() if start is None else start
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)

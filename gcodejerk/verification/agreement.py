@@ -14,7 +14,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-from gcodejerk.nc import AXES, Dialect, Rapids, Start, find_dialect
+from gcodejerk.axes import AXES
+from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
 from gcodejerk.units import MM_PER_INCH
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.known import Facts

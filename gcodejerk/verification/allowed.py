@@ -15,8 +15,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.nc import AXES, Block, Dialect, Rapids
+from gcodejerk.nc import Block, Dialect, Rapids
 
 FINER = 3
 """Decimals more than the resolution's, where the control computes in doubles."""

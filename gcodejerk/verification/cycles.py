@@ -17,7 +17,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from gcodejerk.nc import AXES, Block, Word
+from gcodejerk.axes import AXES
+from gcodejerk.nc import Block, Word
 from gcodejerk.nc.dialect import PLANES
 from gcodejerk.nc.modal import State
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
-from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import rapid_time
 from gcodejerk.verification.feeds import NOT_OWN, judge_feeds, rapid_limits
 from gcodejerk.verification.findings import Findings, Kind

@@ -14,7 +14,8 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import BinaryIO
 
-from gcodejerk.nc import AXES, Block, Dialect, Start, find_dialect, parse_block
+from gcodejerk.axes import AXES
+from gcodejerk.nc import Block, Dialect, Start, find_dialect, parse_block
 from gcodejerk.nc.chunks import Chunk, read_chunks
 from gcodejerk.nc.dialect import PLANES
 from gcodejerk.nc.modal import State

@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, LINUXCNC, LONE_SHARE, Machine
-from gcodejerk.nc import AXES
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.conventional import peak_velocity, rapid_speed, rapid_time
 from gcodejerk.verification.findings import Kind

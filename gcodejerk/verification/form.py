@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 from decimal import Context, Decimal
 from functools import lru_cache
 
-from gcodejerk.nc import AXES, Block, Dialect, Rapids, parse_block
+from gcodejerk.axes import AXES
+from gcodejerk.nc import Block, Dialect, Rapids, parse_block
 from gcodejerk.verification.allowed import Allowed, point_pattern, too_long_a_number
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.modes import WORD, Modes, read_words

@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.nc import AXES
 from gcodejerk.verification.findings import Kind
 from gcodejerk.verification.points import TINY, Array, Paths
 

@@ -12,7 +12,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from gcodejerk.nc.dialect import AXES, LINEAR, PLANES, Dialect, Effect
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialect import LINEAR, PLANES, Dialect, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.reading import NAN
 

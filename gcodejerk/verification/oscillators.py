@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.nc import AXES
 from gcodejerk.verification.points import Array, Index
 
 

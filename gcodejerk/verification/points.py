@@ -15,8 +15,9 @@ from decimal import Decimal
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.nc import AXES, Dialect, Rapids, parse_block
+from gcodejerk.nc import Dialect, Rapids, parse_block
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.form import Stream

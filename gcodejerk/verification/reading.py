@@ -18,7 +18,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
-from gcodejerk.nc.dialect import AXES, Dialect, Effect
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialect import Dialect, Effect
 
 PIECE = 1 << 20
 """Bytes in memory at a time."""

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
-from gcodejerk.nc import AXES
 from gcodejerk.verification.conventional import box_widths, rapid_position
 from gcodejerk.verification.oscillators import Oscillators
 from gcodejerk.verification.points import Array, Index, Paths

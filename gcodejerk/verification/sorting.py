@@ -6,7 +6,8 @@ the dialect's table is not understood as a whole.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import AXES, Dialect
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialect import Dialect
 from gcodejerk.verification.reading import NAN, Line
 
 LEAST = 0.001

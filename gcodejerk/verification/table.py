@@ -13,8 +13,9 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.nc import AXES, CERTAIN, Rapids
+from gcodejerk.nc import CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.points import STANDSTILL, Array, Paths, resolutions
 

@@ -12,7 +12,8 @@ import argparse
 import numpy as np
 from timing import best_of
 
-from gcodejerk.machine import AXES, Machine, find_machine
+from gcodejerk.axes import AXES
+from gcodejerk.machine import Machine, find_machine
 from gcodejerk.plan import plan_moves
 from gcodejerk.stream import Spelling, make_streams
 

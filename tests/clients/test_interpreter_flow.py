@@ -17,8 +17,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.nc import AXES, CERTAIN, Start, read_program, trace
+from gcodejerk.nc import CERTAIN, Start, read_program, trace
 from gcodejerk.pipeline import process
 
 HERE = Path(__file__).resolve().parent

@@ -18,7 +18,8 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from gcodejerk.nc import AXES, CERTAIN, Start, read_program, trace
+from gcodejerk.axes import AXES
+from gcodejerk.nc import CERTAIN, Start, read_program, trace
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 
 ORACLE = Path(__file__).resolve().parent / "oracle.py"

@@ -12,7 +12,8 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from gcodejerk.nc import AXES, CERTAIN, Start, read_program, trace
+from gcodejerk.axes import AXES
+from gcodejerk.nc import CERTAIN, Start, read_program, trace
 from gcodejerk.testing.programs import programs
 
 HERE = Path(__file__).resolve().parent

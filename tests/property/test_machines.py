@@ -10,8 +10,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import MachineError
-from gcodejerk.machine import AXES, Limits, Machine, machine_yaml
+from gcodejerk.machine import Limits, Machine, machine_yaml
 from gcodejerk.machine.problems import MachineFileError
 from gcodejerk.machine.spectrum import MOST_LINES, read_spectrum
 from gcodejerk.testing.machines import machines

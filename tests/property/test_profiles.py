@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from gcodejerk.machine import AXES
+from gcodejerk.axes import AXES
 from gcodejerk.plan import plan_moves
 from gcodejerk.testing import machines
 

@@ -7,8 +7,9 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import AXES, CERTAIN, Start, parse_block, read_program, trace
+from gcodejerk.nc import CERTAIN, Start, parse_block, read_program, trace
 from gcodejerk.nc.dialect import LINEAR
 from gcodejerk.nc.numbers import parse_numbers
 from gcodejerk.testing.programs import differences, programs

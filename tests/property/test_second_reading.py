@@ -13,7 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gcodejerk.nc import AXES, CERTAIN, Start, read_program
+from gcodejerk.axes import AXES
+from gcodejerk.nc import CERTAIN, Start, read_program
 from gcodejerk.nc.dialects import DIALECTS
 from gcodejerk.testing.cycles import cycle_programs
 from gcodejerk.testing.programs import programs

@@ -6,8 +6,8 @@ from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES
 from gcodejerk.move import plan_move
 from gcodejerk.testing import assert_stream_valid, machines, moves
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gcodejerk.axes import AXES
 from gcodejerk.designs import Task, bounds, known_limits, least_residuals, worst_in_band
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine, find_machine
+from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import laws_response, mode_poles
 from gcodejerk.motion.optimal import Move, least_residual
 from gcodejerk.move import plan_move

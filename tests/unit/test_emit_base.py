@@ -7,9 +7,10 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from gcodejerk.axes import AXES
 from gcodejerk.emit import API, base, controllers, load_controller
 from gcodejerk.errors import EmitError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from gcodejerk import ProgramError
-from gcodejerk.nc import AXES, DIALECTS, Dialect, Start, find_dialect, parse_block, read_program
+from gcodejerk.axes import AXES
+from gcodejerk.nc import DIALECTS, Dialect, Start, find_dialect, parse_block, read_program
 from gcodejerk.nc import trace as follow
 from gcodejerk.nc.dialects import GROUP
 from gcodejerk.reasons import CERTAIN, REASONS

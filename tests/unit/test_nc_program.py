@@ -6,8 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import AXES, CERTAIN, REASONS, Start, read_program, trace
+from gcodejerk.nc import CERTAIN, REASONS, Start, read_program, trace
 from gcodejerk.reasons import Reason
 
 HEAD = b"G21 G90 G94 G17 G40 G0 X0 Y0 Z0 A0\n"

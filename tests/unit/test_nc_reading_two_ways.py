@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from gcodejerk.nc import AXES, DIALECTS, Start
+from gcodejerk.axes import AXES
+from gcodejerk.nc import DIALECTS, Start
 from gcodejerk.testing.programs import differences
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"

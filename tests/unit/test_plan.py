@@ -5,14 +5,14 @@ import io
 import numpy as np
 import pytest
 
+from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion import Laws, laws_response, mode_poles
 from gcodejerk.nc import read_program
 from gcodejerk.plan import MOST_INTERVALS, plan_moves, plan_rapids
 from gcodejerk.plans import path_length
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
-from gcodejerk.start import program_start
 
 Z_AXIS = "{resolution: 1.0e-4, rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}"
 ROCKING = "modes: [{name: rocking, frequency: 30, damping: 0}]"
@@ -391,7 +391,7 @@ def test_length_is_that_of_the_linear_axes_unless_only_rotary_ones_move():
 
 def rapids_of(text, machine):
     """The rapids of a program."""
-    return read_program(io.BytesIO(text.encode()), start=program_start(machine)).rapids
+    return read_program(io.BytesIO(text.encode()), start=machine.program_start()).rapids
 
 
 KNOWN = machine_of(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gcodejerk import stream
-from gcodejerk.machine import AXES, Machine
+from gcodejerk.axes import AXES
+from gcodejerk.machine import Machine
 from gcodejerk.motion import polyline_response, sample_laws
 from gcodejerk.move import plan_move
 from gcodejerk.plan import plan_moves

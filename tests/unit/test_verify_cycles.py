@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import gcodejerk
-from gcodejerk.nc import AXES, Start
+from gcodejerk.axes import AXES
+from gcodejerk.nc import Start
 from gcodejerk.nc.expansion import expand
 from gcodejerk.nc.reader import Reader
 from gcodejerk.verification import Kind
