@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.motion import Laws, grouped, laws_response
-from gcodejerk.motion.laws import Array
-from gcodejerk.motion.objective import DENSE
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.search.objective import DENSE
 from gcodejerk.plans import Modes
 
 BANDS = (0.05, 0.10)

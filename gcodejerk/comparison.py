@@ -26,8 +26,8 @@ from gcodejerk.designs import Task, condition1, condition2, known_limits
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import Laws, joined, whole_intervals
-from gcodejerk.motion.laws import Array
-from gcodejerk.motion.programme import require_solver
+from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.move import check_time, displacement_row
 from gcodejerk.optima import Progress

@@ -26,11 +26,11 @@ from gcodejerk.motion import (
     four_segment_range,
     whole_intervals,
 )
-from gcodejerk.motion.cascade import design_cascade
-from gcodejerk.motion.laws import Array
-from gcodejerk.motion.optimal import Move, Optimum, optimum_laws
-from gcodejerk.motion.programme import require_solver
-from gcodejerk.motion.rivals import design_condition
+from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.search.cascade import design_cascade
+from gcodejerk.motion.search.conditions import design_condition
+from gcodejerk.motion.search.optimal import Move, Optimum, optimum_laws
+from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.optima import Progress, Question, answers
 from gcodejerk.plans import Modes, Plans
 from gcodejerk.today import conventional_limits, todays_laws, unit_limits

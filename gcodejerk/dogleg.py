@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.motion import sample_laws
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.plans import Plans
 from gcodejerk.stream import Batch
 

@@ -15,7 +15,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import laws_response
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.profiles.laws import Array, Laws
 from gcodejerk.plan import plan_moves
 from gcodejerk.plans import Plans
 from gcodejerk.reasons import CERTAIN, REASONS

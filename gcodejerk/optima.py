@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
-from gcodejerk.motion.laws import Array
-from gcodejerk.motion.optimal import (
+from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.search.optimal import (
     Move,
     Optimum,
     least_residual,
@@ -36,7 +36,7 @@ from gcodejerk.motion.optimal import (
     quiet_enough,
     smoothest_within,
 )
-from gcodejerk.motion.programme import require_solver
+from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.solutions import cache_file, read_solutions, write_solutions
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from gcodejerk.expanded import (
 )
 from gcodejerk.foreign import HEAD, refuse_foreign
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids

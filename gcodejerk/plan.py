@@ -23,8 +23,8 @@ from gcodejerk.motion import (
     joined,
     whole_intervals,
 )
-from gcodejerk.motion.condition3 import TIE
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.search.condition3 import TIE
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.nc import Rapids
 from gcodejerk.optima import Progress

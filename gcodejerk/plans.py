@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, Mode
 from gcodejerk.motion import Laws, grouped, mode_poles
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.reasons import CERTAIN
 

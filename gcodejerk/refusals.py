@@ -12,7 +12,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import SymmetricLaws, conventional_laws, whole_intervals
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 
 
 def _squeezed(fastest: SymmetricLaws, total: float, interval: float) -> SymmetricLaws:

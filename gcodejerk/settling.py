@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gcodejerk.arrival import arrival_response
 from gcodejerk.axes import AXES
 from gcodejerk.designs import Task
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.plans import STANDSTILL, Modes, Plans
 from gcodejerk.reasons import REASONS, Reason

@@ -27,7 +27,7 @@ from gcodejerk.motion import (
     sampled_response,
     whole_intervals,
 )
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.plans import Plans
 

@@ -24,9 +24,15 @@ from gcodejerk.motion import (
     whole_intervals,
 )
 from gcodejerk.motion.amplitudes import null_curve
-from gcodejerk.motion.conditions import Condition, Peaks, condition_peaks, feasible, limit_use
-from gcodejerk.motion.laws import Array
 from gcodejerk.motion.maps import amplitude_map, displacement_map
+from gcodejerk.motion.profiles.conditions import (
+    Condition,
+    Peaks,
+    condition_peaks,
+    feasible,
+    limit_use,
+)
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.plans import Modes
 
 ALL = "all"

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Limits, Machine
 from gcodejerk.motion import Laws, SymmetricLaws, conventional_laws
-from gcodejerk.motion.bell import bell_laws
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.bell import bell_laws
+from gcodejerk.motion.profiles.laws import Array
 
 
 def todays_laws(machine: Machine, limits: tuple[Array, Array, Array]) -> tuple[SymmetricLaws, Laws]:

@@ -6,9 +6,8 @@ so that limits divided by displacements are the limits of the law, and one desig
 a straight line.
 """
 
-from gcodejerk.motion.condition3 import design_condition3, design_four_segments, four_segment_range
-from gcodejerk.motion.laws import Laws, joined
-from gcodejerk.motion.objective import Objective
+from gcodejerk.motion.profiles.laws import Laws, joined
+from gcodejerk.motion.profiles.symmetric import SymmetricLaws, conventional_laws
 from gcodejerk.motion.residual import (
     grouped,
     laws_response,
@@ -27,7 +26,12 @@ from gcodejerk.motion.sampling import (
     sampled_response,
     whole_intervals,
 )
-from gcodejerk.motion.symmetric import SymmetricLaws, conventional_laws
+from gcodejerk.motion.search.condition3 import (
+    design_condition3,
+    design_four_segments,
+    four_segment_range,
+)
+from gcodejerk.motion.search.objective import Objective
 
 __all__ = [
     "GRID_TOLERANCE",

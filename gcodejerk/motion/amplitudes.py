@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gcodejerk.motion.conditions import Condition, checked_times, condition_accelerations
+from gcodejerk.motion.profiles.conditions import Condition, checked_times, condition_accelerations
 from gcodejerk.motion.residual import mode_poles, residual_acceleration
 
 Array = NDArray[np.float64]
@@ -185,7 +185,7 @@ def residual(
     --------
     The paper's design, 1 mm in 40 ms with T1 = 1 ms:
 
-    >>> from gcodejerk.motion.conditions import condition_segments
+    >>> from gcodejerk.motion.profiles.conditions import condition_segments
     >>> durations, jerks = condition_segments("III", 1.0, 0.001, 0.040)
     >>> times = np.concatenate([[0.0], np.cumsum(durations)])
     >>> steps = np.diff(jerks, prepend=0.0, append=0.0)

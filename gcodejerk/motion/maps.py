@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcodejerk.errors import PlanError
 from gcodejerk.motion.amplitudes import condition_amplitude, ramp_response
-from gcodejerk.motion.conditions import Condition, feasible
+from gcodejerk.motion.profiles.conditions import Condition, feasible
 from gcodejerk.motion.residual import mode_poles
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion.laws import Array, Laws
-from gcodejerk.motion.symmetric import SymmetricLaws
+from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.symmetric import SymmetricLaws
 
 Complex = NDArray[np.complex128]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.profiles.laws import Array, Laws
 from gcodejerk.motion.residual import Complex
 
 Counts = NDArray[np.int64]

@@ -29,7 +29,7 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.profiles.laws import Array, Laws
 from gcodejerk.motion.residual import mode_poles
 
 SHAPERS = ("zv", "zvd", "ei", "mzv", "fir", "posicast")

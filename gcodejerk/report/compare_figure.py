@@ -20,7 +20,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.comparison import Comparison, Contender
 from gcodejerk.machine import Mode
 from gcodejerk.motion import laws_response, mode_poles
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.report.figures import acceleration_curve, new_figure
 

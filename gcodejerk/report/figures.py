@@ -13,7 +13,7 @@ import numpy as np
 from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
 from gcodejerk.motion import sample_laws
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.profiles.laws import Array, Laws
 from gcodejerk.move import Plan
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from gcodejerk.designs import known_limits
 from gcodejerk.dogleg import arrivals, dogleg_notes, path_deviation
 from gcodejerk.machine import Machine
 from gcodejerk.motion import whole_intervals
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.move import Plan
 from gcodejerk.nc import Rapids
 from gcodejerk.pipeline import Result

@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from gcodejerk.motion.conditions import Peaks
+    from gcodejerk.motion.profiles.conditions import Peaks
     from gcodejerk.survey import Survey
 
 UM_PER_MM = 1000.0

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from gcodejerk.motion.amplitudes import condition_amplitude, residual, undamped_amplitude
-from gcodejerk.motion.conditions import (
+from gcodejerk.motion.maps import amplitude_map
+from gcodejerk.motion.profiles.conditions import (
     condition_accelerations,
     condition_displacement,
     condition_peaks,
     condition_segments,
 )
-from gcodejerk.motion.maps import amplitude_map
 
 CASES = 5000
 CONDITIONS = ("I", "II", "III")

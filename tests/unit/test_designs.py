@@ -11,7 +11,7 @@ from gcodejerk.designs import Task, bounds, known_limits, least_residuals, worst
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import laws_response, mode_poles
-from gcodejerk.motion.optimal import Move, least_residual
+from gcodejerk.motion.search.optimal import Move, least_residual
 from gcodejerk.move import plan_move
 from gcodejerk.plan import PROFILES, plan_moves
 from gcodejerk.plans import Modes

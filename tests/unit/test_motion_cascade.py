@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcodejerk.motion import Objective, laws_response, mode_poles
-from gcodejerk.motion.cascade import box_response, design_cascade
+from gcodejerk.motion.search.cascade import box_response, design_cascade
 
 MS = 0.001
 FREE = np.full(1, np.inf)

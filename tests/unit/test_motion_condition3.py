@@ -17,7 +17,7 @@ from gcodejerk.motion import (
     residual_acceleration,
     symmetric_response,
 )
-from gcodejerk.motion.condition3 import TIE
+from gcodejerk.motion.search.condition3 import TIE
 
 INTERVAL = 0.001
 RNG = "rng" if "rng" in inspect.signature(differential_evolution).parameters else "seed"

@@ -13,7 +13,7 @@ from gcodejerk.motion.amplitudes import (
     shortest_null_time,
     undamped_amplitude,
 )
-from gcodejerk.motion.conditions import (
+from gcodejerk.motion.profiles.conditions import (
     Condition,
     Peaks,
     condition_accelerations,

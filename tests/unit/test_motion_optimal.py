@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog
 
 from gcodejerk.motion import conventional_laws, laws_response, mode_poles
-from gcodejerk.motion.optimal import Move, least_residual, optimum_laws, smoothest_within
+from gcodejerk.motion.search.optimal import Move, least_residual, optimum_laws, smoothest_within
 
 MS = 0.001
 FACETS = 64

@@ -8,7 +8,7 @@ import pytest
 from gcodejerk import optima
 from gcodejerk.errors import PlanError
 from gcodejerk.motion import mode_poles
-from gcodejerk.motion.optimal import Move
+from gcodejerk.motion.search.optimal import Move
 from gcodejerk.optima import Question, answers
 from gcodejerk.solutions import VARIABLE, cache_file, read_solutions, write_solutions
 

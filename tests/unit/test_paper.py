@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gcodejerk.motion.amplitudes import condition_amplitude
-from gcodejerk.motion.conditions import condition_peaks
+from gcodejerk.motion.profiles.conditions import condition_peaks
 
 PAGE = (Path(__file__).parents[2] / "docs" / "paper.md").read_text(encoding="utf-8")
 FUNCTIONS = sorted(set(re.findall(r"`(gcodejerk\.[\w.]+)`", PAGE)))

@@ -6,7 +6,7 @@ import pytest
 from gcodejerk.errors import MachineError, PlanError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion.amplitudes import condition_amplitude
-from gcodejerk.motion.conditions import condition_peaks
+from gcodejerk.motion.profiles.conditions import condition_peaks
 from gcodejerk.motion.residual import residual_acceleration
 from gcodejerk.survey import Survey
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gcodejerk.motion.conditions import condition_accelerations, condition_durations
-from gcodejerk.motion.laws import Array, Laws
-from gcodejerk.motion.objective import Objective
+from gcodejerk.motion.profiles.conditions import condition_laws
+from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.search.objective import Objective
 
 CANDIDATES = 65
 """Values of T1 that are looked at first."""
@@ -58,17 +58,6 @@ def design_condition(
             condition, total[part], limits, objective.take(part), interval
         )
     return condition_laws(condition, T1, total), worst
-
-
-def condition_laws(condition: str, T1: Array, total: Array) -> Laws:
-    """Unit laws of a condition, for n values of T1 and T_SUM [s]."""
-    duration = condition_durations(condition, T1, total)
-    A1, A2 = condition_accelerations(condition, 1.0, T1, total)
-    zero = np.zeros(len(T1))
-    acceleration = np.stack([zero, A1 + zero, zero, A2 + zero], axis=1)
-    end = np.stack([A1 + zero, zero, A2 + zero, zero], axis=1)
-    jerk = (end - acceleration) / duration
-    return Laws.of(4 * np.arange(len(T1) + 1), duration.ravel(), acceleration.ravel(), jerk.ravel())
 
 
 def _best_T1(

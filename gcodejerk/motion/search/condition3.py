@@ -21,10 +21,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.laws import Array
-from gcodejerk.motion.objective import Objective
+from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.symmetric import SymmetricLaws, conventional_laws
 from gcodejerk.motion.residual import Complex, symmetric_response
-from gcodejerk.motion.symmetric import SymmetricLaws, conventional_laws
+from gcodejerk.motion.search.objective import Objective
 
 MAP_COLUMNS = 257
 """Values of T1 on the map of four-segment laws, T_SUM/4 among them."""

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.symmetric import SymmetricLaws
 from gcodejerk.motion.residual import Complex, grouped, laws_response, symmetric_response
-from gcodejerk.motion.symmetric import SymmetricLaws
 
 DENSE = 0.06
 """Distance of frequencies, times T_SUM/2, at which a band is judged at most. [rad]"""

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.profiles.laws import Array, Laws
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,9 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gcodejerk.motion.laws import Array, Laws
-from gcodejerk.motion.objective import DENSE, FEWEST
-from gcodejerk.motion.programme import (
+from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.search.objective import DENSE, FEWEST
+from gcodejerk.motion.search.socp import (
     ACCURACY,
     Index,
     Problem,
@@ -31,7 +32,6 @@ from gcodejerk.motion.programme import (
     smoothest,
     solve,
 )
-from gcodejerk.motion.residual import Complex
 
 FEWEST_INTERVALS = 3
 """Two cannot begin and end at rest."""

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gcodejerk.motion.cascade import box_laws
-from gcodejerk.motion.laws import Array, Laws
+from gcodejerk.motion.profiles.boxes import box_laws
+from gcodejerk.motion.profiles.laws import Array, Laws
 
 
 def bell_laws(velocity: Array, acceleration: Array, jerk: Array) -> Laws:

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion.laws import Array
+from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.residual import Complex, grouped
 
 if TYPE_CHECKING:

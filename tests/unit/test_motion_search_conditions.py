@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 from gcodejerk.motion import Objective, mode_poles, residual_acceleration
-from gcodejerk.motion.conditions import condition_accelerations, condition_durations
-from gcodejerk.motion.rivals import condition_laws, design_condition
+from gcodejerk.motion.profiles.conditions import (
+    condition_accelerations,
+    condition_durations,
+    condition_laws,
+)
+from gcodejerk.motion.search.conditions import design_condition
 
 MS = 0.001
 FREE = np.full(1, np.inf)
