@@ -1,7 +1,11 @@
 """The machine: a YAML file read into axes, limits and modes."""
 
+from gcodejerk.machine.file.schema import machine_schema
+from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
+from gcodejerk.machine.file.writer import machine_yaml
 from gcodejerk.machine.find import find_machine
-from gcodejerk.machine.model import (
+from gcodejerk.machine.model import Machine
+from gcodejerk.machine.parts import (
     BELL,
     JERK_LIMITED,
     LINUXCNC,
@@ -11,15 +15,11 @@ from gcodejerk.machine.model import (
     Axis,
     Design,
     Limits,
-    Machine,
     Mode,
     ProgramStart,
     Spectrum,
 )
 from gcodejerk.machine.problems import MachineFileError
-from gcodejerk.machine.schema import machine_schema
-from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
-from gcodejerk.machine.writer import machine_yaml
 
 __all__ = [
     "BELL",

@@ -1,227 +1,34 @@
-"""A machine: its axes, what they may do, and the modes in which it shakes.
+"""A machine: its description, and how one is read from a file.
 
-Rule: a Machine is complete and legal. Every default has been filled in, every number is in mm (or
-deg), s and Hz, and whatever a machine cannot be was refused with its place in the file; so no user
-of these classes checks anything again.
+Rule: `file` makes a `Description` of a text and knows no `Machine`; so the class can have its own
+constructors without a circle.
 """
 
 from __future__ import annotations
 
 import hashlib
-import itertools
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
-from gcodejerk.errors import MachineError
+import yaml
+
+from gcodejerk.errors import MachineError, Place
+from gcodejerk.machine.file.document import read_text
+from gcodejerk.machine.file.loader import load_text
+from gcodejerk.machine.file.writer import settings_text
+from gcodejerk.machine.parts import Description
+from gcodejerk.machine.problems import MachineFileError
 from gcodejerk.start import Start
 
-OSCILLATORS = 4
-"""That a line of a spectrum stands for."""
-LINUXCNC, TRAPEZOIDAL, JERK_LIMITED, BELL = PLANNERS = (
-    "linuxcnc-2.9", "trapezoidal", "jerk-limited", "bell",
-)  # fmt: skip
-"""The laws that a control's own rapid may follow (`Axis.conventional`)."""
-LONE_SHARE = 0.5
-"""Share of MAX_ACCELERATION that LinuxCNC 2.9 gives a lone G0.
 
-Played (2.9, 1 ms): under G64 a G0 that nothing follows in the queue (a dwell, an M code, a change
-of tool or offset, the program's end) has half, since half is kept back for a blend that never
-comes. One that another motion follows, and every one under G61 and G61.1, has all of it.
-"""
+@dataclass(frozen=True, slots=True, repr=False)
+class Machine(Description):
+    """A machine as its YAML file describes it, in mm (or deg), s and Hz."""
 
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What one axis may do at most."""
-
-    velocity: float
-    """[mm/s] or [deg/s]"""
-    acceleration: float
-    """[mm/s^2] or [deg/s^2]"""
-    jerk: float
-    """[mm/s^3] or [deg/s^3]; infinite where no jerk limit is given"""
-
-
-@dataclass(frozen=True, slots=True)
-class Mode:
-    """One way in which the machine vibrates, as an oscillator driven by the axes' acceleration."""
-
-    name: str
-    frequency: float
-    """Undamped natural frequency. [Hz]"""
-    damping: float
-    """Damping ratio, at least 0 and below 1. [-]"""
-    participation: tuple[tuple[str, float], ...]
-    """How strongly each axis excites it, pairs in the order of `AXES`. [-]"""
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """The axes that excite this mode."""
-        return tuple(axis for axis, _ in self.participation)
-
-    def participation_of(self, axis: str) -> float:
-        """How strongly an axis excites this mode [-], 0 for an axis that does not."""
-        return next((amount for name, amount in self.participation if name == axis), 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Spectrum:
-    r"""How one axis shakes as it was measured: a line spectrum in place of modes.
-
-    Every line stands for oscillators that the axis drives. With :math:`w_k` the share of
-    line k in the energy (the PSD times the width that the line stands for, over the sum of all) and
-    :math:`A_k = \omega_k^2 D_k` the acceleration amplitude that a move leaves in its oscillator,
-    the residual of the move is
-
-    .. math:: A = p \sqrt{\sum_k w_k A_k^2}, \qquad D = A / (2 \pi f_{peak})^2
-
-    with the participation p: the spectrum-weighted mean, which is convex in the jerks. It is the
-    acceleration that is weighted, since that is what the sensor measured: of the displacements the
-    lines below 10 Hz, where it feels drift and the motion itself, would be most. A spectrum holds
-    no phase, and damping only as the width of its peaks. So the planner takes several oscillators
-    for a line, spread over its width, with the damping whose half-power width is the line's: they
-    overlap, and no law can hide between them (`oscillators`).
-    """
-
-    source: str = field(compare=False)
-    """The file, as the machine file names it."""
-    frequency: tuple[float, ...]
-    """Frequency of each line, rising. [Hz]"""
-    weight: tuple[float, ...]
-    """Share of each line; all add up to 1. [-]"""
-    peak: float
-    """Frequency at which the measured PSD is largest. [Hz]"""
-    participation: float = 1.0
-    """How strongly the axis excites what was measured. [-]"""
-
-    def oscillators(self) -> list[tuple[float, float, float]]:
-        """Frequency [Hz], damping ratio [-] and share of the energy [-] of each oscillator."""
-        f = self.frequency
-        # The borders of the lines: half way between them.
-        inner = [0.5 * (a + b) for a, b in itertools.pairwise(f)]
-        first = f[0] - (inner[0] - f[0]) if inner else f[0]
-        last = f[-1] + (f[-1] - inner[-1]) if inner else f[-1]
-        borders = [first, *inner, last]
-        out = []
-        for (low, high), weight in zip(itertools.pairwise(borders), self.weight, strict=True):
-            for part in range(OSCILLATORS):
-                frequency = low + (high - low) * (part + 0.5) / OSCILLATORS
-                damping = min(0.5 * (high - low) / frequency, 0.5)
-                out.append((frequency, damping, weight / OSCILLATORS))
-        return out
-
-
-@dataclass(frozen=True, slots=True)
-class Axis:
-    """One axis of a machine; lengths are degrees if it is rotary."""
-
-    name: str
-    rotary: bool
-    diameter: bool
-    """The program's numbers are diameters (a lathe's X); everything in here is of the radius."""
-    resolution: float
-    """The smallest step that is written. [mm] or [deg]"""
-    rapid: Limits
-    """What the controller's own G0 is set to; `conventional` is what it then does."""
-    limit: Limits
-    """What a designed profile may use."""
-    travel: tuple[float, float] | None
-    """Lowest and highest machine coordinate, where they are known. [mm] or [deg]"""
-    modes: tuple[Mode, ...]
-    """Modes that this axis alone excites; none where there is a spectrum."""
-    spectrum: Spectrum | None = None
-    """What was measured in place of modes."""
-    wrap: str | None = None
-    """How it goes to an absolute position, if it is rotary: ``none``, ``shortest`` or ``sign`` as
-    `gcodejerk.nc.Start` has them; None where the file does not say."""
-    planner: str = JERK_LIMITED
-    """Which law the controller's own G0 follows, one of `PLANNERS`; all axes' are alike."""
-
-    def conventional(self, lone: bool = True) -> Limits:
-        """What the controller's own G0 does: this sets the conventional time.
-
-        Parameters
-        ----------
-        lone : bool
-            No other motion follows the rapid directly; only `linuxcnc-2.9` makes a difference.
-
-        Returns
-        -------
-        Limits
-            Under `bell`, the acceleration and the jerk of a ramp that is long enough for both.
-        """
-        own = self.rapid
-        share = LONE_SHARE if lone and self.planner == LINUXCNC else 1.0
-        jerk = own.jerk if self.planner in (JERK_LIMITED, BELL) else math.inf
-        return Limits(own.velocity, share * own.acceleration, jerk)
-
-
-@dataclass(frozen=True, slots=True)
-class Design:
-    """How profiles are chosen, unless the command line says otherwise."""
-
-    profile: str
-    band: float
-    """Relative frequency error to be robust to. [-]"""
-    tolerance: float
-    """Residual displacement that counts as settled. [mm]"""
-    minimum_length: float
-    """Shorter rapids are left alone. [mm]"""
-    max_extension: float
-    """How much longer a move may take where the limits do not allow its conventional time. [-]"""
-
-
-@dataclass(frozen=True, slots=True)
-class ProgramStart:
-    """What a program may assume when it starts; all of it unknown unless the file says so."""
-
-    start: Mapping[str, float] = field(hash=False)
-    """Axis -> position in program coordinates. [mm] or [deg]"""
-    offsets: Mapping[str, Mapping[str, float]] = field(hash=False)
-    """Work offset (`G54`) -> axis -> its value. [mm] or [deg]"""
-    tool_lengths: Mapping[int, float] = field(hash=False)
-    """Number of the length offset (1 for `H1`) -> its value. [mm]"""
-    startup: str
-    """The codes in force, as a line of G-code; empty for the dialect's own."""
-    decimal_point: str | None = None
-    """What a number without a decimal point is: ``calculator``, ``standard``, None unknown."""
-    resume_after_stop: str | None = None
-    """Where the axes stand behind M0 and M1: ``same``, ``unknown``, None: as usual there."""
-
-
-@dataclass(frozen=True, slots=True)
-class Machine:
-    """A machine as its YAML file describes it, in mm (or deg), s and Hz.
-
-    `source` and `inch` tell how it was written and take no part in comparisons: the same machine
-    in inches is the same machine.
-    """
-
-    name: str
-    controller: str
-    """Name of the emitter that is used by default."""
-    dialect: str
-    """How programs are read."""
-    interval: float
-    """Time from one commanded position to the next. [s]"""
-    positioning: str
-    """`linear`: G0 is a straight line; `independent`: every axis runs on its own."""
-    axes: tuple[Axis, ...]
-    """In the order of `AXES`."""
-    modes: tuple[Mode, ...]
-    """Structure modes, which several axes excite together."""
-    design: Design
-    program: ProgramStart
-    spindle: str | None = None
-    """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
-    inch: bool = field(default=False, compare=False)
-    """The file's lengths are inches."""
-    source: str = field(default="<machine>", compare=False)
-    """The file, as it was named."""
-    warnings: tuple[MachineError, ...] = field(default=(), compare=False, repr=False)
-    """What the file says that is possible, but hardly meant; each with its place."""
+    def __repr__(self) -> str:
+        return f"<Machine {self.name!r}: {' '.join(self.axis_names)}, {self.controller}>"
 
     @classmethod
     def load(cls, path: str | Path) -> Machine:
@@ -242,8 +49,6 @@ class Machine:
         MachineFileError
             The file cannot be read or is wrong; lists everything that is.
         """
-        from gcodejerk.machine.document import read_text
-
         return cls.loads(read_text(path), str(path))
 
     @classmethod
@@ -282,29 +87,59 @@ class Machine:
         >>> machine.all_modes()[0][1].name
         '30 Hz'
         """
-        from gcodejerk.machine.loader import load_text
+        return cls._of(load_text(text, name))
 
-        return load_text(text, name)
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], name: str = "<machine>") -> Machine:
+        """Read a machine from what its file would hold.
 
-    @property
-    def axis_names(self) -> tuple[str, ...]:
-        """Letters of the axes, in the order of `AXES`."""
-        return tuple(axis.name for axis in self.axes)
+        Parameters
+        ----------
+        values : mapping
+            Keys and values as in a machine file, of plain types: dict, list, str, numbers, None.
+        name : str
+            What messages call it, and whose folder is where the names of spectrum files begin.
 
-    @property
-    def planner(self) -> str:
-        """Which law the controller's own rapids follow; `jerk-limited` where any axis has a jerk.
+        Returns
+        -------
+        Machine
+            What it describes.
 
-        `trapezoidal` is `jerk-limited` without a jerk, so that axes of both may move together.
+        Raises
+        ------
+        MachineFileError
+            A key or value is wrong; lists everything that is, by its keys and without lines.
+
+        Examples
+        --------
+        >>> rapid = {"velocity": 600, "acceleration": 5000, "jerk": 5e5}
+        >>> axes = {"Z": {"rapid": rapid}}
+        >>> Machine.from_dict({"interval": 0.001, "positioning": "linear", "axes": axes})
+        <Machine '<machine>': Z, linuxcnc>
         """
-        found = {axis.planner for axis in self.axes}
-        return min(found, key=(JERK_LIMITED, TRAPEZOIDAL, LINUXCNC, BELL).index)
+        try:
+            text = yaml.safe_dump(_plain(values), sort_keys=False)
+        except yaml.representer.RepresenterError as error:
+            raise MachineError(
+                f"{name} holds {error.args[-1]!r}, expected what YAML can hold",
+                "give plain dictionaries, lists, strings and numbers",
+            ) from None
+        try:
+            return cls.loads(text, name)
+        except MachineFileError as error:
+            # Lines of a text that the user never saw lead nowhere.
+            raise MachineFileError(
+                MachineError(e.problem, e.remedy, Place(name)) for e in error.problems
+            ) from None
+
+    @classmethod
+    def _of(cls, described: Description) -> Machine:
+        """The machine of a description."""
+        return cls(**{field.name: getattr(described, field.name) for field in fields(described)})
 
     @property
     def settings_hash(self) -> str:
         """Eight hex digits that change with anything that a machine file can say."""
-        from gcodejerk.machine.writer import settings_text
-
         return hashlib.sha256(settings_text(self).encode()).hexdigest()[:8]
 
     def program_start(self) -> Start:
@@ -340,36 +175,11 @@ class Machine:
             diameter=any(axis.diameter for axis in self.axes),
         )
 
-    def axis(self, name: str) -> Axis:
-        """Find the axis of that letter.
 
-        Parameters
-        ----------
-        name : str
-            One of the machine's axes.
-
-        Returns
-        -------
-        Axis
-            That axis.
-
-        Raises
-        ------
-        MachineError
-            The machine has no such axis.
-        """
-        for axis in self.axes:
-            if axis.name == name:
-                return axis
-        raise MachineError(
-            f"machine {self.name!r} has no axis {name!r}, it has {', '.join(self.axis_names)}",
-            "name one of these, or describe the axis in the machine file",
-        )
-
-    def all_modes(self) -> tuple[tuple[str, Mode], ...]:
-        """Every mode with the axes that excite it as a label: `Z`, or `Y+Z` for the structure's.
-
-        Spectra are not among them.
-        """
-        own = tuple((axis.name, mode) for axis in self.axes for mode in axis.modes)
-        return own + tuple(("+".join(mode.axes), mode) for mode in self.modes)
+def _plain(value: Any) -> Any:
+    """Mappings, sequences and numbers of any library as those that YAML writes."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value.item() if hasattr(value, "item") else value

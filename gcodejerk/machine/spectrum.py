@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.errors import MachineError, Place
-from gcodejerk.machine.model import Spectrum
+from gcodejerk.machine.parts import Spectrum
 from gcodejerk.machine.reading import NotAFileError, read_file
 
 Array = NDArray[np.float64]

@@ -6,6 +6,7 @@ reading is tested along the way.
 
 from __future__ import annotations
 
+from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
 
 from gcodejerk.axes import AXES
@@ -76,7 +77,10 @@ def machines(
         f"  minimum_length: {draw(_number(0.001, 0.5))}",
         f"  max_extension: {draw(st.sampled_from([0.0, 0.1, 0.5]))}",
     ]
-    return Machine.loads("\n".join(lines) + "\n", name="drawn.yaml")
+    text = "\n".join(lines) + "\n"
+    if currently_in_test_context():
+        note(f"drawn.yaml:\n{text}")
+    return Machine.loads(text, name="drawn.yaml")
 
 
 _INTERVALS = [0.0005, 0.001, 0.002, 0.004]

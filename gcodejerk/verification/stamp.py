@@ -17,7 +17,7 @@ from itertools import product
 from typing import BinaryIO
 
 from gcodejerk.machine import Machine
-from gcodejerk.machine.table import PROFILES
+from gcodejerk.machine.file.table import PROFILES
 from gcodejerk.nc import DIALECTS
 
 WITHIN = 1 << 17

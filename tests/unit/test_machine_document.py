@@ -3,8 +3,9 @@ import os
 import pytest
 import yaml
 
-from gcodejerk.machine import Machine, MachineFileError, document
-from gcodejerk.machine.document import MOST_BYTES
+from gcodejerk.machine import Machine, MachineFileError
+from gcodejerk.machine.file import document
+from gcodejerk.machine.file.document import MOST_BYTES
 
 
 def first_line(text):

@@ -1,10 +1,12 @@
 import math
 import pickle
 
+import numpy as np
 import pytest
+import yaml
 
 from gcodejerk.errors import MachineError
-from gcodejerk.machine import Limits, Machine
+from gcodejerk.machine import Limits, Machine, MachineFileError, find_machine
 
 MILL = """\
 name: Mill
@@ -95,3 +97,36 @@ def test_without_any_jerk_the_limit_is_infinite(mill):
 def test_each_entry_of_limit_defaults_by_itself():
     text = MILL.replace("acceleration: 2000}", "acceleration: 2000}\n    limit: {jerk: 7.0e+4}")
     assert Machine.loads(text).axis("Y").limit == Limits(300.0, 2000.0, 7e4)
+
+
+@pytest.mark.parametrize("name", ["vmc", "router", "centre", "drill"])
+def test_a_dictionary_is_read_like_the_file_that_holds_it(name):
+    path = find_machine(name)
+    values = yaml.safe_load(path.read_text())
+    assert Machine.from_dict(values, str(path)) == Machine.load(path)
+
+
+def test_a_dictionary_may_hold_numbers_and_tuples_of_numpy():
+    values = yaml.safe_load(MILL)
+    values["interval"] = np.float64(0.001)
+    values["axes"]["Z"]["modes"] = tuple(values["axes"]["Z"]["modes"])
+    assert Machine.from_dict(values) == Machine.loads(MILL)
+
+
+def test_all_that_is_wrong_with_a_dictionary_is_told_without_lines():
+    values = yaml.safe_load(MILL)
+    values["axes"]["Z"]["rapid"]["velocity"] = "fast"
+    values["interval"] = -1
+    with pytest.raises(MachineFileError) as wrong:
+        Machine.from_dict(values, "mine")
+    assert len(wrong.value.problems) == 2
+    assert "mine: axes.Z.rapid.velocity is 'fast'" in str(wrong.value)
+
+
+def test_what_yaml_cannot_hold_is_no_machine():
+    with pytest.raises(MachineError, match="expected what YAML can hold"):
+        Machine.from_dict({"interval": object()})
+
+
+def test_a_machine_is_shown_in_one_short_line(mill):
+    assert repr(mill) == "<Machine 'Mill': Y Z, linuxcnc>"

@@ -5,8 +5,8 @@ import pytest
 import yaml
 
 from gcodejerk.machine import machine_schema
+from gcodejerk.machine.file.table import MACHINE, Section
 from gcodejerk.machine.find import shipped_machines
-from gcodejerk.machine.table import MACHINE, Section
 
 VALID = {
     "interval": 0.001,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gcodejerk.errors import MachineError
-from gcodejerk.machine.checker import Checker, KeyPath, dotted
+from gcodejerk.machine.file.checker import Checker, KeyPath, dotted
 
 LONGEST_BUILD_UP = 0.5
 """Time in which the jerk builds the acceleration up, at most [s]."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from gcodejerk.axes import AXES
-from gcodejerk.machine.model import PLANNERS
+from gcodejerk.machine.parts import PLANNERS
 
 SCHEMA_VERSION = 1
 

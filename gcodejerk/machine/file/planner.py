@@ -11,8 +11,8 @@ from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import MachineError
-from gcodejerk.machine.checker import Checker
-from gcodejerk.machine.model import BELL, JERK_LIMITED, LINUXCNC, TRAPEZOIDAL
+from gcodejerk.machine.file.checker import Checker
+from gcodejerk.machine.parts import BELL, JERK_LIMITED, LINUXCNC, TRAPEZOIDAL
 
 WITHOUT_JERK = {
     "linuxcnc": (LINUXCNC, "LinuxCNC 2.9"),

@@ -12,10 +12,10 @@ from typing import Any
 import yaml
 
 from gcodejerk.errors import Place
-from gcodejerk.machine import table
-from gcodejerk.machine.document import Document
+from gcodejerk.machine.file import table
+from gcodejerk.machine.file.document import Document
+from gcodejerk.machine.file.scalars import is_empty, number_remedy, number_value, shown
 from gcodejerk.machine.problems import Problems, nearest
-from gcodejerk.machine.scalars import is_empty, number_remedy, number_value, shown
 from gcodejerk.units import mm_from_inch
 
 KeyPath = tuple[str | int, ...]

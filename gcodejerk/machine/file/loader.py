@@ -1,4 +1,4 @@
-"""From the text of a machine file to a Machine.
+"""From the text of a machine file to a Description.
 
 Rule: here stands only what involves several keys: defaults that depend on other keys, and what does
 not fit together. What a single key may hold is the table's.
@@ -12,29 +12,21 @@ from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import MachineError
-from gcodejerk.machine.checker import Checker, KeyPath, dotted
-from gcodejerk.machine.document import Document
-from gcodejerk.machine.model import (
-    Axis,
-    Design,
-    Limits,
-    Machine,
-    Mode,
-    ProgramStart,
-    Spectrum,
-)
-from gcodejerk.machine.planner import choose_planners, planner_warnings
-from gcodejerk.machine.plausibility import COARSEST_RESOLUTION, plausibility_warnings
+from gcodejerk.machine.file.checker import Checker, KeyPath, dotted
+from gcodejerk.machine.file.document import Document
+from gcodejerk.machine.file.planner import choose_planners, planner_warnings
+from gcodejerk.machine.file.plausibility import COARSEST_RESOLUTION, plausibility_warnings
+from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
+from gcodejerk.machine.parts import Axis, Description, Design, Limits, Mode, ProgramStart, Spectrum
 from gcodejerk.machine.problems import Problems, place_order
 from gcodejerk.machine.spectrum import load_spectrum
-from gcodejerk.machine.table import DIALECT_OF_CONTROLLER
 
 JERK_OVER_RAPID = 10.0
 """`limit.jerk` where only `rapid.jerk` is given, as a multiple of that (contract, section 2)."""
 
 
-def load_text(text: str, name: str) -> Machine:
-    """Machine that a text describes.
+def load_text(text: str, name: str) -> Description:
+    """What a text says of a machine.
 
     Parameters
     ----------
@@ -45,7 +37,7 @@ def load_text(text: str, name: str) -> Machine:
 
     Returns
     -------
-    Machine
+    Description
         The machine, every default filled in.
 
     Raises
@@ -183,10 +175,10 @@ def _machine(
     planners: dict[str, str],
     name: str,
     checker: Checker,
-) -> Machine:
+) -> Description:
     controller = values["controller"]
     axes = values["axes"]
-    return Machine(
+    return Description(
         name=values.get("name", Path(name).stem),
         controller=controller,
         dialect=values.get("dialect", DIALECT_OF_CONTROLLER.get(controller, "auto")),

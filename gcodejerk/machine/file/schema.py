@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from gcodejerk.machine import table
+from gcodejerk.machine.file import table
 
 
 def machine_schema() -> dict[str, Any]:

@@ -13,16 +13,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
-from gcodejerk.machine.model import Axis, Limits, Machine, Mode, Spectrum
-from gcodejerk.machine.table import SCHEMA_VERSION
+from gcodejerk.machine.file.table import SCHEMA_VERSION
+from gcodejerk.machine.parts import Axis, Description, Limits, Mode, Spectrum
 
 
-def machine_yaml(machine: Machine) -> str:
+def machine_yaml(machine: Description) -> str:
     """Text that `Machine.loads` reads as the same machine.
 
     Parameters
     ----------
-    machine : Machine
+    machine : Description
         As loaded; one made by hand must be one that a file could describe.
 
     Returns
@@ -72,12 +72,12 @@ def machine_yaml(machine: Machine) -> str:
     )
 
 
-def settings_text(machine: Machine) -> str:
+def settings_text(machine: Description) -> str:
     """Text that is the same for equal machines only, wherever their spectra are kept.
 
     Parameters
     ----------
-    machine : Machine
+    machine : Description
         As for `machine_yaml`.
 
     Returns
