@@ -19,9 +19,9 @@ from typing import BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.cycles.expansion import Expansion, LineMap, expand
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
-from gcodejerk.nc.expansion import Expansion, LineMap, expand
 from gcodejerk.verification import Verification, Violation, require, verify_files
 from gcodejerk.verification.expansion import check_expansion
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
+from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
@@ -32,7 +33,6 @@ from gcodejerk.foreign import HEAD, refuse_foreign
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
-from gcodejerk.nc.expansion import Expansion
 from gcodejerk.plan import plan_rapids
 from gcodejerk.plans import Plans
 from gcodejerk.settling import Left, left_alone

@@ -37,7 +37,7 @@ from gcodejerk.emit.digits import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
-from gcodejerk.nc.dialect import Writing, code_name
+from gcodejerk.nc.dialects.dialect import Writing, code_name
 from gcodejerk.plans import Plans
 from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
 from gcodejerk.units import MM_PER_INCH, per_minute

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from gcodejerk.nc.block import Block, Name, Word
-from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.dialects import AUTO, DIALECTS, find_dialect
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.rapids import CERTAIN, REASONS, Rapids
+from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.program import Program, parse_block, read_program, trace
-from gcodejerk.nc.rapids import CERTAIN, REASONS, Rapids
-from gcodejerk.nc.runner import Finding
+from gcodejerk.nc.text.block import Block, Name, Word
 from gcodejerk.start import Start
 
 __all__ = [

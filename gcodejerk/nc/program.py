@@ -15,20 +15,20 @@ from typing import BinaryIO
 import numpy as np
 
 from gcodejerk.errors import Place, ProgramError
-from gcodejerk.nc.block import Block, Line
-from gcodejerk.nc.calls import Calls
-from gcodejerk.nc.chunks import BYTE_ORDER_MARK, Chunk, read_chunks
-from gcodejerk.nc.detect import detect_dialect, refuse_klartext
-from gcodejerk.nc.dialect import Dialect
 from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
-from gcodejerk.nc.lexer import read_lines
-from gcodejerk.nc.modal import NAN, State
-from gcodejerk.nc.neighbours import with_neighbours
-from gcodejerk.nc.outline import find_outline, read_body, refers, seekable
-from gcodejerk.nc.rapids import Rapids
+from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.flow.outline import find_outline, read_body, refers, seekable
+from gcodejerk.nc.flow.subprograms import Calls
+from gcodejerk.nc.interpreter.modal import NAN, State
+from gcodejerk.nc.interpreter.neighbours import with_neighbours
+from gcodejerk.nc.interpreter.rapids import Rapids
+from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.reader import Reader
-from gcodejerk.nc.runner import Finding
-from gcodejerk.nc.tokenizer import parse_line
+from gcodejerk.nc.text.block import Block, Line
+from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK, Chunk, read_chunks
+from gcodejerk.nc.text.lexer import read_lines
+from gcodejerk.nc.text.tokenizer import parse_line
 from gcodejerk.start import NOTHING_KNOWN, Start
 
 STAMP_LINES = 50

@@ -11,21 +11,21 @@ import re
 
 import numpy as np
 
-from gcodejerk.nc.beams import darkness
-from gcodejerk.nc.block import Line
-from gcodejerk.nc.calls import Calls
-from gcodejerk.nc.chunks import BYTE_ORDER_MARK
-from gcodejerk.nc.dialect import Dialect, code_name
-from gcodejerk.nc.flow import Flow
-from gcodejerk.nc.jumps import is_target
-from gcodejerk.nc.modal import GROUP_FIELDS, MODES, State
-from gcodejerk.nc.passes import Passes
-from gcodejerk.nc.rapids import REASONS, USES_FEED, RapidLog, Rapids
-from gcodejerk.nc.runner import Finding, Runner
-from gcodejerk.nc.runs import can_run, run_plain
-from gcodejerk.nc.structures import Collector, Node
-from gcodejerk.nc.tokenizer import parse_line
-from gcodejerk.nc.words import Lines
+from gcodejerk.nc.dialects.dialect import Dialect, code_name
+from gcodejerk.nc.flow.branches import Flow
+from gcodejerk.nc.flow.jumps import is_target
+from gcodejerk.nc.flow.o_words import Passes
+from gcodejerk.nc.flow.structures import Collector, Node
+from gcodejerk.nc.flow.subprograms import Calls
+from gcodejerk.nc.interpreter.beams import darkness
+from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, MODES, State
+from gcodejerk.nc.interpreter.rapids import REASONS, USES_FEED, RapidLog, Rapids
+from gcodejerk.nc.interpreter.runner import Finding, Runner
+from gcodejerk.nc.interpreter.runs import can_run, run_plain
+from gcodejerk.nc.text.block import Line
+from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK
+from gcodejerk.nc.text.tokenizer import parse_line
+from gcodejerk.nc.text.words import Lines
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from gcodejerk.nc.dialect import PLANES
+from gcodejerk.nc.dialects.dialect import PLANES
 
 Draw = st.DrawFn
 _EXTRA = {"G82": "P", "G86": "P", "G89": "P", "G83": "Q", "G73": "Q"}

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from gcodejerk.errors import ProgramError
 from gcodejerk.nc import Program, Start, find_dialect
-from gcodejerk.nc.chunks import read_chunks
-from gcodejerk.nc.modal import MODES
+from gcodejerk.nc.interpreter.modal import MODES
 from gcodejerk.nc.program import follow, open_reader
+from gcodejerk.nc.text.chunks import read_chunks
 from gcodejerk.testing.vocabulary import VOCABULARIES, draw_lines
 
 Draw = st.DrawFn

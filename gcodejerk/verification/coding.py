@@ -6,7 +6,7 @@ Rule: as in `tracking`, what is not followed makes unknown all that it might hav
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialect import Effect
+from gcodejerk.nc.dialects.dialect import Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.known import Known
 from gcodejerk.verification.reading import NAN, Line

@@ -19,8 +19,8 @@ from fractions import Fraction
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Block, Word
-from gcodejerk.nc.dialect import PLANES
-from gcodejerk.nc.modal import State
+from gcodejerk.nc.dialects.dialect import PLANES
+from gcodejerk.nc.interpreter.modal import State
 
 CLOSE = Fraction(1, 10**8)
 """Numbers of a program that differ by less are the same; in its unit, far below a resolution."""

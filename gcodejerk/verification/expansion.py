@@ -16,11 +16,11 @@ from typing import BinaryIO
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Block, Dialect, Start, find_dialect, parse_block
-from gcodejerk.nc.chunks import Chunk, read_chunks
-from gcodejerk.nc.dialect import PLANES
-from gcodejerk.nc.modal import State
+from gcodejerk.nc.dialects.dialect import PLANES
+from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.program import read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
+from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.verification.agreement import Context, confirm_contexts
 from gcodejerk.verification.cycles import (
     CLOSE,

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialect import LINEAR, PLANES, Dialect, Effect
+from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.reading import NAN
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from typing import BinaryIO
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialect import Dialect, Effect
+from gcodejerk.nc.dialects.dialect import Dialect, Effect
 
 PIECE = 1 << 20
 """Bytes in memory at a time."""

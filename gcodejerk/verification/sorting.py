@@ -7,7 +7,7 @@ the dialect's table is not understood as a whole.
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialect import Dialect
+from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.verification.reading import NAN, Line
 
 LEAST = 0.001

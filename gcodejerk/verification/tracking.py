@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialect import LINEAR, PLANES, Effect
+from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.coding import QUIET, Codes

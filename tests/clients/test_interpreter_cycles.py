@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from gcodejerk.cycles.expansion import expand
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import Start
-from gcodejerk.nc.expansion import expand
 from gcodejerk.pipeline import process
 from gcodejerk.testing.cycles import cycle_programs
 

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.nc import DIALECTS
-from gcodejerk.nc.expressions import evaluate
+from gcodejerk.nc.interpreter.expressions import evaluate
 
 RULES = DIALECTS["linuxcnc"].arithmetic
 KNOWN = {"1": 3.5, "2": -2.0, "3": 0.0, "4": 1.0, "<A>": 7.25}

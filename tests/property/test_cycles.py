@@ -6,8 +6,8 @@ import re
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from gcodejerk.cycles.expansion import expand
 from gcodejerk.nc import read_program
-from gcodejerk.nc.expansion import expand
 from gcodejerk.testing.cycles import cycle_programs
 from gcodejerk.testing.programs import programs
 from gcodejerk.verification.expansion import check_expansion

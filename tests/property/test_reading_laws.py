@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
 from gcodejerk.nc import CERTAIN, Start, parse_block, read_program, trace
-from gcodejerk.nc.dialect import LINEAR
-from gcodejerk.nc.numbers import parse_numbers
+from gcodejerk.nc.dialects.dialect import LINEAR
+from gcodejerk.nc.text.numbers import parse_numbers
 from gcodejerk.testing.programs import differences, programs
 
 QUICK = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))

@@ -101,7 +101,7 @@ def test_damage_is_listed_with_both_lines(case, result):
 
 def test_wrong_moves_of_a_cycle_never_appear(monkeypatch):
     # Were the writing side wrong, nothing would be written.
-    from gcodejerk.nc import drilling
+    from gcodejerk.cycles import drilling
 
     rules = replace(drilling.LINUXCNC, clearance={False: drilling.Decimal("0.5"), True: None})
     monkeypatch.setitem(drilling.DRILLING, "linuxcnc", rules)

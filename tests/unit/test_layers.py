@@ -19,6 +19,7 @@ ROOT = Path(gcodejerk.__file__).parent
 PICTURE = """
     _version axes errors units reasons start foreign advice
  <- nc | machine | motion
+ <- cycles
  <- plans today solutions optima designs refusals plan stream move survey arrival
     comparison dogleg settling
  <- emit | verification | testing
@@ -143,7 +144,7 @@ def test_the_picture_forbids_what_it_is_there_to_forbid(importer, imported):
 @pytest.mark.parametrize("name", SECOND_READER)
 def test_the_second_reader_shares_nothing_with_the_first_but_the_tables(name):
     own = {f"gcodejerk.verification.{other}" for other in SECOND_READER}
-    may = own | {"gcodejerk.axes", "gcodejerk.nc.dialect", "gcodejerk.units"}
+    may = own | {"gcodejerk.axes", "gcodejerk.nc.dialects.dialect", "gcodejerk.units"}
     modules = {
         found
         for found in imports(ROOT / "verification" / f"{name}.py")

@@ -7,8 +7,9 @@ import pytest
 
 from gcodejerk import Machine, ProgramError, process
 from gcodejerk.machine import find_machine
-from gcodejerk.nc import AUTO, detect, read_program
-from gcodejerk.nc.detect import detect_dialect
+from gcodejerk.nc import AUTO, read_program
+from gcodejerk.nc.dialects import detect
+from gcodejerk.nc.dialects.detect import detect_dialect
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from gcodejerk.nc import DIALECTS, Start, read_program, trace
-from gcodejerk.nc.expressions import evaluate
+from gcodejerk.nc.interpreter.expressions import evaluate
 
 HEADS = {
     "linuxcnc": b"G21 G90 G94 G17 G40 G0 X0 Y0 Z0\n",

@@ -9,7 +9,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, DIALECTS, Start, read_program
-from gcodejerk.nc.modal import FIELDS, State, agree, join, same
+from gcodejerk.nc.interpreter.modal import FIELDS, State, agree, join, same
 from gcodejerk.nc.reader import Reader
 from gcodejerk.pipeline import process
 from gcodejerk.reasons import REASONS, Reason

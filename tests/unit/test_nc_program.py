@@ -302,7 +302,7 @@ def test_progress_tells_the_bytes_read():
 def test_chunks_cut_anywhere_give_the_same_rapids(monkeypatch):
     data = HEAD + b"".join(b"G0 X%d\r\nG1 Z-1 F9\nY%d (c)\n" % (k, k) for k in range(300))
     whole = read(data).rapids
-    monkeypatch.setattr("gcodejerk.nc.chunks.CHUNK", 777)
+    monkeypatch.setattr("gcodejerk.nc.text.chunks.CHUNK", 777)
     parts = read(data).rapids
     for name in ("line", "begin", "end", "terminator", "reason", "target", "feed_needed"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(parts, name))

@@ -9,8 +9,8 @@ import pytest
 
 import gcodejerk
 from gcodejerk.axes import AXES
+from gcodejerk.cycles.expansion import expand
 from gcodejerk.nc import Start
-from gcodejerk.nc.expansion import expand
 from gcodejerk.nc.reader import Reader
 from gcodejerk.verification import Kind
 from gcodejerk.verification.expansion import check_expansion

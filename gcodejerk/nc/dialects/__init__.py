@@ -10,7 +10,7 @@ import difflib
 from importlib.metadata import entry_points
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc.dialect import Dialect
+from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.fanuc import FANUC, FANUC_LATHE_A, FANUC_LATHE_B
 from gcodejerk.nc.dialects.grbl import GRBL
 from gcodejerk.nc.dialects.haas import HAAS

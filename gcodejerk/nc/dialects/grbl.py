@@ -7,7 +7,7 @@ M6 are errors. M2 leaves G1, power-on G0: which of the two is in force at the st
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import Dialect, Text, Writing, code_names, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Text, Writing, code_names, grouped
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 

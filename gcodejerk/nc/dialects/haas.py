@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialect import grouped
+from gcodejerk.nc.dialects.dialect import grouped
 from gcodejerk.nc.dialects.fanuc import FANUC
 
 _EXTRA_SYSTEMS = tuple(range(1100, 1300, 10))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialect import Text
+from gcodejerk.nc.dialects.dialect import Text
 from gcodejerk.nc.dialects.marlin import MARLIN
 
 KLIPPER = replace(

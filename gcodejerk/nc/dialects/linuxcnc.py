@@ -7,7 +7,7 @@ Sources: its manual ("G-code overview" with the modal groups and the order of ex
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import (
+from gcodejerk.nc.dialects.dialect import (
     PLANES,
     Arithmetic,
     Dialect,

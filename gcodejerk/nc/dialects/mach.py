@@ -8,7 +8,7 @@ nothing is taken as known behind them.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import Arithmetic, Dialect, Drilling, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, Text, Writing, grouped
 from gcodejerk.nc.dialects.linuxcnc import FUNCTIONS
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)

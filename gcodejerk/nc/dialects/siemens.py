@@ -8,7 +8,7 @@ subprogram is such a name.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialect import Arithmetic, Dialect, Effect, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Effect, Text, Writing, grouped
 
 SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 

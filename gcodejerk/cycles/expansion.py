@@ -1,0 +1,440 @@
+"""Drilling cycles written out: a program in, the same program with explicit moves out.
+
+This module owns the walk through the file and the map from the lines of the result to those of the
+original. Whether a series of cycles is certain, and what its blocks become, is told by `series`;
+what a cycle does, by `drilling`.
+
+Rule 1: the file is walked twice, first to judge every series, then to write; so no series is held
+in memory, however long it is.
+Rule 2: what is not a block of a series that is certain is copied byte for byte.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.cycles.drilling import DRILLING
+from gcodejerk.cycles.series import (
+    Moment,
+    PathWords,
+    Series,
+    begin_series,
+    call_of,
+    decimal,
+    doubt,
+    drills,
+    g_codes,
+    judge,
+    passes,
+    write_block,
+)
+from gcodejerk.errors import EmitError, ProgramError
+from gcodejerk.nc.dialects import find_dialect
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.rapids import Rapids
+from gcodejerk.nc.interpreter.runner import Finding
+from gcodejerk.nc.program import read_chunk
+from gcodejerk.nc.reader import Reader
+from gcodejerk.nc.text.block import Block
+from gcodejerk.nc.text.chunks import Chunk, read_chunks
+from gcodejerk.nc.text.tokenizer import parse_line
+from gcodejerk.reasons import Reason
+from gcodejerk.start import NOTHING_KNOWN, Start
+
+# A cycle's code, blanks and zeros as the controller allows them; one that is computed is unknown.
+_CYCLE = re.compile(rb"[gG][0+ \t]*[78]")
+# What may change the spindle or the path mode.
+_NOTED = re.compile(rb"[mMoO]|[gG][0+ \t]*6")
+ROOM = 16
+"""Characters by which a line may become longer than the block: its code, blanks, a sign, a dot."""
+_SHOWN = 20
+"""Series left alone that get a finding of their own."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineMap:
+    """Where the blocks that were written out stand, in the result and in the original.
+
+    Entry i of every array is block i, in the order of the file.
+    """
+
+    line: NDArray[np.int64]
+    """First line of what became of the block; counted from 1, like all lines."""
+    lines: NDArray[np.int64]
+    begin: NDArray[np.int64]
+    """It is the result's bytes begin:end, line ends included."""
+    end: NDArray[np.int64]
+    original_line: NDArray[np.int64]
+    original_begin: NDArray[np.int64]
+    """The block is the original's bytes begin:end, without its line end."""
+    original_end: NDArray[np.int64]
+    original_terminator: NDArray[np.int64]
+    """As `Rapids.terminator`."""
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def lines_of(self, lines: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Lines of the original that lines of the result come from."""
+        if not len(self):
+            return lines
+        k = np.searchsorted(self.line, lines, side="right") - 1
+        behind = lines - (self.line[k] + self.lines[k]) + 1
+        mapped = self.original_line[k] + np.maximum(behind, 0)
+        return np.where(k < 0, lines, mapped).astype(np.int64)
+
+    def line_of(self, line: int | None) -> int | None:
+        """The same for one line; None stays None."""
+        return None if line is None else int(self.lines_of(np.array([line]))[0])
+
+    def rapids_of(self, rapids: Rapids) -> Rapids:
+        """The rapids with the places of their blocks in the original; several may share one."""
+        if not len(self) or not len(rapids):
+            return rapids
+        k = np.searchsorted(self.begin, rapids.begin, side="right") - 1
+        inside = (k >= 0) & (rapids.begin < self.end[k])
+        ends = np.array([0, 1, 2, 1])[self.original_terminator]
+        shift = np.where(k < 0, 0, self.original_end[k] + ends[k] - self.end[k])
+        return replace(
+            rapids,
+            line=self.lines_of(rapids.line),
+            begin=np.where(inside, self.original_begin[k], rapids.begin + shift),
+            end=np.where(inside, self.original_end[k], rapids.end + shift),
+            terminator=np.where(inside, self.original_terminator[k], rapids.terminator).astype(
+                np.uint8
+            ),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expansion:
+    """What was written out, and what was not."""
+
+    blocks: int
+    """Of the original."""
+    holes: int
+    """Those of them that call a cycle."""
+    written: int
+    """Those of these that were written out."""
+    findings: tuple[Finding, ...]
+    """One for each series that was left to the controller, up to a number."""
+    map: LineMap
+
+
+@dataclass(frozen=True, slots=True)
+class _Verdict:
+    """What the first walk found about one series."""
+
+    line: int
+    reason: str | None
+    at: int
+    """The line that the reason is about."""
+
+
+def expand(
+    source: BinaryIO,
+    target: BinaryIO,
+    *,
+    name: str = "<program>",
+    dialect: str | Dialect = "linuxcnc",
+    start: Start = NOTHING_KNOWN,
+    comments: bool = True,
+) -> Expansion:
+    r"""Write the drilling cycles of a program out as explicit moves.
+
+    Parameters
+    ----------
+    source : BinaryIO
+        The program, seekable, at its beginning.
+    target : BinaryIO
+        Takes the result; nothing is written where no cycle is.
+    name : str, optional
+        For messages.
+    dialect : str or Dialect, optional
+        How the program is written.
+    start : Start, optional
+        What may be assumed when it starts.
+    comments : bool, optional
+        Name each block that is written out in a comment.
+
+    Returns
+    -------
+    Expansion
+        With `written` 0, and nothing in `target`, where no series is certain.
+
+    Raises
+    ------
+    ProgramError
+        The file cannot be an NC program, or nothing is known of the dialect's cycles.
+    EmitError
+        The file was changed between the two walks.
+
+    Examples
+    --------
+    >>> import io
+    >>> program = b"G21 G90 G64 G98 F100\nG0 X0 Y0 Z10\nG81 X5 Z-3 R2\nG80\nM2\n"
+    >>> target = io.BytesIO()
+    >>> expand(io.BytesIO(program), target, comments=False).written
+    1
+    >>> print(target.getvalue().decode().splitlines()[2:-2])
+    ['G61', 'G0 X5', 'G0 Z2.', 'G1 Z-3.', 'G0 Z10.', 'G64']
+    """
+    chosen = find_dialect(dialect)
+    if chosen.name not in DRILLING:
+        known = ", ".join(sorted(DRILLING))
+        raise ProgramError(
+            f"the cycles of dialect '{chosen.name}' cannot be written out",
+            f"leave --expand-cycles out; it knows the cycles of: {known}",
+        )
+    begin = source.tell()
+    judging = _Walker(name, chosen, start, comments, None, None)
+    digest = judging.walk(source)
+    if any(verdict.reason is None for verdict in judging.verdicts):
+        source.seek(begin)
+        writing = _Walker(name, chosen, start, comments, target, judging.verdicts)
+        if writing.walk(source) != digest:
+            raise EmitError(
+                f"{name} was changed while it was being read",
+                "run the command again when nothing writes to the file",
+            )
+        places = writing.places
+    else:
+        places = array("q")
+    columns = np.array(places, dtype=np.int64).reshape(-1, 8).T
+    findings = _findings(judging.verdicts)
+    return Expansion(judging.blocks, judging.holes, columns.shape[1], findings, LineMap(*columns))
+
+
+def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
+    """What the user should know of the series that were left alone."""
+    left = [v for v in verdicts if v.reason is not None]
+    found = []
+    for verdict in left[:_SHOWN]:
+        where = "" if verdict.at == verdict.line else f" (line {verdict.at})"
+        text = f"cycles not written out from here on: {verdict.reason}{where}"
+        found.append(Finding(verdict.line, text))
+    if len(left) > _SHOWN:
+        found.append(Finding(None, f"{len(left) - _SHOWN} more series of cycles not written out"))
+    return tuple(found)
+
+
+class _Walker(Reader):
+    """Reads a program, and judges or writes its series on the way."""
+
+    def __init__(
+        self,
+        name: str,
+        dialect: Dialect,
+        start: Start,
+        comments: bool,
+        target: BinaryIO | None,
+        verdicts: list[_Verdict] | None,
+    ) -> None:
+        super().__init__(name, dialect, start)
+        self.rules = DRILLING[dialect.name]
+        self.comments = comments
+        self.target = target
+        self.known = verdicts
+        """The verdicts of the first walk; None during it."""
+        self.verdicts: list[_Verdict] = []
+        self.series: Series | None = None
+        self.reason_at = 0
+        self.holes = 0
+        self.lenders: list[int] = []
+        """Series to be written out whose dwell a later cycle might take."""
+        self.places = array("q")
+        """The columns of the map, row by row."""
+        self.spindle: int | None = None
+        self.path: PathWords | None = None
+        if start.startup:
+            self._note(parse_line(start.startup.encode("latin-1", "replace"), dialect), True, 0)
+        self.newline = b"\n"
+        self._chunk = Chunk(b"", 0, 1)
+        self._at = 0
+        self._out = 0
+        self._added = 0
+        """Lines of the result beyond those of the original."""
+
+    def walk(self, source: BinaryIO) -> bytes:
+        """Take a whole file; the digest of its bytes."""
+        digest = hashlib.blake2b(digest_size=16)
+        for chunk in read_chunks(source, self.name):
+            digest.update(chunk.data)
+            if not chunk.offset:
+                first = chunk.data.find(b"\n")
+                crlf = first > 0 and chunk.data[first - 1 : first] == b"\r"
+                self.newline = b"\r\n" if crlf else b"\n"
+            self._chunk = chunk
+            read_chunk(self, chunk, True)
+            self._copy(chunk.offset + len(chunk.data))
+        if self.series is not None:
+            self._close(self.series)
+        return digest.digest()
+
+    def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
+        """Take one line; its cycles are noticed before and after it acts."""
+        bare = text.removesuffix(b"\r")
+        if self.series is None and not _CYCLE.search(bare):
+            noted = _NOTED.search(bare) is not None
+            faults, inside = self.odd_count, self.inside
+            super().read_line(text, begin, number, terminator)
+            if noted:
+                sure = faults == self.odd_count and not inside
+                self._note(parse_line(bare, self.dialect), sure, number)
+            return
+        block = parse_line(bare, self.dialect)
+        before, faults, inside = list(self.state.position), self.odd_count, self.inside
+        ended, motion = self.state.ended, self.state.motion
+        super().read_line(text, begin, number, terminator)
+        if ended:
+            return
+        why = str(Reason.NOT_UNDERSTOOD) if faults != self.odd_count else doubt(block)
+        if inside or self.inside:
+            why = str(Reason.SUBPROGRAM)
+        if self.collecting and self.series is None:
+            # The structure runs once it is complete; what drills in it is left to the controller.
+            if self.dialect.cycles & {*g_codes(block)}:
+                self.verdicts.append(_Verdict(number, why, number))
+            return
+        self._note(block, why is None, number)
+        if self.rules.borrows_dwell & {*g_codes(block)}:
+            states = any(word.letter == self.rules.dwell for word in block.words)
+            if not states and not (self.series is not None and self.series.dwells):
+                self._borrow(number)
+        moment = Moment(before, self.state, self.path, self.spindle)
+        if self.series is None:
+            if self.state.motion not in self.dialect.cycles:
+                return
+            self.series = begin_series(number, moment)
+            if motion in self.dialect.cycles:
+                why = str(Reason.START_UNKNOWN)  # a cycle from before the program
+        place = (begin, begin + len(bare), number, len(text) - len(bare), terminator)
+        self._follow(self.series, block, bare, moment, why, place)
+
+    def _follow(
+        self,
+        series: Series,
+        block: Block,
+        text: bytes,
+        moment: Moment,
+        why: str | None,
+        place: tuple[int, int, int, int, int],
+    ) -> None:
+        """One line of a series."""
+        state, cycles = self.state, self.dialect.cycles
+        if why is not None:
+            self._give_up(series, why, place[2])
+            if state.motion not in cycles:
+                self._close(series)
+            return
+        if state.ended:
+            # M2 resets the motion, so whether its block makes a hole is not seen afterwards.
+            if any(word.letter in "XYZABCUVW" for word in block.words):
+                self._give_up(series, str(Reason.OTHER_WORDS), place[2])
+            self._close(series)
+        elif drills(block, state, cycles):
+            self.holes += 1
+            series.dwells |= any(word.letter == self.rules.dwell for word in block.words)
+            self._drill(series, block, text, moment, place)
+        elif state.motion not in cycles:
+            own = any(self.dialect.groups.get(code) == "motion" for code in g_codes(block))
+            if not own:
+                self._give_up(series, str(Reason.NOT_UNDERSTOOD), place[2])
+            self._close(series)
+        elif not passes(block):
+            series.broken = f"something else stands between the holes (line {place[2]})"
+
+    def _drill(
+        self,
+        series: Series,
+        block: Block,
+        text: bytes,
+        moment: Moment,
+        place: tuple[int, int, int, int, int],
+    ) -> None:
+        """A block that makes a hole: judge it, or write what it was judged to be."""
+        if series.reason is not None:
+            return
+        reason = judge(series, moment, block, self.rules)
+        if len(text) > self.dialect.text.line_limit - ROOM:
+            reason = reason or "the block is too long"
+        call = reason or call_of(series, moment, block, self.rules)
+        if isinstance(call, str):
+            self._give_up(series, call, place[2])
+            return
+        if self.known is None or self.target is None:
+            return
+        verdict = self.known[len(self.verdicts)]
+        if verdict.reason is not None or verdict.line != series.line:
+            return
+        begin, end, number, returns, terminator = place
+        self._copy(begin)
+        last = b"\r" * returns + b"\n" * terminator
+        line_end = last if terminator else self.newline
+        lines = write_block(text, block, call, moment, self.comments)
+        new = line_end.join(lines) + last if lines else b""
+        kind = (0, 1, 3, 2)[2 * returns + terminator]
+        self.places.extend((number + self._added, len(lines), self._out, self._out + len(new)))
+        self.places.extend((number, begin, end, kind))
+        self._put(new)
+        self._added += len(lines) - 1
+        self._at = end + len(last)
+
+    def _give_up(self, series: Series, reason: str, line: int) -> None:
+        """Leave a series to the controller; the first reason counts."""
+        if series.reason is None:
+            series.reason, self.reason_at = reason, line
+
+    def _close(self, series: Series) -> None:
+        """The series is over."""
+        if series.dwells:
+            # A dwell that the controller itself reads replaces those before it.
+            self.lenders = [*self.lenders, len(self.verdicts)] if series.reason is None else []
+        self.verdicts.append(_Verdict(series.line, series.reason, self.reason_at))
+        self.series = None
+
+    def _borrow(self, line: int) -> None:
+        """A cycle may take its dwell from those before it: the controller has to read them."""
+        for index in self.lenders:
+            reason = "a later cycle takes its dwell from this one"
+            self.verdicts[index] = _Verdict(self.verdicts[index].line, reason, line)
+        self.lenders = []
+
+    def _note(self, block: Block, sure: bool, line: int) -> None:
+        """Follow the spindle, the words of G64, and calls of what may hold any cycle."""
+        sure = sure and doubt(block) is None
+        if block.o_word is not None:
+            self.spindle = None
+        if block.o_word == "call" or any(w.letter == "M" and w.value == 98 for w in block.words):
+            self._borrow(line)
+        for word in block.words:
+            if word.letter == "M" and word.value not in (0, 1, 7, 8, 9, 48, 49):
+                self.spindle = int(word.value) if sure and word.value in (3.0, 4.0) else None
+        if any(code in (610, 611, 640) for code in g_codes(block)):
+            words = (
+                [(w.letter, decimal(w)) for w in block.words if w.letter in "PQ"] if sure else []
+            )
+            sure = sure and (self.state.unit is not None or not words)
+            known = sure and all(number >= 0 for _, number in words)
+            self.path = PathWords(tuple(words), self.state.unit) if known else None
+
+    def _copy(self, end: int) -> None:
+        """Copy the original up to an offset within the chunk."""
+        if self.target is not None:
+            data = self._chunk.data[self._at - self._chunk.offset : end - self._chunk.offset]
+            self._put(data)
+        self._at = end
+
+    def _put(self, data: bytes) -> None:
+        """Write."""
+        assert self.target is not None
+        self.target.write(data)
+        self._out += len(data)

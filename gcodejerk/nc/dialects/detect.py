@@ -1,0 +1,221 @@
+"""Which dialect a program is written in, from its text (``dialect: auto``).
+
+Rule 1: evidence is what only one dialect has, or what a program says of itself: the name of a
+post-processor in a comment counts most. What several dialects share is no evidence.
+
+Rule 2: when the evidence is not for one dialect alone, or there is none, nothing is chosen. A wrong
+dialect moves the tool elsewhere: ``X100`` is 100 mm here and 0.1 mm there.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from gcodejerk.errors import Place, ProgramError
+from gcodejerk.nc.dialects import AUTO, DIALECTS
+from gcodejerk.nc.dialects.dialect import Dialect
+
+HEAD = 64 * 1024
+"""Bytes at the top of a program that are looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Text that speaks for a dialect, and why."""
+
+    dialect: str
+    pattern: re.Pattern[bytes]
+    why: str
+    sure: bool = True
+    """It settles the matter unless another dialect's evidence does too; else it only hints."""
+
+
+def _code(dialect: str, pattern: bytes, why: str, sure: bool = True) -> Evidence:
+    """Evidence in code, comments left out."""
+    return Evidence(dialect, _in_line(pattern, re.IGNORECASE), why, sure)
+
+
+def _in_line(pattern: bytes, flags: int = 0) -> re.Pattern[bytes]:
+    r"""Compile a pattern whose ``\s`` stays within the line: over line ends it is quadratic."""
+    return re.compile(pattern.replace(rb"\s", rb"[ \t]"), flags | re.MULTILINE)
+
+
+_IN_COMMENTS = (
+    ("linuxcnc", rb"\blinuxcnc|\bemc2\b|\baxis\.ngc"),
+    ("fanuc", rb"\bfanuc"),
+    ("haas", rb"\bhaas\b"),
+    ("siemens", rb"\bsinumerik|\bsiemens\b|\b840d|\b828d"),
+    ("grbl", rb"\bgrbl"),
+    ("mach", rb"\bmach ?[34]|\buccnc\b|\buc-cnc\b|\bcentroid_post\b"),
+    ("marlin", rb"\bmarlin"),
+    ("klipper", rb"\bklipper\b"),
+)
+COMMENTS = tuple(
+    Evidence(name, re.compile(pattern, re.IGNORECASE), f"a comment names {name}")
+    for name, pattern in _IN_COMMENTS
+)
+CODE = (
+    _code("siemens", rb"^%_N_", "a program name %_N_"),
+    _code("siemens", rb"(?<![A-Z_])(MSG|MCALL|CYCLE\d+|HOLES[12]|POCKET\d)\b",
+          "a Siemens cycle or MSG"),
+    _code("siemens", rb"(?<![A-Z_])(DIAMON|DIAMOF|DIAM90|A?TRANS|AROT|GOTOF|GOTOB|SUPA|LIMS)\b",
+          "a Siemens word"),
+    _code("siemens", rb"^\s*DEF\s+(REAL|INT|BOOL|STRING)", "a Siemens declaration"),
+    _code("siemens", rb"(?<![A-Z_])G(64[1-5]|50[5-9]|5[1-9]\d)\b", "a Siemens G code", sure=False),
+    _code("heidenhain-iso", rb"^\s*%\S+\s+G7[01]\s*\*", "a program head %NAME G71 *"),
+    _code("heidenhain-iso", rb"^\s*N?\d*\s*G[0-9].*\*\s*$", "blocks that end with *", sure=False),
+    _code("linuxcnc", rb"^\s*(N\d+\s*)?o\s*(<[^>]+>|\d+|\[[^\]]*\])\s*"
+          rb"(sub|endsub|call|if|else|endif|while|endwhile|do|repeat|endrepeat|return)\b",
+          "O-words of LinuxCNC"),
+    _code("linuxcnc", rb"#<[^>]+>", "a variable with a name"),
+    _code("linuxcnc", rb"(?<![A-Z_])G(5\.2|5\.3|33\.1)(?!\d)", "a LinuxCNC G code"),
+    _code("fanuc", rb"(?<![A-Z_])G(5\.1\s*Q|68\.2|43\.[45]|10\.6)(?!\.)", "a Fanuc G code"),
+    *(_code(name, rb"(?<![A-Z_])G54\.1(?!\d)", "G54.1", sure=False) for name in ("fanuc", "mach")),
+    _code("fanuc", rb"(?<![A-Z_])(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)",
+          "Fanuc macro flow", sure=False),
+    _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
+    # increments U and W, which system A alone has, in a block that no mill has
+    _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
+    _code("grbl", rb"^\s*\$(\$|#|G|I|N|X|H|C|J=|\d+=)", "a $ command of grbl"),
+    *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
+      for name in ("marlin", "klipper")),
+    _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
+          rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
+)  # fmt: skip
+_INCREMENTS = _in_line(rb"(?<![A-Z_#\[])[UW]\s*[-+]?[.\d]")
+LATHE = (
+    (_in_line(rb"(?<![A-Z_])T\d{4}(?!\d)"), "a tool with its offset, T0101"),
+    (_in_line(rb"(?<![A-Z_])G(50|92)\s*S\d"), "a limit of the spindle's speed, G50 S"),
+    (_in_line(rb"(?<![A-Z_])G96(?!\d)"), "constant surface speed, G96"),
+    (_INCREMENTS, "increments U and W"),
+    (_in_line(rb"^[^Y\n]*(?<![A-Z_])G7[1-6](?!\d)[^Y\n]*$"), "a turning cycle"),
+)
+"""What programs of lathes hold, and hardly any program of a mill that reads Fanuc's language."""
+_TURNING = re.compile(rb"\b(LATHE|TURN(?:ING)?|TURN POST)\b")
+_O_PROGRAM = _in_line(rb"^\s*[O:]\d+")
+_KLARTEXT = _in_line(rb"^\s*\d+\s+BEGIN\s+PGM\b")
+_COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
+
+
+def refuse_klartext(head: bytes, name: str) -> None:
+    """Refuse Heidenhain's own language, in which hardly a line looks like a block.
+
+    Parameters
+    ----------
+    head : bytes
+        The beginning of a program.
+    name : str
+        For messages.
+    """
+    if match := _KLARTEXT.search(head[:HEAD]):
+        raise ProgramError(
+            "this is Heidenhain Klartext, which is not read",
+            "post the program as DIN/ISO (dialect heidenhain-iso)",
+            Place(name, 1 + head.count(b"\n", 0, match.start())),
+        )
+
+
+def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect, str]:
+    r"""Find the dialect of a program.
+
+    Parameters
+    ----------
+    head : bytes
+        The beginning of the program.
+    name : str
+        For messages.
+    lathe : bool
+        The machine file is one of a lathe.
+
+    Returns
+    -------
+    dialect : Dialect
+        The only one that the text speaks for.
+    why : str
+        What was found.
+
+    Raises
+    ------
+    ProgramError
+        Nothing speaks for one dialect, or several do.
+
+    Examples
+    --------
+    >>> detect_dialect(b"o100 sub\nG0 X1\no100 endsub\n", "part.ngc")[0].name
+    'linuxcnc'
+    """
+    head = head[:HEAD]
+    refuse_klartext(head, name)
+    comments = b"\n".join(_COMMENT.findall(head))
+    code = _COMMENT.sub(b" ", head)
+    found: dict[str, str] = {}
+    hints: dict[str, str] = {}
+    for evidence in (*COMMENTS, *CODE):
+        match = evidence.pattern.search(comments if evidence in COMMENTS else code)
+        if match:
+            line = head.count(b"\n", 0, max(head.find(match[0]), 0)) + 1
+            into = found if evidence.sure else hints
+            into.setdefault(evidence.dialect, f"{evidence.why} (line {line})")
+    _prefer(found, code)
+    chosen = found or hints
+    _refuse_mills(chosen, code, comments, lathe, name)
+    if len(chosen) == 1:
+        ((dialect, why),) = chosen.items()
+        return DIALECTS[dialect], why
+    if not chosen and _O_PROGRAM.search(code):
+        raise ProgramError(
+            "the program has a number (O...), as fanuc, haas and mach have: which of them it is "
+            "cannot be told",
+            "state it: --dialect, or the machine file's dialect",
+            Place(name),
+        )
+    if not chosen:
+        raise ProgramError(
+            f"the dialect cannot be told from the program (dialect: {AUTO})",
+            f"state it: --dialect, or the machine file's dialect; one of {', '.join(DIALECTS)}",
+            Place(name),
+        )
+    seen = "; ".join(f"{dialect}: {why}" for dialect, why in sorted(chosen.items()))
+    raise ProgramError(
+        f"the program could be of several dialects ({seen})",
+        "state it: --dialect, or the machine file's dialect",
+        Place(name),
+    )
+
+
+def _refuse_mills(
+    chosen: dict[str, str], code: bytes, comments: bytes, lathe: bool, name: str
+) -> None:
+    """Refuse to take a program for one of a mill that reads like one of a lathe.
+
+    In system A, G90 X40. Z-20. is a turning pass and X35. the next one; on a mill both are moves.
+    """
+    mills = [dialect for dialect in chosen if DIALECTS[dialect].lathe == "no"]
+    if not mills:
+        return
+    upper = code.upper()
+    why = "the machine's X is a diameter" if lathe else ""
+    if not why and not {"fanuc", "haas"}.isdisjoint(mills):
+        why = next((what for pattern, what in LATHE if pattern.search(upper)), "")
+        if not why and _TURNING.search(comments.upper()):
+            why = "a comment speaks of turning"
+    if why:
+        raise ProgramError(
+            f"the program could be of {mills[0]} ({chosen[mills[0]]}), but reads like one of a "
+            f"lathe ({why}), and which system of G codes the lathe has cannot be told",
+            "state it: --dialect fanuc-lathe-a or fanuc-lathe-b (or fanuc, haas for a mill), or "
+            "the machine file's dialect",
+            Place(name),
+        )
+
+
+def _prefer(found: dict[str, str], code: bytes) -> None:
+    """Take out what the evidence of a more special dialect explains as well."""
+    if "fanuc" in found and "haas" not in found and _INCREMENTS.search(code.upper()):
+        why = f"{found.pop('fanuc')}, and U and W are increments in system A alone"
+        found["fanuc-lathe-a"] = why
+    if "haas" in found:
+        found.pop("fanuc", None)  # it speaks Fanuc's language with words of its own
+    if "linuxcnc" in found and "mach" in found and _O_PROGRAM.search(code):
+        found.pop("mach")

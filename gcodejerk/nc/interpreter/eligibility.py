@@ -1,0 +1,202 @@
+"""Whether a block is a rapid that can be rewritten, and why not.
+
+Rule: the first reason in the order of `Reason` that applies is given; what nobody is sure of has
+one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.dialect import LINEAR, Dialect, Effect
+from gcodejerk.nc.interpreter.codes import Codes
+from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.rapids import NO_FEED
+from gcodejerk.nc.text.block import Block
+from gcodejerk.reasons import Reason
+
+_FRAME_CHANGES: frozenset[Effect] = frozenset(
+    {
+        *(
+            "return",
+            "store",
+            "machine",
+            "system",
+            "numbered system",
+            "length",
+            "set",
+            "clear",
+            "restore",
+            "local",
+        ),
+        *("table", "frames", "home"),
+    }
+)
+"""Effects that, in the block of a rapid, move the origin that its numbers refer to."""
+
+
+BARS = {
+    "offsets written": Reason.SYSTEM_WRITTEN,  # until a work system is selected
+    "tool data written": Reason.SYSTEM_WRITTEN,  # until a tool length is
+    "parameters written": Reason.SYSTEM_WRITTEN,  # for good
+    "look-ahead": Reason.LOOK_AHEAD,
+    "feed group": Reason.FEED_GROUP,
+    "feed override": Reason.FEED_SCALED,
+    "another language": Reason.NOT_UNDERSTOOD,
+}
+"""What makes rapids unfit while it is, or may be, in force (`State.bars`), and the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """``M98 P1000 L3``."""
+
+    m: int
+    number: int
+    """What P says."""
+    repeats: int | None
+    """What L says; None without it."""
+
+
+@dataclass(slots=True)
+class Step:
+    """What a block did."""
+
+    rapid: bool = False
+    reason: Reason | None = None
+    start: list[float] = field(default_factory=list)
+    end: list[float] = field(default_factory=list)
+    """Where the block's own motion ends, whatever a stop behind it leaves."""
+    words: int = 0
+    """Bit k set: a word for AXES[k]."""
+    cycle: bool = False
+    """The rapid is one of a canned cycle."""
+    feed_event: int = NO_FEED
+    fault: bool = False
+    unknown: str = ""
+    """A code that the dialect does not know, as written."""
+    turned: int = 0
+    """Bit k set: AXES[k] turns, and its word alone does not say which way."""
+    way_unknown: bool = False
+    """Nor does the machine file."""
+    habit: bool = False
+    outputs: bool = False
+    """See `beams`."""
+    beam: bool = False
+    """What M3 turns on is, or may be, on in front of the block or behind it."""
+    ends: bool = False
+    """The program ends behind the block's motion."""
+    call: Call | None = None
+    """A subprogram of the file that runs behind the block."""
+    leaves: bool = False
+    """Programs run that are not followed."""
+
+
+def looks_rapid(
+    block: Block, codes: Codes, step: Step, motion_before: int | None, dialect: Dialect
+) -> bool:
+    """Whether a block that is not understood was probably meant as a rapid."""
+    stated = [word.value for word in block.words if word.letter == "G"]
+    implied = "motion" not in codes.g and motion_before == dialect.rapid
+    rest = block.rest.decode("latin-1").upper()
+    axes = step.words or any(axis in rest for axis in AXES)
+    return bool((dialect.rapid in stated or implied) and axes)
+
+
+def judge(
+    block: Block,
+    codes: Codes,
+    step: Step,
+    state: State,
+    dialect: Dialect,
+    ended: bool,
+    contour: bool,
+) -> Reason | None:
+    """Say why a rapid has to be left alone.
+
+    Parameters
+    ----------
+    block, codes, step
+        The block, its words, and what it did.
+    state : State
+        In force behind it.
+    dialect : Dialect
+        Of the program.
+    ended : bool
+        The program ended before it.
+    contour : bool
+        The block is part of a contour that a cycle runs by itself.
+
+    Returns
+    -------
+    Reason or None
+        None where it can be rewritten.
+    """
+    g = codes.g
+    effects = {dialect.effect(code) for code in g.values()}
+    if ended:
+        return Reason.AFTER_END
+    if block.block_delete:
+        return Reason.BLOCK_DELETE
+    if step.fault or (codes.unknown and not codes.expression):
+        return Reason.NOT_UNDERSTOOD
+    if codes.expression:
+        return Reason.EXPRESSION
+    if codes.decimal:
+        return Reason.DECIMAL_POINT
+    if "return" in effects:
+        return Reason.FRAME_CHANGE
+    if step.cycle or contour or state.transforms.get("modal macro", False) is not False:
+        return Reason.CANNED_CYCLE
+    if effects & _FRAME_CHANGES or not dialect.tool_frame.isdisjoint(codes.values):
+        return Reason.FRAME_CHANGE
+    if state.compensation != 400:
+        return Reason.CUTTER_COMPENSATION
+    if state.transformed:
+        return Reason.ROTATION
+    bar = next((name for name, on in state.bars.items() if on is not False), None)
+    if bar is not None:
+        return BARS[bar]
+    return _judge_move(codes, step, state, dialect)
+
+
+def _judge_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Reason | None:
+    """Find the reasons that lie in the move itself."""
+    named = [k for k in range(len(AXES)) if step.words >> k & 1]
+    moves = unknown = False
+    for axis in named:
+        a, b = step.start[axis], step.end[axis]
+        if math.isnan(a) or math.isnan(b):
+            unknown = True
+        elif a != b:
+            moves = True
+    if not moves and not unknown:
+        return Reason.NO_MOTION
+    if state.distance is None:
+        return Reason.DISTANCE_MODE_UNKNOWN
+    if state.unit is None:
+        return Reason.UNITS_UNKNOWN
+    if unknown:
+        return Reason.START_UNKNOWN
+    if dialect.lengths_only and state.feed_unit != state.unit:
+        return Reason.FEED_UNIT
+    if dialect.path_has_to_be_stated and state.path is None:
+        return Reason.PATH_UNKNOWN
+    if step.way_unknown:
+        return Reason.ROTARY_WAY
+    # Where the table does not say what a letter is for, nobody knows what it does to a rapid.
+    others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
+    if (
+        any(code not in dialect.harmless for code in codes.g.values())
+        or not dialect.before_m | dialect.after_m >= set(codes.m)
+        or others
+        or codes.names
+        or codes.functions
+    ):
+        return Reason.OTHER_WORDS
+    moving = {AXES[k] in LINEAR for k in named if step.start[k] != step.end[k]}
+    if len(moving) > 1 and not dialect.feed_of_mixed:
+        return Reason.MIXED_AXES
+    return None

@@ -1,0 +1,80 @@
+"""The modal state that a program starts in.
+
+Rule: without a word from the user only the dialect's documented modes are assumed, and no position.
+The unit is no such mode: whether 1 is a millimetre or an inch, the program says, or the user.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.axes import AXES
+from gcodejerk.errors import Place, ProgramError
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.execute import Executor
+from gcodejerk.nc.interpreter.frames import system_key
+from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, State
+from gcodejerk.nc.text.block import Block
+from gcodejerk.nc.text.tokenizer import parse_line
+from gcodejerk.start import Start
+from gcodejerk.units import MM_PER_INCH
+
+
+def initial_state(dialect: Dialect, start: Start) -> State:
+    """Make the state in which a program starts."""
+    state = State()
+    for group, code in dialect.defaults.items():
+        if (name := GROUP_FIELDS.get(group)) is not None:
+            setattr(state, name, code)
+    state.system = dialect.defaults.get("system")
+    mode = dialect.defaults.get("feed mode")
+    state.feed_mode = None if mode is None else dialect.feed_modes.get(mode, mode // 10)
+    path = dialect.defaults.get("path")
+    state.path = None if path is None else dialect.paths[path]
+    written = set(dialect.groups.values())
+    state.fixed = frozenset(
+        GROUP_FIELDS.get(group, group.replace(" ", "_"))
+        for group in dialect.defaults
+        if group not in written
+    )
+    units = dialect.defaults.get("units")
+    state.unit = None if units is None else MM_PER_INCH if dialect.units[units] else 1.0
+    state.unit_stated = units is not None
+    state.wraps = tuple(start.wraps.get(axis) for axis in AXES)
+    state.diameter = state.turns = start.diameter
+    for system, offsets in start.offsets.items():
+        state.offsets[system_key(system)] = [offsets.get(axis, NAN) for axis in AXES]
+    if start.positions or start.offsets:
+        # Who states where the axes are, states it for the modes that the dialect starts in: no
+        # tool length and no G92, which would otherwise outlive the program before this one.
+        state.tool = [0.0] * len(AXES)
+        state.g92 = [0.0] * len(AXES)
+    if state.system is not None:
+        state.g5x = list(state.offsets.get(state.system, state.g5x))
+    if start.startup:
+        block = parse_line(start.startup.encode("latin-1", "replace"), dialect)
+        each = [Block(words=(word,)) for word in block.words]
+        if block.problem is not None:
+            raise ProgramError(
+                f"startup codes: {block.problem}",
+                "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
+                Place("startup", 1, block.column, start.startup),
+            )
+        executor = Executor(dialect, state, start)
+        steps = [executor.run(line) for line in (each if dialect.one_command else [block])]
+        if any(step.fault or step.unknown for step in steps):
+            raise ProgramError(
+                f"startup codes: the dialect {dialect.name} refuses {start.startup!r}",
+                "give codes that it has, and that may stand together",
+                Place("startup", 1, None, start.startup),
+            )
+        state.feed_unit = state.unit  # what holds at the start is the control's own unit
+        if "tool length" in _groups_of(block, dialect):
+            state.tool = [0.0] * len(AXES)
+    for axis, letter in enumerate(AXES):
+        state.position[axis] = start.positions.get(letter, NAN)
+    return state
+
+
+def _groups_of(block: Block, dialect: Dialect) -> set[str]:
+    """List the modal groups whose codes stand in a block."""
+    codes = [round(w.value * 10) for w in block.words if w.letter == "G" and w.value is not None]
+    return {dialect.groups[code] for code in codes if code in dialect.groups}

@@ -1,0 +1,67 @@
+"""M codes: the spindle, tool changes, builders' programs, saved modes, calls that are not followed.
+
+Rule: what a program of somebody else's does is not known; what those for tool changes are known to
+leave changed is forgotten.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.eligibility import Step
+from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.rapids import USES_FEED
+from gcodejerk.nc.interpreter.variables import forget_shared
+
+_CALLS = frozenset({47, 96, 97, 98, 198})
+"""M codes that go on elsewhere, or may."""
+
+
+def run_m_code(state: State, m: int, dialect: Dialect, step: Step) -> bool:
+    """Execute an M code, the end of the program and stops excepted.
+
+    Parameters
+    ----------
+    state : State
+        Changed.
+    m : int
+        The code.
+    dialect : Dialect
+        Of the program.
+    step : Step
+        What the block did so far.
+
+    Returns
+    -------
+    bool
+        Whether programs run that are not followed.
+    """
+    group = dialect.m_groups.get(m)
+    if m in (3, 4, 5) and group == "spindle":
+        state.put("spindle", m)
+    if group is None or m == 6 or group == "user":
+        # A tool change may go anywhere, and so may a program of the user's.
+        state.forget_positions()
+        forget_shared(state, dialect.arithmetic)
+        if dialect.other_m == "positions":
+            _behind_macro(state)
+    elif m == 73 and group == "state":
+        state.put("restores", True)
+    elif m in (70, 72) and group == "state":
+        step.feed_event = USES_FEED  # M70 keeps F and the modes, M72 gives them back
+        if m == 72:
+            state.forget_modes()
+            state.forget_positions()
+    return group is not None and m in _CALLS and step.call is None
+
+
+def _behind_macro(state: State) -> None:
+    """Forget what a builder's macro is known to leave changed.
+
+    It retracts with G91 G28 and ends in G90, and it cancels the tool length. Were it to leave
+    G91, G1 or another work system behind, no program would run on such a machine.
+    """
+    state.lose("tool")
+    if state.cycle is not None:
+        state.lose("cycle")
+    if state.distance == 910 and "distance" not in state.fixed:
+        state.put("distance", None)

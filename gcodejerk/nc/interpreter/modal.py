@@ -1,0 +1,356 @@
+"""The modal state of a program: every group, the position, and how words change them.
+
+Rule 1: all modal state lives in `State`, and a word changes it here, in the modules that `Executor`
+hands it to (`frames`, `cycles`, `flow`), or nowhere. A second place that remembers G91 is a second
+opinion about where the tool is. (`runs.py` computes whole runs of plain lines as arrays; a
+differential test holds it to this file on every column.)
+
+Rule 2: this file knows no machine. It says what the program asked for.
+
+Rule 3: what is not known for certain is unknown: None for a mode, NaN for a number. Unknown never
+becomes known except by a word that states the value.
+
+Rule 4: `FIELDS` is the one list of what a state holds. Starting, copying, forgetting, comparing and
+joining go through it, so that a field that is added is forgotten and joined like the others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.dialect import LINEAR
+
+NAN = math.nan
+MOST_VARIABLES = 1000
+"""Variables that are known at a time, so that a copy of the state stays cheap."""
+
+GROUP_FIELDS = {
+    "motion": "motion",
+    "plane": "plane",
+    "distance": "distance",
+    "arc distance": "arc_distance",
+    "compensation": "compensation",
+    "retract": "retract",
+}
+"""Modal groups whose code simply becomes the value of a field."""
+
+Kind = Literal[
+    "mode",  # one value; None: unknown
+    "number",  # NaN: unknown
+    "axes",  # one number an axis; NaN: unknown
+    "once",  # true as soon as the program did something somewhere; never taken back
+    "named",  # name -> in force, None unknown; a name that is not there is not in force
+    "table",  # key -> what is known of it; a key that is not there is unknown
+    "constant",  # the same from the start to the end, or kept by whoever runs the blocks
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of the state, and how it is treated."""
+
+    name: str
+    kind: Kind
+    start: Any = None
+    """Before anything is known; empty containers are made anew."""
+    together: str = ""
+    """Fields with the same word here are known together or not at all: F and whether it was
+    written without a decimal point; a path mode and its tolerances."""
+    only_if: str = ""
+    """It can only be unknown where this field of kind "once" is true: without a G7 in the program,
+    X is a radius for certain."""
+
+
+FIELDS = (
+    *(
+        Field(name, "mode")
+        for name in ("motion", "plane", "distance", "arc_distance", "feed_mode", "unit")
+    ),
+    *(Field(name, "mode") for name in ("feed_unit", "compensation", "retract", "system")),
+    Field("path", "mode", together="path"),
+    Field("path_p", "number", NAN, together="path"),
+    Field("path_q", "number", NAN, together="path"),
+    Field("feed", "number", NAN, together="feed"),
+    Field("feed_whole", "mode", False, together="feed"),
+    Field("diameter", "mode", only_if="turns"),
+    Field("rotated", "mode", False, only_if="rotates"),
+    Field("spindle", "mode", 5),
+    Field("cycle", "mode", together="cycle"),
+    Field("cycle_level", "number", NAN),
+    *(Field(name, "axes") for name in ("position", "g5x", "g92", "tool")),
+    *(Field(name, "named") for name in ("transforms", "bars")),
+    *(Field(name, "table") for name in ("offsets", "variables")),
+    *(
+        Field(name, "once", False)
+        for name in ("distance_stated", "feed_mode_stated", "unit_stated", "rotates", "turns")
+    ),
+    Field("restores", "once", False),
+    *(Field(name, "constant", start) for name, start in (("ended", False), ("touched", None))),
+    Field("fixed", "constant", frozenset()),
+    Field("wraps", "constant", (None,) * len(AXES)),
+)
+"""What a state holds."""
+BY_NAME = {field.name: field for field in FIELDS}
+MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in ("feed_whole", "cycle"))
+"""Fields that hold one modal group each."""
+_FRAME = ("g5x", "g92", "tool")
+_GROUPS = {
+    word: tuple(field.name for field in FIELDS if field.together == word)
+    for word in {field.together for field in FIELDS} - {""}
+}
+_LINEAR = tuple(axis in LINEAR for axis in AXES)
+
+
+def _unknown(field: Field, value: Any) -> Any:
+    """What a field holds where nothing is known of it."""
+    if field.kind == "mode":
+        return None
+    if field.kind == "number":
+        return NAN
+    if field.kind == "axes":
+        return [NAN] * len(AXES)
+    if field.kind == "named":
+        return dict.fromkeys(value)
+    if field.kind == "table":
+        return {}
+    return True if field.kind == "once" else value
+
+
+class State:
+    """What is in force between two blocks."""
+
+    __slots__ = tuple(field.name for field in FIELDS)
+
+    motion: int | None
+    plane: int | None
+    distance: int | None
+    arc_distance: int | None
+    feed_mode: int | None
+    unit: float | None
+    """mm per unit of length."""
+    feed_unit: float | None
+    """mm per unit of length of F, where a dialect keeps the two apart; elsewhere that of `unit`."""
+    compensation: int | None
+    retract: int | None
+    system: int | None
+    path: int | None
+    path_p: float
+    path_q: float
+    """P and Q of G64; NaN where `path` is known: none were given."""
+    feed: float
+    feed_whole: bool | None
+    """F was written without a decimal point."""
+    diameter: bool | None
+    rotated: bool | None
+    """The coordinate system is turned."""
+    spindle: int | None
+    """3, 4 or 5: the M code in force, where G0 may darken what M3 turns on."""
+    cycle: tuple[int, float, float] | None
+    """Code in force, its Z and R words."""
+    cycle_level: float
+    """Where the series of cycles began."""
+    position: list[float]
+    g5x: list[float]
+    g92: list[float]
+    tool: list[float]
+    transforms: dict[str, bool | None]
+    """Rotation, scaling, mirroring..."""
+    bars: dict[str, bool | None]
+    """What besides makes rapids unfit to be rewritten while it is in force, by `judge.BARS`."""
+    offsets: dict[int, list[float]]
+    variables: dict[str, float]
+    """Variables whose value is certain, by `expressions.variable_name`."""
+    distance_stated: bool
+    feed_mode_stated: bool
+    unit_stated: bool
+    rotates: bool
+    """The program turns a coordinate system somewhere."""
+    turns: bool
+    """The program uses G7, so X may be a diameter."""
+    restores: bool
+    """The subprogram gives the modes of its caller back (M73)."""
+    ended: bool
+    touched: set[str | int] | None
+    """What blocks have changed since somebody wanted to know."""
+    fixed: frozenset[str]
+    """Modes that no code of the dialect changes, so that nothing makes them unknown."""
+    wraps: tuple[str | None, ...]
+    """How each axis turns: see `gcodejerk.start.Start`; None unknown."""
+
+    def __init__(self) -> None:
+        for field in FIELDS:
+            if field.kind in ("axes", "named", "table"):
+                setattr(self, field.name, [NAN] * len(AXES) if field.kind == "axes" else {})
+            else:
+                setattr(self, field.name, field.start)
+
+    def copy(self) -> State:
+        """Make an independent copy."""
+        other = State.__new__(State)
+        for field in FIELDS:
+            value = getattr(self, field.name)
+            shared = field.kind not in ("axes", "named", "table")
+            setattr(other, field.name, value if shared else value.copy())
+        return other
+
+    def put(self, field: str, value: object) -> None:
+        """Set one field and remember that it was set."""
+        setattr(self, field, value)
+        if self.touched is not None:
+            self.touched.add(field)
+
+    def move(self, axis: int, value: float) -> None:
+        """Set the position of one axis."""
+        self.position[axis] = value
+        if self.touched is not None:
+            self.touched.add(axis)
+
+    def set_variable(self, name: str, value: float) -> None:
+        """Set a variable, or, with NaN, forget it; more than `MOST_VARIABLES` are not kept."""
+        if value == value and (name in self.variables or len(self.variables) < MOST_VARIABLES):
+            self.variables[name] = value
+        else:
+            self.variables.pop(name, None)
+        if self.touched is not None:
+            self.touched.add("#" + name)
+
+    def forget_variables(self, but: Iterable[str] = ()) -> None:
+        """Forget all variables but these."""
+        self.variables = {name: self.variables[name] for name in but}
+        if self.touched is not None:
+            self.touched.add("#")
+
+    def lose(self, name: str) -> None:
+        """Make one field unknown, and those that are known with it."""
+        field = BY_NAME[name]
+        for each in _GROUPS.get(field.together, (name,)):
+            self.put(each, _unknown(BY_NAME[each], getattr(self, each)))
+        if name == "cycle":
+            self.put("motion", None)  # a position may be a hole or a move
+
+    def forget_positions(self, axes: Iterable[int] = range(len(AXES))) -> None:
+        """Forget the positions of these axes."""
+        for axis in axes:
+            self.move(axis, NAN)
+
+    def forget_modes(self) -> None:
+        """Forget every modal group, and what lies between machine and program coordinates."""
+        for field in FIELDS:
+            name = field.name
+            if field.kind in ("once", "table", "constant") or name == "position":
+                continue
+            if name in self.fixed or (field.only_if and not getattr(self, field.only_if)):
+                continue
+            if field.kind != "named" or getattr(self, name):
+                self.put(name, _unknown(field, getattr(self, name)))
+
+    def forget_frame(self) -> None:
+        """Forget what lies between machine and program coordinates."""
+        for name in _FRAME:
+            self.lose(name)
+
+    def forget(self) -> None:
+        """Forget everything."""
+        self.forget_modes()
+        self.forget_positions()
+        self.forget_variables()
+        self.offsets = {}
+
+    def forget_silently(self) -> None:
+        """Forget everything, though nothing was touched: the start of a body."""
+        touched, self.touched = self.touched, None
+        offsets = self.offsets
+        self.forget()
+        self.offsets, self.touched = offsets, touched
+
+    def forget_touched(self, touched: Iterable[str | int]) -> None:
+        """Forget fields and axes that may or may not have been changed."""
+        for name in touched:
+            if isinstance(name, int):
+                self.move(name, NAN)
+            elif name == "#":
+                self.forget_variables()
+            elif name.startswith("#"):
+                self.set_variable(name[1:], NAN)
+            else:
+                self.lose(name)
+
+    @property
+    def transformed(self) -> bool:
+        """Whether a rotation, scaling, mirroring or polar frame is, or may be, in force."""
+        return self.rotated is not False or any(on is not False for on in self.transforms.values())
+
+    def shift(self, axis: int) -> float:
+        """Machine coordinate minus program coordinate of an axis [mm, deg]; NaN if unknown."""
+        if self.transformed and (axis < 2 or self.rotated is False):
+            return NAN
+        return self.g5x[axis] + self.g92[axis] + self.tool[axis]
+
+    def scale(self, axis: int) -> float:
+        """Mm (or deg) per unit of an axis word; NaN if unknown."""
+        if not _LINEAR[axis]:
+            return 1.0
+        if self.unit is None:
+            return NAN
+        if axis == 0 and self.diameter is not False:
+            return NAN if self.diameter is None else self.unit / 2.0
+        return self.unit
+
+
+def same(a: object, b: object) -> bool:
+    """Whether two values of a field are one: NaN counts as equal to NaN."""
+    return a == b or (a != a and b != b)
+
+
+def _equal(field: Field, a: Any, b: Any) -> bool:
+    """Whether two states know the same of a field."""
+    if field.kind == "axes":
+        return all(map(same, a, b))
+    if field.kind == "named":
+        return all(a.get(name, False) == b.get(name, False) for name in a.keys() | b.keys())
+    if field.name == "cycle" and a is not None and b is not None:
+        return all(map(same, a, b))
+    return same(a, b)
+
+
+def agree(a: State, b: State) -> bool:
+    """Whether two states know the same."""
+    return all(
+        _equal(field, getattr(a, field.name), getattr(b, field.name))
+        for field in FIELDS
+        if field.name != "touched"
+    )
+
+
+def join(before: State, after: State) -> State:
+    """Keep what is known when it is unknown which of two states holds."""
+    joined = before.copy()
+    joined.touched = after.touched
+    for field in FIELDS:
+        a, b = getattr(before, field.name), getattr(after, field.name)
+        if field.kind == "constant" or _equal(field, a, b):
+            continue
+        if field.kind == "once":
+            joined.put(field.name, a or b)
+        elif field.kind == "named":
+            names = a.keys() | b.keys()
+            both = {name: (a.get(name, False), b.get(name, False)) for name in names}
+            joined.put(field.name, {n: x if x == y else None for n, (x, y) in both.items()})
+        elif field.name == "position":
+            for axis, (x, y) in enumerate(zip(a, b, strict=True)):
+                if not same(x, y):
+                    joined.move(axis, NAN)
+        elif field.kind == "axes":
+            joined.put(field.name, [x if x == y else NAN for x, y in zip(a, b, strict=True)])
+        elif field.name == "variables":
+            for name in [name for name, value in a.items() if b.get(name) != value]:
+                joined.set_variable(name, NAN)
+        elif field.kind == "table":
+            joined.offsets = {key: x for key, x in a.items() if b.get(key) == x}
+        else:
+            joined.lose(field.name)
+    return joined

@@ -1,0 +1,115 @@
+"""Where a straight move leads, and a return: the axis words of a block become positions.
+
+Rule: a rotary axis goes the way that the machine file says; where it says none, the position is
+known and the way is not.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect
+from gcodejerk.nc.interpreter.codes import Codes
+from gcodejerk.nc.interpreter.eligibility import Step
+from gcodejerk.nc.interpreter.modal import NAN, State
+
+
+def go_straight(state: State, codes: Codes, step: Step) -> None:
+    """Go to where the axis words say."""
+    values = codes.values
+    for axis, letter in enumerate(AXES):
+        if letter in codes.increments:
+            by = codes.increments[letter] * state.scale(axis)
+            state.move(axis, state.position[axis] + by)
+        elif letter in values:
+            value = values[letter] * state.scale(axis)
+            function = codes.functions.get(letter)
+            if function == "IC" or (function is None and state.distance == 910):
+                value = state.position[axis] + value
+            elif function in (None, "AC") and (function or state.distance is not None):
+                if letter not in LINEAR:
+                    value = _turn(state, axis, value, step)
+            else:
+                value = NAN  # the shortest way, or this way round: the machine decides
+            state.move(axis, value)
+
+
+def _turn(state: State, axis: int, angle: float, step: Step) -> float:
+    """Where a rotary axis stands behind an absolute word."""
+    stands = state.position[axis]
+    wrap = state.wraps[axis]
+    step.way_unknown |= wrap is None and stands != angle
+    if wrap is None and math.copysign(1.0, angle) < 0.0:
+        return NAN  # by its sign alone, some controls go backwards, to the positive angle
+    if wrap in (None, "none"):
+        return angle
+    end = way_round(stands, angle, wrap)
+    step.way_unknown |= end != end
+    moves = end != stands and (wrap == "sign" or not 0.0 <= stands < 360.0)
+    if moves or end != angle:
+        step.turned |= 1 << axis
+    return end
+
+
+def go_to_machine_position(state: State, values: dict[str, float]) -> None:
+    """G53: the axis words are machine coordinates."""
+    for axis, letter in enumerate(AXES):
+        if letter in values:
+            at = values[letter] * state.scale(axis) - state.shift(axis)
+            counts = letter not in LINEAR and state.wraps[axis] in ("shortest", "sign")
+            state.move(axis, NAN if counts or state.distance == 910 else at)
+
+
+def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:
+    """G28 and G30: to a stored point that the program does not tell."""
+    if dialect.tool_cancelled_by_return:
+        state.lose("tool")
+        state.forget_positions()
+    named = [AXES.index(axis) for axis in codes.moved()]
+    state.forget_positions(named or range(len(AXES)))
+    if state.transformed:
+        state.forget_positions()
+
+
+def plane_axes(state: State) -> list[int]:
+    """List the axes that cutter compensation may displace."""
+    plane = state.plane
+    # Heidenhain's G20 is a plane that nothing here knows.
+    letters = PLANES[plane][:2] if plane in PLANES else "XYZUVW"
+    return [AXES.index(letter) for letter in letters]
+
+
+def way_round(stands: float, angle: float, wrap: str) -> float:
+    """Where a rotary axis ends that counts turns, behind an absolute word.
+
+    Parameters
+    ----------
+    stands : float
+        Where it stands. [deg]
+    angle : float
+        What the word says. [deg]
+    wrap : str
+        ``shortest``, or ``sign``: LinuxCNC's WRAPPED_ROTARY, which goes forwards to a positive
+        number and backwards to a negative one (interp_convert.cc, unwrap_rotary).
+
+    Returns
+    -------
+    float
+        NaN where half a turn has no shorter way round, or the number is not an angle. [deg]
+    """
+    if stands != stands:
+        # Somewhere on this angle; how many turns have been counted, nobody knows.
+        return angle if wrap == "shortest" else NAN
+    if wrap == "shortest":
+        way = (angle - stands + 180.0) % 360.0 - 180.0
+        if abs(abs(way) - 180.0) < 1e-6:
+            return NAN
+        return angle if abs(stands + way - angle) < 1e-9 else stands + way
+    if abs(angle) >= 360.0:
+        return NAN
+    backwards = math.copysign(1.0, angle) < 0.0
+    end = abs(angle) + math.floor(stands / 360.0) * 360.0
+    if backwards and end > stands:
+        return end - 360.0
+    return end + 360.0 if not backwards and end < stands else end

@@ -1,0 +1,122 @@
+"""What follows a rapid: a motion, or something that LinuxCNC waits for.
+
+LinuxCNC 2.9 keeps half of a G0's acceleration back for the blend with its successor as long as it
+knows none (tcGetOverallMaxAccel: a parabolic end). Played (2.9, G64 with and without P): where a
+motion follows directly, be it a feed, another rapid or a cycle, the G0 has all of it; in front of
+G4, M3 to M9, M64, S, G43, G49 and G92, and at the program's end it has half. G61 and G61.1 give all
+of it always.
+
+Rule: what is not understood counts as something that is waited for: the rapid is then taken for as
+slow as it can be, and no stream is held to a time that the control would not keep.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.nc.interpreter.rapids import CERTAIN, Rapids
+
+WINDOW = 512
+"""Bytes behind a rapid that are looked at first, and how far at most. [bytes]"""
+FARTHEST = 1 << 14
+_COMMENT = re.compile(rb"\([^()\n]*\)|;[^\n]*")
+_WORD = re.compile(rb"([A-Z])([+-]?[0-9.]+)?")
+_COMPUTED = re.compile(rb"(N[0-9]+)?(G0?[0-3])?[XYZABCUVW]")
+_STILL = frozenset(
+    {17, 18, 19, 20, 21, 40, 54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3}
+    | {61, 61.1, 64, 80, 90, 91, 90.1, 91.1, 93, 94, 98, 99}
+)
+"""G codes that neither move nor wait, played."""
+_QUIET = frozenset({48, 49, 70, 71, 72})
+"""M codes of which the same holds."""
+_MOVES = frozenset({0, 1, 2, 3, 53, 73, 81, 82, 83, 85, 86, 89})
+_MOVING = {bytes([c]) for c in b"XYZABCUVWIJK"}
+
+
+def with_neighbours(file: BinaryIO, origin: int, rapids: Rapids) -> Rapids:
+    """Say of each certain rapid whether it is alone.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        The program, seekable.
+    origin : int
+        Where the program begins in it.
+    rapids : Rapids
+        Found in it.
+
+    Returns
+    -------
+    Rapids
+        The same; `lone` is false also where a motion follows.
+    """
+    lone: NDArray[np.bool_] = rapids.lone.copy()
+    for i in np.flatnonzero(lone & (rapids.reason == CERTAIN)).tolist():
+        lone[i] = not _followed(file, origin + int(rapids.begin[i]), origin + int(rapids.end[i]))
+    return replace(rapids, lone=lone)
+
+
+def _followed(file: BinaryIO, begin: int, end: int) -> bool:
+    """Whether the motion of the block at begin:end is followed by another one directly."""
+    size = WINDOW
+    while True:
+        file.seek(begin)
+        text = file.read(end - begin + size)
+        block, behind = text[: end - begin], text[end - begin :]
+        if _waits(block):
+            return False
+        whole = len(text) < end - begin + size
+        lines = behind.split(b"\n")[1:]
+        for line in lines if whole else lines[:-1]:
+            found = _kind(line)
+            if found is not None:
+                return found
+        if whole or size >= FARTHEST:
+            return False
+        size *= 8
+
+
+def _waits(block: bytes) -> bool:
+    """Whether a block stops the program behind its own motion."""
+    words = _WORD.findall(_plain(block))
+    return any(letter == b"M" and _number(value) in (0, 1, 2, 30, 60) for letter, value in words)
+
+
+def _kind(line: bytes) -> bool | None:
+    """True: moves; False: waits, or is not understood; None: neither."""
+    text = _plain(line)
+    if not text or text.startswith(b"#"):
+        return None
+    if text[:1] in b"/%O":
+        return False
+    if b"#" in text or b"[" in text:
+        # A motion by an expression is one all the same; what else is computed may be anything.
+        return _COMPUTED.match(text) is not None
+    words = _WORD.findall(text)
+    if b"".join(letter + value for letter, value in words) != text:
+        return False
+    letters = {letter for letter, _ in words}
+    codes = {_number(value) for letter, value in words if letter == b"G"}
+    orders = {_number(value) for letter, value in words if letter == b"M"}
+    if letters & {b"T", b"S", b"H", b"D"} or not orders <= _QUIET or not codes <= _STILL | _MOVES:
+        return False
+    if letters & _MOVING:
+        return True
+    return None
+
+
+def _plain(line: bytes) -> bytes:
+    """A line without comments and blanks, in upper case."""
+    return b"".join(_COMMENT.sub(b"", line).split()).upper()
+
+
+def _number(value: bytes) -> float | None:
+    try:
+        return float(value)
+    except ValueError:
+        return None

@@ -1,0 +1,239 @@
+"""The rapids of a program as columns, and the log that they are collected in.
+
+Rule: a rapid's F word matters only if a later block uses it before a new one is certain to come.
+That is known only later, so the log keeps the rapids since the last such block waiting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.visits import Visits
+from gcodejerk.reasons import Reason
+
+REASONS = tuple(Reason)
+CERTAIN = 255
+"""Entry of `Rapids.reason` for a rapid whose start, end and path are known."""
+_INDEX = {reason: index for index, reason in enumerate(REASONS)}
+FEED_UNKNOWN = _INDEX[Reason.FEED_UNKNOWN]
+EXACT = (61, 62)
+"""Path modes (G61, G61.1) in which no motion blends with the next."""
+NO_FEED, USES_FEED, GIVES_FEED = 0, 1, 2
+"""What a block means for an F word in front of it: nothing, it may be used, it is replaced."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rapids:
+    """The rapids of a program; entry i of every array is rapid i, in the order of the file."""
+
+    line: NDArray[np.int64]
+    """Of the block, counted from 1."""
+    begin: NDArray[np.int64]
+    """The block is the file's bytes begin:end, without its line end."""
+    end: NDArray[np.int64]
+    terminator: NDArray[np.uint8]
+    """0 none (last line), 1 LF, 2 CR LF, 3 CR."""
+    start: NDArray[np.float64]
+    """Shape (n, 9), program coordinates [mm, deg]; NaN where unknown."""
+    target: NDArray[np.float64]
+    """Shape (n, 9), program coordinates [mm, deg]; the start's value where no axis moves."""
+    words: NDArray[np.uint16]
+    """Bit k set: a word for AXES[k] stands in the block."""
+    reason: NDArray[np.uint8]
+    """255 certain, else an index into tuple(Reason)."""
+    inch: NDArray[np.bool_]
+    incremental: NDArray[np.bool_]
+    diameter: NDArray[np.bool_]
+    distance_stated: NDArray[np.bool_]
+    """G90 or G91 was stated, not taken from the dialect's default."""
+    feed_mode: NDArray[np.uint8]
+    """93, 94, 95, or 0 unknown; after the block's own words."""
+    feed_mode_stated: NDArray[np.bool_]
+    feed: NDArray[np.float64]
+    """F in force after the block, in the program's own unit; NaN unknown."""
+    feed_whole: NDArray[np.bool_]
+    """F was written without a decimal point, which some controls read differently."""
+    feed_needed: NDArray[np.bool_]
+    """A later block may use F before a new one is certain to be given."""
+    speed: NDArray[np.float64]
+    """Of a rapid that runs at F [mm/s]; NaN where rapids run as fast as the axes allow."""
+    path: NDArray[np.uint8]
+    """61, 62 (G61.1), 64, or 0 unknown; after the block's own words."""
+    path_p: NDArray[np.float64]
+    """P and Q of G64 in the program's own unit, NaN absent."""
+    path_q: NDArray[np.float64]
+    lone: NDArray[np.bool_]
+    """Under G64, or in a path mode that is not known; and nothing that moves follows directly,
+    where `neighbours` has looked. LinuxCNC 2.9 gives such a rapid half of its acceleration."""
+    offset: NDArray[np.float64]
+    """Shape (n, 9): machine = program + offset [mm, deg]; NaN where unknown."""
+    turned: NDArray[np.uint16]
+    """Bit k set: AXES[k] turns to where the machine file says, and a plain number written in the
+    program would not lead it there."""
+    beam: NDArray[np.bool_]
+    """What M3 turns on is, or may be, on."""
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+_TYPES: dict[str, tuple[type, int]] = {
+    **{name: (np.int64, 0) for name in ("line", "begin", "end")},
+    **{name: (np.uint8, 0) for name in ("terminator", "reason", "feed_mode", "path")},
+    **{name: (np.float64, len(AXES)) for name in ("start", "target", "offset")},
+    **{name: (np.float64, 0) for name in ("feed", "path_p", "path_q", "speed")},
+    **{name: (np.uint16, 0) for name in ("words", "turned")},
+    **{
+        name: (np.bool_, 0)
+        for name in (
+            *("inch", "incremental", "diameter", "distance_stated"),
+            *("feed_mode_stated", "feed_needed", "feed_whole", "beam", "lone"),
+        )
+    },
+}
+
+
+def common_columns(state: State) -> dict[str, object]:
+    """Fill the columns that depend on the modal state alone."""
+    unknown: list[float] = [state.shift(axis) for axis in range(len(AXES))]
+    return {
+        "inch": state.unit is not None and state.unit != 1.0,
+        "incremental": state.distance == 910,
+        "diameter": bool(state.diameter),
+        "distance_stated": state.distance_stated,
+        "feed_mode": state.feed_mode or 0,
+        "feed_mode_stated": state.feed_mode_stated,
+        "path": state.path or 0,
+        "path_p": state.path_p,
+        "path_q": state.path_q,
+        "lone": state.path not in EXACT,
+        "offset": unknown,
+        "feed_whole": bool(state.feed_whole),
+        "speed": np.nan,
+        "turned": 0,
+        "beam": state.spindle != 5,
+    }
+
+
+class RapidLog:
+    """Collects rapids in the order of the file."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, list[NDArray[np.generic]]] = {name: [] for name in _TYPES}
+        self._rows: list[dict[str, object]] = []
+        self._needed: list[NDArray[np.bool_]] = []
+        self._waiting = 0
+        self.count = 0
+        self.habits = self.outputs = False
+        """Blocks were seen that do what `beams` looks for."""
+        self.dark = ""
+        """See `beams.Dark`."""
+        self.visits = Visits()
+        """Rapids of lines that may run more than once."""
+
+    def feed_event(self, event: int) -> None:
+        """Settle the rapids that wait for a block that uses or replaces F."""
+        if event:
+            self.visits.feed_event(event == USES_FEED)
+        if event and self._waiting:
+            self._needed.append(np.full(self._waiting, event == USES_FEED))
+            self._waiting = 0
+
+    def add(self, reason: Reason | None, row: dict[str, object]) -> None:
+        """Add one rapid."""
+        row["reason"] = CERTAIN if reason is None else _INDEX[reason]
+        self._rows.append(row)
+        self._waiting += 1
+        self.count += 1
+        if len(self._rows) >= 4096:
+            self._flush()
+
+    def visit(self, line: int, reason: Reason | None, row: dict[str, object]) -> None:
+        """Take one pass over the block of a rapid that may run more than once."""
+        row["reason"] = CERTAIN if reason is None else _INDEX[reason]
+        row["feed_needed"] = False
+        self.visits.add(line, row)
+
+    def add_many(
+        self, columns: dict[str, object], events: NDArray[np.uint8], lines: NDArray[np.intp]
+    ) -> None:
+        """Add the rapids of a run of lines.
+
+        Parameters
+        ----------
+        columns : dict
+            Per column an array, or one value for all.
+        events : ndarray
+            What each line of the run means for F.
+        lines : ndarray
+            Index into the run of each rapid.
+        """
+        at = np.flatnonzero(events)
+        if len(at):
+            self.feed_event(int(events[at[0]]))
+            following = np.searchsorted(at, lines, side="right")
+            settled = following[following < len(at)]
+            self._needed.append(events[at[settled]] == USES_FEED)
+            self._waiting = len(lines) - len(settled)
+        else:
+            self._waiting += len(lines)
+        if not len(lines):
+            return
+        self.count += len(lines)
+        self._flush()
+        for name, value in columns.items():
+            dtype, width = _TYPES[name]
+            shape = (len(lines), width) if width else (len(lines),)
+            self._parts[name].append(np.broadcast_to(np.asarray(value, dtype=dtype), shape))
+
+    def _flush(self) -> None:
+        if not self._rows:
+            return
+        for name in self._parts:
+            if name != "feed_needed":
+                dtype, _ = _TYPES[name]
+                self._parts[name].append(np.array([row[name] for row in self._rows], dtype=dtype))
+        self._rows = []
+
+    def _merge_visits(self, columns: dict[str, NDArray[Any]]) -> None:
+        """Put the rapids of lines that were followed in the place of those that were not."""
+        if not self.visits.rows:
+            return
+        kept = ~np.isin(columns["line"], np.array(list(self.visits.rows), dtype=np.int64))
+        rows = self.visits.finish()
+        for name, (dtype, width) in _TYPES.items():
+            visited: NDArray[Any] = np.array([row[name] for row in rows], dtype=dtype)
+            if width:
+                visited = visited.reshape(len(rows), width)
+            columns[name] = np.concatenate([columns[name][kept], visited])
+        order = np.argsort(columns["line"], kind="stable")
+        for name in columns:
+            columns[name] = columns[name][order]
+
+    def finish(self) -> Rapids:
+        """All rapids, with what only the whole program tells."""
+        self._flush()
+        self._needed.append(np.zeros(self._waiting, dtype=np.bool_))
+        self._parts["feed_needed"] = list(self._needed)
+        columns: dict[str, NDArray[Any]] = {}
+        for name, (dtype, width) in _TYPES.items():
+            parts = self._parts.pop(name)
+            empty: NDArray[np.generic] = np.empty((0, width) if width else 0, dtype=dtype)
+            columns[name] = np.concatenate([empty, *parts]).astype(dtype, copy=False)
+        self._merge_visits(columns)
+        # In G93 every feed move carries its own F.
+        mode, feed = columns["feed_mode"], columns["feed"]
+        unknown = (mode == 0) | ((mode != 93) & columns["feed_needed"] & np.isnan(feed))
+        reason = columns["reason"]
+        reason[(reason == CERTAIN) & unknown] = FEED_UNKNOWN
+        if self.dark:
+            burns = columns["beam"] | (self.dark == "always")
+            reason[(reason == CERTAIN) & burns] = _INDEX[Reason.BEAM]
+        assert set(columns) == {f.name for f in fields(Rapids)}
+        return Rapids(**columns)

@@ -1,0 +1,183 @@
+"""Running one block: the modal state moves on, and a rapid is entered with its reason.
+
+Rule: whoever decides which block runs next (`reader`, `passes`, `calls`) hands it over here, so
+that a block does the same wherever it is run from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from gcodejerk.errors import Place
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.eligibility import Call, Step
+from gcodejerk.nc.interpreter.execute import Executor
+from gcodejerk.nc.interpreter.initial import initial_state
+from gcodejerk.nc.interpreter.modal import NAN, State, join
+from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog, common_columns
+from gcodejerk.nc.text.block import Line
+from gcodejerk.reasons import Reason
+from gcodejerk.start import Start
+from gcodejerk.units import SECONDS_PER_MINUTE
+
+_SHOWN = 20
+"""Lines not understood that get a finding of their own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something in a program that the user can live with."""
+
+    line: int | None
+    message: str
+    place: Place | None = None
+
+
+class Runner:
+    """Runs blocks one by one against the state that it owns."""
+
+    def __init__(self, name: str, dialect: Dialect, start: Start) -> None:
+        self.name = name
+        self.dialect = dialect
+        self.log = RapidLog()
+        state = initial_state(dialect, start)
+        self.executor = Executor(dialect, state, start)
+        self.odd_lines: list[Finding] = []
+        self.odd_count = 0
+        self.asked_distance: int | None = None
+        self.asked_feed_mode: int | None = None
+        self.call: Callable[[Call, Line], bool] | None = None
+        """Runs a subprogram; whether the program goes on behind it."""
+        self.left: Callable[[], None] = lambda: None
+        """Called where programs run that are not followed."""
+        self.observe: Callable[[Line, State], None] | None = None
+        """Called behind every line that may run more than once."""
+
+    @property
+    def state(self) -> State:
+        """The state in force."""
+        return self.executor.state
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self.executor.state = state
+
+    def run(self, line: Line, uncertain: bool = False, visit: bool = False) -> State | None:
+        """Execute a block and enter what it did.
+
+        Parameters
+        ----------
+        line : Line
+            The block.
+        uncertain : bool
+            Whether it runs is not known, nor how often.
+        visit : bool
+            It is one pass of several; what the passes have in common counts.
+
+        Returns
+        -------
+        State or None
+            Where the block ends the program, or returns from it: the state behind it. It is not
+            the one in force if the block may be skipped.
+        """
+        executor, block = self.executor, line.block
+        before = executor.state.copy() if block.block_delete else None
+        step = executor.run(block)
+        if visit and line.number in self.log.visits.rows:
+            pass  # said on the first pass
+        elif step.fault and block.problem is None:
+            self.odd(line, "the controller would refuse this combination of words")
+        elif step.unknown:
+            name = self.dialect.name
+            self.odd(line, f"{step.unknown} is a code that the dialect {name} does not know")
+        if not ((before is not None or uncertain) and step.feed_event == GIVES_FEED):
+            self.log.feed_event(step.feed_event)
+        self.log.habits |= step.habit
+        self.log.outputs |= step.outputs
+        if step.leaves:
+            self.left()
+        if step.rapid:
+            self._rapid(step, line, uncertain, visit)
+        elif visit:
+            self.log.visits.add(line.number, None)
+        goes_on = self._call(step, line, before is not None)
+        after = executor.state
+        if self.observe is not None and visit:
+            self.observe(line, after if before is None else join(before, after))
+        if before is not None:
+            executor.state = before if step.ends or not goes_on else join(before, after)
+        return after if step.ends or not goes_on else None
+
+    def _call(self, step: Step, line: Line, may_skip: bool) -> bool:
+        """Run what the block calls; whether the program goes on."""
+        if step.call is None:
+            return True
+        assert self.call is not None
+        if may_skip:
+            self.log.feed_event(USES_FEED)
+        goes_on = self.call(step.call, line)
+        if may_skip:
+            self.log.feed_event(USES_FEED)
+        return goes_on
+
+    def _rapid(self, step: Step, line: Line, uncertain: bool, visit: bool) -> None:
+        """Enter a rapid."""
+        state, reason = self.state, step.reason
+        if uncertain and reason not in (Reason.AFTER_END, Reason.BLOCK_DELETE):
+            reason = Reason.SUBPROGRAM
+        speed = NAN
+        if self.dialect.feed_on_rapids:
+            speed = state.feed * (state.unit or NAN) / SECONDS_PER_MINUTE
+            if reason is None and not speed > 0.0:
+                reason = Reason.FEED_UNKNOWN
+        if reason is None:
+            self.ask(line.number)
+        row = common_columns(state)
+        row.update(
+            line=line.number,
+            begin=line.begin,
+            end=line.begin + len(line.text),
+            terminator=line.terminator,
+            start=step.start,
+            target=step.end,
+            turned=step.turned,
+            beam=step.beam,
+            words=step.words,
+            feed=state.feed,
+            speed=speed,
+        )
+        if visit:
+            self.log.visit(line.number, reason, row)
+        else:
+            self.log.add(reason, row)
+
+    def enter_unreached(self, lines: Iterable[Line]) -> None:
+        """Enter rapids that no pass has come to, as far as they can be told."""
+        kept, self.state = self.state, self.state.copy()
+        lengths, self.executor.lengths = self.executor.lengths, {}
+        self.state.forget()
+        self.state.ended = False
+        for line in lines:
+            if line.number not in self.log.visits.rows and line.block.o_word is None:
+                step = self.executor.run(line.block)
+                if step.rapid:
+                    self._rapid(step, line, uncertain=True, visit=False)
+        self.state, self.executor.lengths = kept, lengths
+
+    def ask(self, number: int) -> None:
+        """Note the first certain rapid that rests on an assumed distance or feed mode."""
+        state = self.state
+        fixed = "distance" in state.fixed
+        if not (fixed or state.distance_stated) and self.asked_distance is None:
+            self.asked_distance = number
+        fixed = "feed_mode" in state.fixed
+        if not (fixed or state.feed_mode_stated) and self.asked_feed_mode is None:
+            self.asked_feed_mode = number
+
+    def odd(self, line: Line, problem: str, column: int | None = None) -> None:
+        """Note a line that is not understood."""
+        self.odd_count += 1
+        if len(self.odd_lines) < _SHOWN:
+            place = Place(self.name, line.number, column, line.text[:200].decode("latin-1"))
+            self.odd_lines.append(Finding(line.number, f"block not understood: {problem}", place))

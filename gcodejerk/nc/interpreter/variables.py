@@ -1,0 +1,132 @@
+"""Variables of a program: which can be known, and what a block does to them.
+
+Rule: a variable is known only while the program itself has set it, on every way that leads here.
+Variables of the control are never known, nor is what a tool change or a builder's M code, which may
+be a program, can have set.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+
+from gcodejerk.nc.dialects.dialect import LINEAR, Arithmetic
+from gcodejerk.nc.interpreter.expressions import NAN, evaluate, variable_name
+from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.text.block import Block, Word
+from gcodejerk.nc.text.cursor import LARGEST
+
+_INCREMENT_DECIMALS = (3, 4)
+"""Of the least increment: 0.001 mm or degrees, 0.0001 inch."""
+_POSITIONS = frozenset("XYZABCUVWIJKR")
+_READ = re.compile(rb"#([0-9]+|<[^<>]*>|[#\[])")
+_PREDEFINED = """
+VMAJOR VMINOR LINE MOTION_MODE PLANE CCOMP METRIC IMPERIAL ABSOLUTE INCREMENTAL INVERSE_TIME
+UNITS_PER_MINUTE UNITS_PER_REV COORD_SYSTEM TOOL_OFFSET RETRACT_R_PLANE RETRACT_OLD_Z
+SPINDLE_RPM_MODE SPINDLE_CSS_MODE IJK_ABSOLUTE_MODE LATHE_DIAMETER_MODE LATHE_RADIUS_MODE
+SPINDLE_ON SPINDLE_CW MIST FLOOD SPEED_OVERRIDE FEED_OVERRIDE ADAPTIVE_FEED FEED_HOLD FEED RPM
+X Y Z A B C U V W ABS_X ABS_Y ABS_Z ABS_A ABS_B ABS_C ABS_U ABS_V ABS_W CURRENT_TOOL
+CURRENT_POCKET SELECTED_TOOL SELECTED_POCKET VALUE VALUE_RETURNED TASK CALL_LEVEL REMAP_LEVEL
+"""
+_READ_ONLY = frozenset(_PREDEFINED.split())
+"""Global names that LinuxCNC sets by itself ("Predefined Named Parameters")."""
+
+
+def is_local(name: str, rules: Arithmetic) -> bool:
+    """Whether a variable belongs to one program or subprogram alone."""
+    if name.isdigit():
+        return 1 <= int(name) <= rules.local
+    return name.startswith("<") and not name.startswith("<_")
+
+
+def _can_be_known(name: str, rules: Arithmetic) -> bool:
+    """Whether what the program sets is what it finds later."""
+    if name.isdigit():
+        return 1 <= int(name) < rules.system
+    return not (name.startswith("<_") and name[2:-1] in _READ_ONLY)
+
+
+def assigned_values(block: Block, state: State, rules: Arithmetic) -> list[float]:
+    """Values of the assignments of a block, by the variables as they were before it."""
+    known = before_block(block, state.variables, rules)
+    return [evaluate(text, known, rules) for text in block.assigned]
+
+
+def before_block(
+    block: Block, variables: Mapping[str, float], rules: Arithmetic
+) -> Mapping[str, float]:
+    """List the variables whose value within a block is certain."""
+    if rules.together or not block.assigns:
+        return variables
+    # Is X#1 in the line of #1=5 read before or after? Not certain: neither.
+    if "" in block.assigns:
+        return {}
+    targets = set(map(_name, block.assigns))
+    return {name: value for name, value in variables.items() if name not in targets}
+
+
+def assign(block: Block, values: Iterable[float], state: State, rules: Arithmetic) -> None:
+    """Set the variables of a block."""
+    for target, value in zip(block.assigns, values, strict=True):
+        if not target:
+            state.forget_variables()
+            continue
+        name = _name(target)
+        twice = sum(_name(other) == name for other in block.assigns) > 1
+        known = _can_be_known(name, rules) and not twice
+        state.set_variable(name, value if known else NAN)
+
+
+def _name(target: str) -> str:
+    return variable_name(target.encode("latin-1"))
+
+
+def reads_feed(block: Block, rules: Arithmetic) -> bool:
+    """Whether a block reads F, or a variable that is computed and may be it."""
+    if not rules.feed:
+        return False
+    texts = [word.text for word in block.words if word.value is None]
+    texts += [*block.assigned, *block.o_arguments, *(name.arguments for name in block.names)]
+    if not any(b"#" in text for text in texts):
+        return False
+    names = {n for text in texts for n in _READ.findall(text.translate(None, b" \t").upper())}
+    return any(name in (b"#", b"[") or _name_of(name) in rules.feed for name in names)
+
+
+def _name_of(text: bytes) -> str:
+    return text.decode("latin-1").lower()
+
+
+def forget_shared(state: State, rules: Arithmetic) -> None:
+    """Forget what other programs can have set."""
+    state.forget_variables([name for name in state.variables if is_local(name, rules)])
+
+
+def word_value(word: Word, variables: Mapping[str, float], rules: Arithmetic, inch: bool) -> float:
+    """Compute the number of a word; NaN where it is not certain to the last digit that counts."""
+    text = word.text[1:] if b"=" not in word.text else word.text.partition(b"=")[2]
+    if word.function:
+        text = text.partition(b"(")[2].rstrip(b" \t").removesuffix(b")")
+    if not rules.exact and b"ROUND" in text.upper():
+        return NAN  # in a word it rounds to the least increment
+    value = evaluate(text, variables, rules)
+    if not abs(value) <= LARGEST:
+        return NAN
+    if word.letter in _POSITIONS:
+        if rules.exact:
+            return value
+        decimals = _INCREMENT_DECIMALS[inch and word.letter in LINEAR | set("IJKR")]
+        return _if_short(value, decimals)
+    if word.letter in "FS":
+        return _if_short(value, 6)
+    whole = round(value)
+    if math.isclose(value, whole, rel_tol=0.0, abs_tol=1e-9):
+        return float(whole)
+    return NAN if abs(value - whole) < 1e-3 else value
+
+
+def _if_short(value: float, decimals: int) -> float:
+    """Give a number with so few decimals; any other is not certain."""
+    short = round(value, decimals)
+    return short if abs(value - short) < 1e-9 else NAN

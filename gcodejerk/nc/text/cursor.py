@@ -1,0 +1,144 @@
+"""A cursor over one line, and the numbers and expressions that it passes over.
+
+Rule: an expression is passed over, not computed (`expressions` does that when the block runs); here
+only its end is found.
+"""
+
+from __future__ import annotations
+
+import re
+
+from gcodejerk.nc.dialects.dialect import Text
+
+LARGEST = 1e9
+"""Numbers beyond this are not understood: no machine has such an axis."""
+
+BLANKS = re.compile(rb"[ \t]*")
+SHAPE = re.compile(rb"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+CLOSED_NUMBER = re.compile(rb"[-+]?[ \t]*[0-9.]*")
+_UNSIGNED = re.compile(rb"[0-9]+(?:\.[0-9]*)?")
+_OPERATOR_TEXT = re.compile(rb"[ \t]*([A-Za-z][A-Za-z \t]*?)[ \t]*(?=\[)")
+_OPERATOR = re.compile(rb"[ \t]*(?:[*/]|[-+]|MOD|AND|OR|XOR)(?=[-+#\[0-9. \tA-Z])", re.IGNORECASE)
+_FUNCTIONS = frozenset(
+    b"abs acos asin atan cos exists exp fix fup ln round sin sqrt tan".upper().split()
+)
+_NUMBER = re.compile(rb"[-+]?[0-9. \t]*")
+
+
+class Odd(Exception):  # noqa: N818 - not an error of ours: a place in the line
+    """A problem and where it is, from 0."""
+
+    def __init__(self, problem: str, at: int) -> None:
+        super().__init__(problem)
+        self.problem = problem
+        self.at = at
+
+
+class Cursor:
+    """A place in a line."""
+
+    __slots__ = ("assigned", "assigns", "at", "rules", "text")
+
+    def __init__(self, text: bytes, rules: Text) -> None:
+        self.text = text
+        self.rules = rules
+        self.at = 0
+        self.assigns: list[str] = []
+        self.assigned: list[bytes] = []
+
+    def skip(self) -> bytes:
+        """Pass over blanks; the next byte, empty at the end."""
+        self.at = BLANKS.match(self.text, self.at).end()  # type: ignore[union-attr]
+        return self.text[self.at : self.at + 1]
+
+    def number(self) -> float | None:
+        """Read the number that begins here; None for an expression."""
+        begin = self.at
+        byte = self.skip()
+        if byte in (b"+", b"-"):
+            after = BLANKS.match(self.text, self.at + 1).end()  # type: ignore[union-attr]
+            if self.text[after : after + 1] in (b"#", b"["):
+                self.at = after
+                byte = self.text[after : after + 1]
+        if byte in (b"#", b"[") or byte.isalpha():
+            if self.rules.variables != "#":
+                raise Odd("a number is missing", begin)
+            self.operand()
+            return None
+        pattern = _NUMBER if self.rules.blanks == "anywhere" else CLOSED_NUMBER
+        match = pattern.match(self.text, self.at)
+        assert match is not None
+        digits = match[0].replace(b" ", b"").replace(b"\t", b"")
+        if not SHAPE.fullmatch(digits):
+            shown = digits.decode("latin-1")
+            what = f"'{shown}' is not a number" if shown else "a number is missing"
+            raise Odd(what, begin)
+        value = float(digits)
+        if not abs(value) <= LARGEST:
+            raise Odd(f"'{digits.decode()}' is beyond any machine", begin)
+        self.at = match.start() + len(match[0].rstrip(b" \t"))
+        return value
+
+    def operand(self) -> None:
+        """Pass over ``#...``, ``[...]`` or ``function[...]``."""
+        while (byte := self.skip()) == b"#":
+            self.at += 1
+        if byte == b"[":
+            self.bracket()
+        elif byte == b"<":
+            end = self.text.find(b">", self.at)
+            if end < 0:
+                raise Odd("name is not closed", self.at)
+            self.at = end + 1
+        elif byte.isdigit():
+            match = _UNSIGNED.match(self.text, self.at)
+            assert match is not None
+            self.at = match.end()
+        elif match := _OPERATOR_TEXT.match(self.text, self.at):
+            name = match[1].replace(b" ", b"").replace(b"\t", b"").upper()
+            if name not in _FUNCTIONS:
+                raise Odd("function is not known", self.at)
+            self.at = match.end()
+            self.bracket()
+            if name == b"ATAN" and self.skip() == b"/":
+                self.at += 1
+                self.skip()
+                self.bracket()
+        else:
+            raise Odd("a number is missing", self.at)
+
+    def bracket(self) -> None:
+        """Pass over an expression in square brackets."""
+        text, begin = self.text, self.at
+        if text[begin : begin + 1] != b"[":
+            raise Odd("expression expected", begin)
+        depth = 0
+        for at in range(begin, len(text)):
+            byte = text[at]
+            depth += (byte == 0x5B) - (byte == 0x5D)
+            if byte in b"(;":
+                break
+            if depth == 0:
+                self.at = at + 1
+                return
+        raise Odd("expression is not closed", begin)
+
+    def assignment(self) -> None:
+        """Pass over ``#target = value``."""
+        self.at += 1
+        begin = self.at
+        self.operand()
+        name = self.text[begin : self.at].strip(b" \t")
+        known = name.isdigit() or (name.startswith(b"<") and name.endswith(b">"))
+        self.assigns.append(name.decode("latin-1") if known else "")
+        self.assigned.append(b"")
+        if self.skip() != b"=":
+            raise Odd("assignment without =", self.at)
+        self.at += 1
+        begin = self.at
+        self.number()
+        if self.rules.open_expressions:
+            while match := _OPERATOR.match(self.text, self.at):
+                self.at = match.end()
+                self.number()
+        self.assigned[-1] = self.text[begin : self.at]

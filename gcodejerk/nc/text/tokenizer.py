@@ -1,0 +1,367 @@
+"""The careful reading of one line: every byte is accounted for, and what cannot be is named.
+
+Rule: it never raises. A line that the controller would refuse becomes a block with a `problem`,
+its column, and the words in front of it.
+
+The grammar is RS274/NGC's: words of a letter and a number without exponent, in any case. What
+differs between dialects (comments, block delete, blanks within numbers, names, ``X=5``) is asked of
+`Dialect.text`.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.text.block import Block, Name, Word
+from gcodejerk.nc.text.cursor import BLANKS, CLOSED_NUMBER, LARGEST, SHAPE, Cursor, Odd
+
+CHECKSUM = "*"
+"""Name of a checksum among the names of a block."""
+_WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[0-9.]+)[ \t]*(?![-+0-9. \t#\[=])")
+_IDENTIFIER = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
+_INDEX = re.compile(rb"[0-9]*")
+_FUNCTION = re.compile(rb"(IC|AC|DC|ACP|ACN)[ \t]*\(", re.IGNORECASE)
+_TO_BLANK = re.compile(rb"[^ \t;]*")
+_TO_COMMENT = re.compile(rb"[^;]*")
+_CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
+_KEYWORD = re.compile(rb"[A-Za-z]*")
+_ACTIVE = re.compile(rb"[ \t]*py[ \t]*,", re.IGNORECASE)
+_BLOCK = re.compile(
+    rb"[ \t]*(?:[A-Z][ \t]*[-+]?[0-9.]+[ \t]*)+(?:[;(].*)?|.*[#=\[].*", re.IGNORECASE
+)
+"""Text that a control may run: words, or an assignment."""
+_STRING = re.compile(rb'"[^"]*"')
+_HEXADECIMAL = re.compile(rb"[A-Z][ \t]*[-+]?0[Xx]", re.IGNORECASE)
+
+
+class _Line(Cursor):
+    """A cursor over one line."""
+
+    __slots__ = (
+        *("comments", "delete", "dialect", "names", "o_arguments", "o_name", "o_word", "percent"),
+        "words",
+    )
+
+    def __init__(self, text: bytes, dialect: Dialect) -> None:
+        super().__init__(text, dialect.text)
+        self.dialect = dialect
+        self.words: list[Word] = []
+        self.comments: list[tuple[int, int]] = []
+        self.o_arguments: list[bytes] = []
+        self.names: list[Name] = []
+        self.o_word: str | None = None
+        self.o_name = ""
+        self.delete = False
+        self.percent = False
+
+    def comment(self) -> None:
+        """Pass over the comment that begins here."""
+        begin, text = self.at, self.text
+        if text[begin] == 0x28:  # (
+            end = text.find(b")", begin)
+            strict = self.rules.parentheses == "comment"
+            if end < 0 and strict:
+                raise Odd("comment is not closed", begin)
+            if strict and text.find(b"(", begin + 1, end) >= 0:
+                raise Odd("comment within a comment", text.find(b"(", begin + 1))
+            self.at = end + 1 if end >= 0 else len(text)
+        else:
+            self.at = len(text)
+        if self.rules.python and _ACTIVE.match(text, begin + 1):
+            raise Odd("comment runs Python", begin)
+        self.comments.append((begin, self.at))
+
+    def flow(self) -> None:
+        """Pass over an O-word: its name, its keyword, and whatever belongs to that."""
+        self.at += 1
+        begin = self.at
+        self.skip()
+        self.operand()
+        self.o_name = self.text[begin : self.at].replace(b" ", b"").decode("latin-1").lower()
+        self.skip()
+        match = _KEYWORD.match(self.text, self.at)
+        assert match is not None
+        self.o_word = match[0].decode().lower()
+        self.at = match.end()
+        if self.o_word and self.rules.o_word == "program":
+            raise Odd("text after the number of a program", match.start())
+        while byte := self.skip():
+            if byte in b"(;":
+                self.comment()
+            elif byte == b"[":
+                begin = self.at
+                self.bracket()
+                self.o_arguments.append(self.text[begin : self.at])
+            else:
+                raise Odd("text after an O-word", self.at)
+
+    def word(self) -> None:
+        """Take one word."""
+        begin = self.at
+        letter = self.text[begin : begin + 1].decode().upper()
+        if letter == "N" and (self.words or self.comments or self.names):
+            raise Odd("N stands behind something else", begin)
+        match = _WORD.match(self.text, begin)
+        function = ""
+        if self.rules.hexadecimal and _HEXADECIMAL.match(self.text, begin):
+            raise Odd("0X begins a hexadecimal number", self.at)
+        if match and SHAPE.fullmatch(match[2]):  # the usual case, made quick
+            self.at = match.end(2)
+            value: float | None = float(match[2])
+            if not -LARGEST <= value <= LARGEST:  # type: ignore[operator]
+                raise Odd(f"'{match[2].decode()}' is beyond any machine", begin + 1)
+        else:
+            self.at = begin + 1
+            if self.rules.equals and self._equals(letter):
+                if letter == "R" and self.rules.variables == "R":
+                    self.assigns.append(self.text[begin : self.at].split(b"=")[0].decode().upper())
+                    at = self.at
+                    self._value()
+                    self.assigned.append(self.text[at : self.at])
+                    return
+                function = self._function()
+                value = self._value()
+                if function:
+                    self._close()
+            else:
+                value = self.number()
+        if letter == "N" and (value is None or not self.text[begin + 1 :].lstrip()[:1].isdigit()):
+            raise Odd("N without a plain number", begin)
+        text = self.text[begin : self.at]
+        whole = value is not None and b"." not in text
+        self.words.append(Word(letter, value, begin, self.at, text, whole, function))
+
+    def _equals(self, letter: str) -> bool:
+        """Pass over an index and ``=``, where that stands here: the 1 of ``T1=5``."""
+        match = _INDEX.match(self.text, self.at)
+        assert match is not None
+        after = BLANKS.match(self.text, match.end()).end()  # type: ignore[union-attr]
+        if self.text[after : after + 1] != b"=":
+            return False
+        if match[0] and letter not in "TSMDHR" and self.rules.variables == "R":
+            raise Odd("axis with a number: not known here", self.at)
+        self.at = after + 1
+        self.skip()
+        return True
+
+    def _function(self) -> str:
+        """Pass over ``IC(`` or its kin; which it is."""
+        match = _FUNCTION.match(self.text, self.at)
+        if not match:
+            return ""
+        self.at = match.end()
+        self.skip()
+        return match[1].decode().upper()
+
+    def _value(self) -> float | None:
+        """Read what follows ``=``: a number, or an expression up to the next blank."""
+        match = CLOSED_NUMBER.match(self.text, self.at)
+        assert match is not None
+        after = self.text[match.end() : match.end() + 1]
+        ends = not after or after in b" \t;)" or after.isalpha()
+        if ends and SHAPE.fullmatch(match[0]):
+            return self.number()
+        if self.rules.strings and (match := _STRING.match(self.text, self.at)):
+            self.at = match.end()
+            return None
+        match = _TO_BLANK.match(self.text, self.at)
+        assert match is not None
+        if not match[0]:
+            raise Odd("a value is missing", self.at)
+        self.at = match.end() - (match[0].endswith(b")") and match[0].count(b"(") == 0)
+        return None
+
+    def _close(self) -> None:
+        if self.skip() != b")":
+            raise Odd("parenthesis is not closed", self.at)
+        self.at += 1
+
+    def name(self) -> bool:
+        """Take a word with a name, if one stands here."""
+        match = _IDENTIFIER.match(self.text, self.at)
+        if not match:
+            return False
+        self.at = match.end()
+        name, begin = match[0].decode().upper(), self.at
+        if self.dialect.one_command:
+            self.at = len(self.text)  # all that follows belongs to the command
+        elif self.dialect.names.get(name) == "flow" and self.skip() != b":":
+            self.at = _TO_COMMENT.match(self.text, self.at).end()  # type: ignore[union-attr]
+        elif self.skip() == b"(":
+            self._arguments()
+        elif self.text[self.at : self.at + 1] == b"=":
+            self.at += 1
+            self.skip()
+            if name == "CR":  # the radius of an arc
+                value = self._value()
+                text = self.text[match.start() : self.at]
+                self.words.append(Word("R", value, match.start(), self.at, text))
+                return True
+            self._value()
+        elif self.text[self.at : self.at + 1] == b":":
+            self.at += 1
+            self.names.append(Name("", match[0]))  # a label: a place that jumps may lead to
+            return True
+        else:
+            self.at = begin
+        self.names.append(Name(name, self.text[begin : self.at]))
+        return True
+
+    def _arguments(self) -> None:
+        """Pass over ``( ... )``, quoted text in it included."""
+        depth, quoted, begin = 0, False, self.at
+        for at in range(begin, len(self.text)):
+            byte = self.text[at]
+            if byte == 0x22:
+                quoted = not quoted
+            elif not quoted:
+                depth += (byte == 0x28) - (byte == 0x29)
+                if depth == 0:
+                    self.at = at + 1
+                    return
+        raise Odd("parenthesis is not closed", begin)
+
+    def keyword(self) -> bool:
+        """Take a keyword of program flow and all that follows it, if one stands here."""
+        pattern = _keywords(self.rules.keywords)
+        match = pattern.match(self.text, self.at) if pattern else None
+        if not match:
+            return False
+        self.names.append(Name(match[1].decode().upper(), self.text[match.end() :]))
+        self.at = len(self.text)
+        return True
+
+    def delete_mark(self) -> bool:
+        """Pass over a ``/`` and its level, if it stands where the dialect has it."""
+        where = self.rules.delete
+        if where == "ignored":
+            self.at += 1
+            return True
+        behind = any(word.letter != "N" for word in self.words) or self.names or self.comments
+        if where == "none" or behind or self.delete or (where == "first" and self.words):
+            return False
+        self.at += 1
+        self.delete = True
+        level = self.text[self.at : self.at + 1]
+        if where == "numbered" and level.isdigit():
+            self.at += 1
+        return True
+
+    def percent_mark(self) -> None:
+        """Take a ``%``, with a name where the dialect gives it one."""
+        rules, text = self.rules, self.text
+        if rules.percent == "error":
+            raise Odd("'%' has no meaning here", self.at)
+        if rules.percent == "lone":
+            if text.strip(b" \t") != b"%":
+                raise Odd("text on the line of %", self.at + 1)
+            self.at = len(text)
+        elif any(word.letter != "N" for word in self.words):
+            raise Odd("% behind other words", self.at)
+        else:
+            self.at = _TO_BLANK.match(text, self.at).end()  # type: ignore[union-attr]
+        self.percent = True
+
+    def rest(self) -> None:
+        """Take what stands here, until nothing is left."""
+        rules, text = self.rules, self.text
+        byte = text[self.at : self.at + 1]
+        if byte.isalpha() or (byte == b"_" and rules.names):
+            leads = all(word.letter == "N" for word in self.words) and not self.names
+            if byte in b"Oo" and leads and rules.o_word != "error":
+                self.flow()
+            elif not (rules.keywords and self.keyword()) and not (rules.names and self.name()):
+                self.word()
+        elif (
+            (byte == b"(" and rules.parentheses != "code")
+            or (byte == b";" and rules.semicolon == "comment")
+            or (rules.slashes and text.startswith(b"//", self.at))
+        ):
+            self.comment()
+        elif byte == b";" and rules.semicolon == "end":
+            if _BLOCK.fullmatch(text, self.at + 1):
+                raise Odd("another block behind the end of the block", self.at + 1)
+            self.comments.append((self.at, len(text)))
+            self.at = len(text)
+        elif byte == b"#" and rules.variables == "#":
+            self.assignment()
+        elif byte == b"/" and self.delete_mark():
+            pass
+        elif byte == b"%":
+            self.percent_mark()
+        elif byte == b"$" and "$" in self.dialect.names:
+            end = _TO_COMMENT.match(text, self.at).end()  # type: ignore[union-attr]
+            self.names.append(Name("$", text[self.at : end]))
+            self.at = end
+        elif byte == b":" and rules.o_word == "program" and not self.words:
+            self.flow()
+        elif rules.checksum and _CHECKSUM.fullmatch(text, self.at):
+            self.names.append(Name(CHECKSUM, text[self.at :]))
+            self.at = len(text)
+        elif rules.end and text.startswith(rules.end, self.at):
+            self.at += len(rules.end)
+            if self.skip() not in (b"", b";"):
+                raise Odd("text behind the end of the block", self.at)
+        else:
+            raise Odd(f"{_shown(byte)} has no meaning here", self.at)
+
+
+@lru_cache(maxsize=16)
+def _keywords(words: tuple[str, ...]) -> re.Pattern[bytes] | None:
+    """Any of these words, not followed by another letter."""
+    if not words:
+        return None
+    every = b"|".join(word.encode() for word in sorted(words, key=len, reverse=True))
+    return re.compile(rb"(" + every + rb")(?![A-Za-z_])", re.IGNORECASE)
+
+
+def _shown(byte: bytes) -> str:
+    """A byte in a message: itself, or its number where it would not be seen."""
+    return f"'{byte.decode()}'" if 0x20 < byte[0] < 0x7F else f"byte 0x{byte[0]:02x}"
+
+
+def parse_line(text: bytes, dialect: Dialect) -> Block:
+    """Read one line without its line end.
+
+    Parameters
+    ----------
+    text : bytes
+        The line.
+    dialect : Dialect
+        How it is written.
+
+    Returns
+    -------
+    Block
+        With a `problem` where the controller would refuse the line.
+    """
+    text = text.rstrip(b"\r")  # CR CR LF, which a transfer in text mode makes of CR LF
+    line = _Line(text, dialect)
+    problem, column, rest, mark = None, None, b"", 0
+    limit = dialect.text.line_limit
+    try:
+        if len(text) > limit and text.strip(b" \t") != b"%":
+            line.skip()
+            raise Odd(f"line is longer than {limit} bytes", limit)
+        while line.skip():
+            mark = line.at
+            line.rest()
+    except Odd as odd:
+        problem, column, rest = odd.problem, odd.at + 1, text[mark:]
+    return Block(
+        tuple(line.words),
+        tuple(line.comments),
+        line.delete,
+        line.o_word,
+        line.o_name,
+        line.percent,
+        tuple(line.assigns),
+        tuple(line.assigned),
+        tuple(line.o_arguments),
+        rest,
+        problem,
+        column,
+        tuple(line.names),
+    )
