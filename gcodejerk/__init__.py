@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from gcodejerk.motion import residual_acceleration
     from gcodejerk.motion.amplitudes import residual
     from gcodejerk.motion.maps import amplitude_map
-    from gcodejerk.move import Plan, plan_move
     from gcodejerk.pipeline import Result, process
+    from gcodejerk.planning.move import Plan, plan_move
     from gcodejerk.verification import Verification, verify
 
 _HOMES = {
@@ -43,7 +43,7 @@ _HOMES = {
     "gcodejerk.motion": ("residual_acceleration",),
     "gcodejerk.motion.amplitudes": ("residual",),
     "gcodejerk.motion.maps": ("amplitude_map",),
-    "gcodejerk.move": ("Plan", "plan_move"),
+    "gcodejerk.planning.move": ("Plan", "plan_move"),
     "gcodejerk.pipeline": ("Result", "process"),
     "gcodejerk.verification": ("Verification", "verify"),
 }  # fmt: skip

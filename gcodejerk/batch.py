@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import BinaryIO
 
-from gcodejerk.designs import known_limits
 from gcodejerk.errors import EmitError, GcodejerkError
 from gcodejerk.files import (
     STANDARD,
@@ -34,6 +33,7 @@ from gcodejerk.files import (
 )
 from gcodejerk.machine import Machine
 from gcodejerk.pipeline import Progress, Result, Settings, process_file, silent
+from gcodejerk.planning.designs import known_limits
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line, whole_line

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
 from gcodejerk.cycles.expansion import Expansion
-from gcodejerk.dogleg import dogleg_notes, path_deviation
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
@@ -33,11 +32,12 @@ from gcodejerk.foreign import HEAD, refuse_foreign
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
-from gcodejerk.plan import plan_rapids
-from gcodejerk.plans import Plans
-from gcodejerk.settling import Left, left_alone
+from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
+from gcodejerk.planning.plan import plan_rapids
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.settling import Left, left_alone
+from gcodejerk.planning.stream import Residuals, make_streams
 from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
-from gcodejerk.stream import Residuals, make_streams
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
 
 Progress = Callable[[str, int, int], None]

@@ -22,7 +22,7 @@ from gcodejerk.errors import EmitError
 from gcodejerk.expanded import TERMINATOR_LENGTH
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program
-from gcodejerk.stream import Batch
+from gcodejerk.planning.stream import Batch
 
 COPY_SIZE = 1 << 20
 STAMP_LENGTH = 67

@@ -12,7 +12,7 @@ from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_mac
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
-    from gcodejerk.survey import Survey
+    from gcodejerk.studies.amplitude_map import Survey
 
 CONDITIONS = ("I", "II", "III")
 TABLE = ".csv"
@@ -50,7 +50,7 @@ def plan(
 ) -> None:
     """Plan one move: its profile, peaks and residuals, the conventional ones beside it."""
     from gcodejerk.files import new_file
-    from gcodejerk.move import plan_move
+    from gcodejerk.planning.move import plan_move
     from gcodejerk.report.records import conventional_motion, dump, move_record, stream_csv
     from gcodejerk.report.tables import move_limit, move_tables
 
@@ -166,11 +166,11 @@ def compare(
     ] = None,
 ) -> None:
     """Compare every profile and shaper on one move: time, peaks, vibration, settling."""
-    from gcodejerk.comparison import compare_move
     from gcodejerk.files import new_file
     from gcodejerk.report.compare_record import compare_record
     from gcodejerk.report.compare_table import compare_notes, compare_table
     from gcodejerk.report.records import dump
+    from gcodejerk.studies.comparison import compare_move
 
     damping = _damping(shaper_damping)
     if plot is not None and Path(plot).suffix.lower() not in FIGURES:
@@ -219,7 +219,7 @@ def _survey(
     machine: Machine, axis: str, length: float, condition: str, mode: str | None, table: bool
 ) -> Survey:
     """The survey of the mode that was asked for, or of the one that the output is best made of."""
-    from gcodejerk.survey import ALL, Survey
+    from gcodejerk.studies.amplitude_map import ALL, Survey
 
     survey = Survey.of(machine, axis, length, condition, mode or ALL)
     if mode is not None or not (table or len(survey.modes) == 1):

@@ -21,8 +21,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import DIALECTS, Dialect, Rapids
-from gcodejerk.plans import Plans
-from gcodejerk.stream import Batch, Spelling
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.stream import Batch, Spelling
 from gcodejerk.units import MM_PER_INCH
 
 GROUP = "gcodejerk.controllers"

@@ -18,8 +18,8 @@ from gcodejerk.emit.base import Form, Options, decimal_step, step_sizes
 from gcodejerk.emit.digits import Column, format_lines
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
-from gcodejerk.plans import Plans
-from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.stream import FINE_DECIMALS, Batch, Spelling
 
 
 class CsvController:

@@ -38,8 +38,8 @@ from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
 from gcodejerk.nc.dialects.dialect import Writing, code_name
-from gcodejerk.plans import Plans
-from gcodejerk.stream import FINE_DECIMALS, Batch, Spelling
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.stream import FINE_DECIMALS, Batch, Spelling
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002

@@ -13,7 +13,7 @@ from gcodejerk.emit.base import Form
 from gcodejerk.emit.gcode import GcodeController
 from gcodejerk.machine import LINUXCNC
 from gcodejerk.nc import Rapids
-from gcodejerk.plans import Plans
+from gcodejerk.planning.plans import Plans
 
 STREAMS_NEED = 1.05
 """MAX_ACCELERATION over the largest acceleration of a stream, played: 1.05 to 4 times."""

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from gcodejerk.arrival import arrival_response
 from gcodejerk.axes import AXES
-from gcodejerk.comparison import Comparison, Contender
 from gcodejerk.machine import Mode
 from gcodejerk.motion import laws_response, mode_poles
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.shapers import SHAPERS
+from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.report.figures import acceleration_curve, new_figure
+from gcodejerk.studies.comparison import Comparison, Contender
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk._version import __version__
-from gcodejerk.arrival import BANDS
 from gcodejerk.axes import AXES
-from gcodejerk.comparison import CONTENDERS, QUANTITIES, Comparison, Contender
+from gcodejerk.planning.arrival import BANDS
 from gcodejerk.report.records import Record, number
+from gcodejerk.studies.comparison import CONTENDERS, QUANTITIES, Comparison, Contender
 
 MOST_SEGMENTS = 400
 """More segments than these say nothing to anyone."""

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from rich.table import Table
 from rich.text import Text
 
-from gcodejerk.arrival import BANDS
-from gcodejerk.comparison import DESIGNED, NEEDS_SOLVER, Comparison, Contender
 from gcodejerk.motion.shapers import SHAPERS
+from gcodejerk.planning.arrival import BANDS
 from gcodejerk.report.compare_record import axis_peaks
 from gcodejerk.report.tables import MS_PER_S, UM_PER_MM, bare_table
+from gcodejerk.studies.comparison import DESIGNED, NEEDS_SOLVER, Comparison, Contender
 
 NEVER = "never"
 UNKNOWN = "-"

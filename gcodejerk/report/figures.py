@@ -14,7 +14,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
 from gcodejerk.motion import sample_laws
 from gcodejerk.motion.profiles.laws import Array, Laws
-from gcodejerk.move import Plan
+from gcodejerk.planning.move import Plan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.survey import Survey
+from gcodejerk.studies.amplitude_map import Survey
 
 Array = NDArray[np.float64]
 

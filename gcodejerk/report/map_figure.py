@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.report.figures import new_figure
-from gcodejerk.survey import Chosen, Survey
+from gcodejerk.studies.amplitude_map import Chosen, Survey
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
-from gcodejerk.designs import known_limits
-from gcodejerk.dogleg import arrivals, dogleg_notes, path_deviation
 from gcodejerk.machine import Machine
 from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.profiles.laws import Array
-from gcodejerk.move import Plan
 from gcodejerk.nc import Rapids
 from gcodejerk.pipeline import Result
-from gcodejerk.plans import Plans
+from gcodejerk.planning.designs import known_limits
+from gcodejerk.planning.independent_axes import arrivals, dogleg_notes, path_deviation
+from gcodejerk.planning.move import Plan
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.settling import Left, settling_times
 from gcodejerk.reasons import REASONS
-from gcodejerk.settling import Left, settling_times
 
 Record = dict[str, Any]
 DIGITS = 10

@@ -17,7 +17,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from gcodejerk.motion.profiles.conditions import Peaks
-    from gcodejerk.survey import Survey
+    from gcodejerk.studies.amplitude_map import Survey
 
 UM_PER_MM = 1000.0
 MS_PER_S = 1000.0

@@ -15,8 +15,8 @@ from timing import best_of
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.plan import plan_moves
-from gcodejerk.solutions import VARIABLE
+from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.solution_cache import VARIABLE
 
 
 def moves(machine, axes, count, longest):

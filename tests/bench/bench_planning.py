@@ -14,8 +14,8 @@ from timing import best_of
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.plan import plan_moves
-from gcodejerk.stream import Spelling, make_streams
+from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.stream import Spelling, make_streams
 
 
 def moves(machine, axes, count, longest):

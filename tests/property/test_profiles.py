@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.axes import AXES
-from gcodejerk.plan import plan_moves
+from gcodejerk.planning.plan import plan_moves
 from gcodejerk.testing import machines
 
 MOVES = 50

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
-from gcodejerk.move import plan_move
+from gcodejerk.planning.move import plan_move
 from gcodejerk.testing import assert_stream_valid, machines, moves
 
 # A machine is a large thing to shrink: minutes for a smaller example that says no more.

@@ -39,7 +39,7 @@ from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.pipeline import process
-from gcodejerk.plan import PROFILES
+from gcodejerk.planning.plan import PROFILES
 from gcodejerk.testing.machines import machines
 from gcodejerk.verification import Kind, verify, verify_csv
 

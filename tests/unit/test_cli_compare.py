@@ -11,8 +11,8 @@ import jsonschema
 import numpy as np
 import pytest
 
-from gcodejerk.comparison import CONTENDERS
 from gcodejerk.machine import find_machine
+from gcodejerk.studies.comparison import CONTENDERS
 
 SCHEMA = json.loads(files("gcodejerk.report").joinpath("compare.schema.json").read_text())
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from gcodejerk.comparison import CONTENDERS, compare_move
 from gcodejerk.errors import MachineError, PlanError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.report.compare_record import compare_record
 from gcodejerk.report.compare_table import compare_notes
 from gcodejerk.report.records import dump
+from gcodejerk.studies.comparison import CONTENDERS, compare_move
 
 SCHEMA = json.loads(files("gcodejerk.report").joinpath("compare.schema.json").read_text())
 RATIO = {"rel": 1e-3}

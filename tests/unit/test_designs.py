@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from gcodejerk.axes import AXES
-from gcodejerk.designs import Task, bounds, known_limits, least_residuals, worst_in_band
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import laws_response, mode_poles
 from gcodejerk.motion.search.optimal import Move, least_residual
-from gcodejerk.move import plan_move
-from gcodejerk.plan import PROFILES, plan_moves
-from gcodejerk.plans import Modes
+from gcodejerk.planning.designs import Task, bounds, known_limits, least_residuals, worst_in_band
+from gcodejerk.planning.move import plan_move
+from gcodejerk.planning.plan import PROFILES, plan_moves
+from gcodejerk.planning.plans import Modes
 from gcodejerk.report.records import move_record
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -176,7 +176,7 @@ def test_without_the_solver_a_bound_is_unknown_and_the_plan_is_not(monkeypatch):
     def missing():
         raise PlanError("no solver", "install it")
 
-    monkeypatch.setattr("gcodejerk.designs.require_solver", missing)
+    monkeypatch.setattr("gcodejerk.planning.designs.require_solver", missing)
     plan = plan_move({"Z": 1.0}, VMC)
     assert known_limits(plan.plans) is None
     assert move_record(plan)["rapids"][0]["limit"] is None

@@ -19,10 +19,8 @@ ROOT = Path(gcodejerk.__file__).parent
 PICTURE = """
     _version axes errors units reasons start foreign advice
  <- nc | machine | motion
- <- cycles
- <- plans today solutions optima designs refusals plan stream move survey arrival
-    comparison dogleg settling
- <- emit | verification | testing
+ <- cycles | planning
+ <- studies | emit | verification | testing
  <- expanded splice
  <- pipeline
  <- report
@@ -41,7 +39,7 @@ PLACE = {
 }
 """Layer and side of the bar, by module or subpackage."""
 NEVER = {
-    "verification": {"motion", "plans", "plan", "stream", "move", "emit"},
+    "verification": {"motion", "planning", "emit"},
     "emit": {"verification", "report"},
 }
 """What the picture alone would allow, or what matters enough to be said twice."""
@@ -56,8 +54,8 @@ FOREIGN = {
     "hypothesis": {"testing"},
     "scipy": {"motion"},
     "clarabel": {"motion"},
-    "platformdirs": {"solutions"},
-    "threadpoolctl": {"optima", "motion"},
+    "platformdirs": {"planning"},
+    "threadpoolctl": {"planning", "motion"},
 }
 """Packages that only these parts may import; numpy is everyone's."""
 
@@ -82,7 +80,7 @@ def imports(path):
             home = package[: len(package) - node.level + 1] if node.level else ()
             module = ".".join([*home, *([node.module] if node.module else [])])
             yield module
-            # `from gcodejerk import plan` imports a module too.
+            # `from gcodejerk import planning` imports a module too.
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
@@ -124,15 +122,14 @@ def test_imports_point_left(path):
         ("machine", "nc"),
         ("motion", "nc"),
         ("motion", "machine"),
-        ("motion", "plan"),
+        ("motion", "planning"),
         ("start", "nc"),
         ("verification", "motion"),
-        ("verification", "plan"),
-        ("verification", "stream"),
+        ("verification", "planning"),
         ("verification", "emit"),
         ("emit", "verification"),
         ("emit", "report"),
-        ("plan", "emit"),
+        ("planning", "emit"),
         ("pipeline", "cli"),
         ("errors", "nc"),
     ],
@@ -159,11 +156,11 @@ def test_imports_are_found_however_they_are_written(tmp_path, monkeypatch):
     module.parent.mkdir(parents=True)
     module.write_text(
         "from gcodejerk import plan\n"
-        "import gcodejerk.stream as s\n"
+        "import gcodejerk.planning.stream as s\n"
         "def later():\n    from ..motion.laws import Laws\n"
         "if False:\n    from .. import emit\n"
     )
-    assert own_parts(module) == {"plan", "stream", "motion", "emit"}
+    assert own_parts(module) == {"planning", "studies", "motion", "emit"}
 
 
 def test_other_packages_stay_where_they_belong():
@@ -190,7 +187,7 @@ def test_importing_the_package_loads_none_of_it():
 
 def test_planning_and_processing_load_no_command_line_figures_or_test_tools():
     loaded = loaded_by("import gcodejerk\ngcodejerk.plan_move, gcodejerk.process")
-    assert {"gcodejerk.plan", "gcodejerk.pipeline", "numpy"} <= loaded
+    assert {"gcodejerk.planning.plan", "gcodejerk.pipeline", "numpy"} <= loaded
     assert not loaded & {"matplotlib", "scipy", "typer", "rich", "hypothesis", "pytest"}
 
 

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gcodejerk.designs import Task
 from gcodejerk.machine import BELL, LINUXCNC, Machine, MachineFileError, machine_yaml
 from gcodejerk.motion import laws_response, mode_poles
-from gcodejerk.move import plan_move
 from gcodejerk.pipeline import process
-from gcodejerk.plans import Modes
+from gcodejerk.planning.designs import Task
+from gcodejerk.planning.move import plan_move
+from gcodejerk.planning.plans import Modes
 
 HEAD = "interval: 0.001\npositioning: linear\n"
 

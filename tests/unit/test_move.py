@@ -6,7 +6,7 @@ import pytest
 from gcodejerk.errors import MachineError, PlanError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import mode_poles, polyline_response
-from gcodejerk.move import plan_move
+from gcodejerk.planning.move import plan_move
 
 PAPER = Machine.load(find_machine("paper"))
 VMC = Machine.load(find_machine("centre"))

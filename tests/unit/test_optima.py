@@ -5,12 +5,12 @@ import builtins
 import numpy as np
 import pytest
 
-from gcodejerk import optima
 from gcodejerk.errors import PlanError
 from gcodejerk.motion import mode_poles
 from gcodejerk.motion.search.optimal import Move
-from gcodejerk.optima import Question, answers
-from gcodejerk.solutions import VARIABLE, cache_file, read_solutions, write_solutions
+from gcodejerk.planning import optima
+from gcodejerk.planning.optima import Question, answers
+from gcodejerk.planning.solution_cache import VARIABLE, cache_file, read_solutions, write_solutions
 
 MS = 0.001
 

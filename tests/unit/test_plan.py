@@ -10,8 +10,8 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import Laws, laws_response, mode_poles
 from gcodejerk.nc import read_program
-from gcodejerk.plan import MOST_INTERVALS, plan_moves, plan_rapids
-from gcodejerk.plans import path_length
+from gcodejerk.planning.plan import MOST_INTERVALS, plan_moves, plan_rapids
+from gcodejerk.planning.plans import path_length
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 Z_AXIS = "{resolution: 1.0e-4, rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}"

@@ -8,8 +8,8 @@ import jsonschema
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.move import plan_move
 from gcodejerk.pipeline import process
+from gcodejerk.planning.move import plan_move
 from gcodejerk.reasons import Reason
 from gcodejerk.report.records import dump, move_record, process_record, stream_csv
 

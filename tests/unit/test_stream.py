@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcodejerk import stream
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion import polyline_response, sample_laws
-from gcodejerk.move import plan_move
-from gcodejerk.plan import plan_moves
+from gcodejerk.planning import stream
+from gcodejerk.planning.move import plan_move
+from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.stream import FINE_DECIMALS, Spelling, make_streams
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
-from gcodejerk.stream import FINE_DECIMALS, Spelling, make_streams
 
 MACHINE = Machine.loads(
     """

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.arrival import arrival_response
 from gcodejerk.axes import AXES
-from gcodejerk.designs import Task
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.nc import Rapids
-from gcodejerk.plans import STANDSTILL, Modes, Plans
+from gcodejerk.planning.arrival import arrival_response
+from gcodejerk.planning.designs import Task
+from gcodejerk.planning.plans import STANDSTILL, Modes, Plans
 from gcodejerk.reasons import REASONS, Reason
 
 KNOWN = tuple(

@@ -8,7 +8,7 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion.amplitudes import condition_amplitude
 from gcodejerk.motion.profiles.conditions import condition_peaks
 from gcodejerk.motion.residual import residual_acceleration
-from gcodejerk.survey import Survey
+from gcodejerk.studies.amplitude_map import Survey
 
 MS = 1e-3
 

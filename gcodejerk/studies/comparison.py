@@ -20,19 +20,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcodejerk.arrival import arrival_response, worst_in_bands
 from gcodejerk.axes import AXES
-from gcodejerk.designs import Task, condition1, condition2, known_limits
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import Laws, joined, whole_intervals
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
-from gcodejerk.move import check_time, displacement_row
-from gcodejerk.optima import Progress
-from gcodejerk.plan import plan_moves
-from gcodejerk.plans import STANDSTILL, Modes, Plans, path_length
+from gcodejerk.planning.arrival import arrival_response, worst_in_bands
+from gcodejerk.planning.designs import Task, condition1, condition2, known_limits
+from gcodejerk.planning.move import check_time, displacement_row
+from gcodejerk.planning.optima import Progress
+from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.reasons import CERTAIN, REASONS
 
 DESIGNED = ("condition3", "cascade", "optimal", "shortest")

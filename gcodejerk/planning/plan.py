@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.designs import DESIGNS, Task, shortest, worst_in_band
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import (
@@ -27,11 +26,12 @@ from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.search.condition3 import TIE
 from gcodejerk.motion.shapers import SHAPERS, shaped_law
 from gcodejerk.nc import Rapids
-from gcodejerk.optima import Progress
-from gcodejerk.plans import STANDSTILL, Modes, Plans, path_length
+from gcodejerk.planning.conventional import least_time
+from gcodejerk.planning.designs import DESIGNS, Task, shortest, worst_in_band
+from gcodejerk.planning.optima import Progress
+from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
+from gcodejerk.planning.refusals import limit_error, time_error
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
-from gcodejerk.refusals import limit_error, time_error
-from gcodejerk.today import least_time
 
 PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""

@@ -37,7 +37,7 @@ from gcodejerk.motion.search.optimal import (
     smoothest_within,
 )
 from gcodejerk.motion.search.socp import require_solver
-from gcodejerk.solutions import cache_file, read_solutions, write_solutions
+from gcodejerk.planning.solution_cache import cache_file, read_solutions, write_solutions
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcodejerk import Machine, plan_move, process
-from gcodejerk.dogleg import arrivals, path_deviation
+from gcodejerk.planning.independent_axes import arrivals, path_deviation
 from gcodejerk.report.records import move_record
 
 TEXT = """

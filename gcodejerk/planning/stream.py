@@ -29,7 +29,7 @@ from gcodejerk.motion import (
 )
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.residual import Complex
-from gcodejerk.plans import Plans
+from gcodejerk.planning.plans import Plans
 
 BATCH_SAMPLES = 400_000
 """Samples of a batch, about; each needs some 100 bytes while it is worked on."""

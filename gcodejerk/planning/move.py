@@ -16,10 +16,10 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import laws_response
 from gcodejerk.motion.profiles.laws import Array, Laws
-from gcodejerk.plan import plan_moves
-from gcodejerk.plans import Plans
+from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.stream import Batch, Spelling, make_streams
 from gcodejerk.reasons import CERTAIN, REASONS
-from gcodejerk.stream import Batch, Spelling, make_streams
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from gcodejerk.motion import Laws, grouped, laws_response
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.search.objective import DENSE
-from gcodejerk.plans import Modes
+from gcodejerk.planning.plans import Modes
 
 BANDS = (0.05, 0.10)
 """Relative errors of the frequencies for which the worst is looked for. [-]"""

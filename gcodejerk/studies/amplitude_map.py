@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.designs import Task
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Axis, Machine, Mode
 from gcodejerk.motion import (
@@ -33,7 +32,8 @@ from gcodejerk.motion.profiles.conditions import (
     limit_use,
 )
 from gcodejerk.motion.profiles.laws import Array
-from gcodejerk.plans import Modes
+from gcodejerk.planning.designs import Task
+from gcodejerk.planning.plans import Modes
 
 ALL = "all"
 """In place of a mode: the worst displacement over all of them."""

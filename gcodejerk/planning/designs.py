@@ -31,9 +31,9 @@ from gcodejerk.motion.search.cascade import design_cascade
 from gcodejerk.motion.search.conditions import design_condition
 from gcodejerk.motion.search.optimal import Move, Optimum, optimum_laws
 from gcodejerk.motion.search.socp import require_solver
-from gcodejerk.optima import Progress, Question, answers
-from gcodejerk.plans import Modes, Plans
-from gcodejerk.today import conventional_limits, todays_laws, unit_limits
+from gcodejerk.planning.conventional import conventional_limits, todays_laws, unit_limits
+from gcodejerk.planning.optima import Progress, Question, answers
+from gcodejerk.planning.plans import Modes, Plans
 
 ALLOWED = 0.97
 """Share of the tolerance that a law may use; rounding to the resolution needs some, too."""

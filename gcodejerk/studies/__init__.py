@@ -1,0 +1,1 @@
+"""Studies: one move looked at from all sides, its amplitude map and its comparison."""
