@@ -23,7 +23,7 @@ from gcodejerk.cycles.expansion import Expansion, LineMap, expand
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
 from gcodejerk.verification import Verification, Violation, require, verify_files
-from gcodejerk.verification.expansion import check_expansion
+from gcodejerk.verification.cycles.expansion import check_expansion
 
 SPOOL = 8 << 20
 """An expanded program is held in memory up to this size, then on disk. [bytes]"""

@@ -240,7 +240,7 @@ def verify(
     from gcodejerk.expanded import verify_expanded
     from gcodejerk.files import open_input
     from gcodejerk.verification import verify_csv, verify_files
-    from gcodejerk.verification.stamp import read_stamp
+    from gcodejerk.verification.bytes.stamp import read_stamp
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Form, Options, decimal_step, step_sizes
-from gcodejerk.emit.digits import Column, format_lines
+from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.planning.plans import Plans

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Form, Options, axis_steps, step_sizes
-from gcodejerk.emit.digits import Column, format_lines
+from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block

@@ -17,7 +17,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.points import STANDSTILL, Array, Paths, resolutions
+from gcodejerk.verification.physics.points import STANDSTILL, Array, Paths, resolutions
 
 PIECE = 1 << 20
 ROWS = 512

@@ -14,7 +14,7 @@ import numpy as np
 from timing import best_of
 
 from gcodejerk import Machine, find_machine, process
-from gcodejerk.emit.digits import Column, format_lines
+from gcodejerk.emit.number_format import Column, format_lines
 
 
 def numbers(axes, count):

@@ -10,7 +10,7 @@ from gcodejerk.cycles.expansion import expand
 from gcodejerk.nc import read_program
 from gcodejerk.testing.cycles import cycle_programs
 from gcodejerk.testing.programs import programs
-from gcodejerk.verification.expansion import check_expansion
+from gcodejerk.verification.cycles.expansion import check_expansion
 
 CALM = settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
 

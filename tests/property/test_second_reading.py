@@ -18,8 +18,8 @@ from gcodejerk.nc import CERTAIN, Start, read_program
 from gcodejerk.nc.dialects import DIALECTS
 from gcodejerk.testing.cycles import cycle_programs
 from gcodejerk.testing.programs import programs
-from gcodejerk.verification.agreement import confirm
 from gcodejerk.verification.findings import Findings
+from gcodejerk.verification.second_reading.agreement import confirm
 
 WRITTEN = sorted(name for name, dialect in DIALECTS.items() if dialect.writing is not None)
 CALM = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))

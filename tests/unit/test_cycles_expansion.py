@@ -9,7 +9,7 @@ import pytest
 from gcodejerk.cycles.expansion import expand
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.nc import DIALECTS, Start, read_program
-from gcodejerk.verification.expansion import check_expansion
+from gcodejerk.verification.cycles.expansion import check_expansion
 
 HEAD = b"G21 G90 G64 P0.05 G98\nF100 M3 S500\nG0 X0 Y0 Z10\n"
 

@@ -13,9 +13,9 @@ from gcodejerk.nc.interpreter.modal import FIELDS, State, agree, join, same
 from gcodejerk.nc.reader import Reader
 from gcodejerk.pipeline import process
 from gcodejerk.reasons import REASONS, Reason
-from gcodejerk.verification.agreement import confirm
 from gcodejerk.verification.findings import Findings
-from gcodejerk.verification.known import KINDS, Facts, Known
+from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.second_reading.known import KINDS, Facts, Known
 
 WRITTEN, NO_DISTANCE = Reason.SYSTEM_WRITTEN, Reason.DISTANCE_MODE_UNKNOWN
 HEADS = {

@@ -15,8 +15,10 @@ import pytest
 
 import gcodejerk
 from gcodejerk.nc import DIALECTS
-from gcodejerk.verification import allowed, cycles, form, modes, reading
-from gcodejerk.verification.reading import Text
+from gcodejerk.verification.bytes import allowed, form, modes
+from gcodejerk.verification.cycles import holes as cycles
+from gcodejerk.verification.second_reading import reading
+from gcodejerk.verification.second_reading.reading import Text
 
 ROOT = Path(gcodejerk.__file__).parent
 FORBIDDEN = ("*+", "++", "?+", "}+", "(?>")
@@ -60,7 +62,8 @@ for path in sorted(root.rglob("*.py")):
     if path.stem != "__main__":
         import_module(".".join(path.relative_to(root.parent).with_suffix("").parts))
 from gcodejerk.nc import DIALECTS
-from gcodejerk.verification import form, reading
+from gcodejerk.verification.bytes import form
+from gcodejerk.verification.second_reading import reading
 for dialect in DIALECTS.values():
     for decimals in (True, False):
         reading.Text(dialect, decimals)

@@ -40,7 +40,7 @@ def test_an_empty_variable_means_no_cache(monkeypatch):
 def test_without_the_variable_the_users_cache_directory_is_used(monkeypatch, tmp_path):
     monkeypatch.delenv(solution_cache.VARIABLE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cache_file().name == f"solution_cache-{solution_cache.VERSION}.sqlite"
+    assert cache_file().name == f"solutions-{solution_cache.VERSION}.sqlite"
     if sys.platform == "linux":
         assert cache_file().parent == tmp_path / "gcodejerk"
 

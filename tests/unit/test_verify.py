@@ -14,7 +14,8 @@ import pytest
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.verification import Kind, points, require, verify, verify_csv
+from gcodejerk.verification import Kind, require, verify, verify_csv
+from gcodejerk.verification.physics import points
 
 TEXT = """
 interval: 0.001

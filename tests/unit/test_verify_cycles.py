@@ -13,7 +13,7 @@ from gcodejerk.cycles.expansion import expand
 from gcodejerk.nc import Start
 from gcodejerk.nc.reader import Reader
 from gcodejerk.verification import Kind
-from gcodejerk.verification.expansion import check_expansion
+from gcodejerk.verification.cycles.expansion import check_expansion
 
 PROGRAM = b"""\
 %
@@ -276,6 +276,6 @@ def test_what_is_in_force_in_front_of_a_cycle_has_to_be_read_twice(monkeypatch, 
     right = b"G0 X5\nG0 Z2\nG1 Z-3\nG0 Z10\n"
     written = program.replace(b"G81 X5 Z-3 R2\n", right)
     assert check_expansion(io.BytesIO(program), io.BytesIO(written)).confirmed == 1
-    monkeypatch.setattr("gcodejerk.verification.expansion.Reader", Mistaken)
+    monkeypatch.setattr("gcodejerk.verification.cycles.expansion.Reader", Mistaken)
     found = check_expansion(io.BytesIO(program), io.BytesIO(written))
     assert any(v.kind is Kind.READING and told in v.problem for v in found.violations)

@@ -21,8 +21,8 @@ from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.program import read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
-from gcodejerk.verification.agreement import Context, confirm_contexts
-from gcodejerk.verification.cycles import (
+from gcodejerk.verification.bytes.source import Window
+from gcodejerk.verification.cycles.holes import (
     CLOSE,
     HEIGHTS,
     QUIET_G,
@@ -40,7 +40,7 @@ from gcodejerk.verification.cycles import (
     told,
 )
 from gcodejerk.verification.findings import Findings, Kind, Verification
-from gcodejerk.verification.source import Window
+from gcodejerk.verification.second_reading.agreement import Context, confirm_contexts
 
 _CANDIDATE = re.compile(rb"[gG][0+ \t]*[678]|[mMoO#\[%]")
 _PATH = re.compile(rb"G64((?: [PQ]\d*(?:\.\d*)?)*)")

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, LINUXCNC, LONE_SHARE, Machine
 from gcodejerk.units import SECONDS_PER_MINUTE
-from gcodejerk.verification.conventional import peak_velocity, rapid_speed, rapid_time
 from gcodejerk.verification.findings import Kind
-from gcodejerk.verification.points import LINEAR, Array, Paths, feed_speed
-from gcodejerk.verification.speeds import RELATIVE, Blocks, Speeds
+from gcodejerk.verification.physics.conventional import peak_velocity, rapid_speed, rapid_time
+from gcodejerk.verification.physics.points import LINEAR, Array, Paths, feed_speed
+from gcodejerk.verification.physics.speeds import RELATIVE, Blocks, Speeds
 
 FEED_STEP = 1e-3
 """Rounding of F that is allowed for. [units/min]"""

@@ -19,8 +19,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids, parse_block
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.form import Stream
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
-from gcodejerk.verification.conventional import box_widths, rapid_position
-from gcodejerk.verification.oscillators import Oscillators
-from gcodejerk.verification.points import Array, Index, Paths
+from gcodejerk.verification.physics.conventional import box_widths, rapid_position
+from gcodejerk.verification.physics.oscillators import Oscillators
+from gcodejerk.verification.physics.points import Array, Index, Paths
 
 RELATIVE = 0.02
 """Share by which a stream may leave more: straight lines filter both motions nearly alike."""

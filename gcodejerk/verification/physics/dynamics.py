@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
-from gcodejerk.verification.conventional import rapid_time
-from gcodejerk.verification.feeds import NOT_OWN, judge_feeds, rapid_limits
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.independent import judge_axes
-from gcodejerk.verification.oscillators import Oscillators
-from gcodejerk.verification.points import Array, Index, Paths
-from gcodejerk.verification.residual import leaves_more
+from gcodejerk.verification.physics.conventional import rapid_time
+from gcodejerk.verification.physics.feeds import NOT_OWN, judge_feeds, rapid_limits
+from gcodejerk.verification.physics.independent import judge_axes
+from gcodejerk.verification.physics.oscillators import Oscillators
+from gcodejerk.verification.physics.points import Array, Index, Paths
+from gcodejerk.verification.physics.residual import leaves_more
 
 BLOCK_TIME = 0.002
 """Of a G-code block. [s]"""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.verification.points import Array, Index
+from gcodejerk.verification.physics.points import Array, Index
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.verification.findings import Kind
-from gcodejerk.verification.points import TINY, Array, Paths
+from gcodejerk.verification.physics.points import TINY, Array, Paths
 
 Rows = NDArray[np.bool_]
 SYMMETRIC = ("conventional", "condition3", "cascade")

@@ -18,9 +18,9 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
 from gcodejerk.units import MM_PER_INCH
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.known import Facts
-from gcodejerk.verification.reading import Line, Text, jumps_back, pieces
-from gcodejerk.verification.tracking import Sighting, Tracker
+from gcodejerk.verification.second_reading.known import Facts
+from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
+from gcodejerk.verification.second_reading.tracking import Sighting, Tracker
 
 MARK = b"\xef\xbb\xbf"
 """Of UTF-8, in front of the first line."""

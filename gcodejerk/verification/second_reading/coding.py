@@ -8,9 +8,9 @@ from __future__ import annotations
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Effect
 from gcodejerk.units import MM_PER_INCH as INCH
-from gcodejerk.verification.known import Known
-from gcodejerk.verification.reading import NAN, Line
-from gcodejerk.verification.sorting import Sorted
+from gcodejerk.verification.second_reading.known import Known
+from gcodejerk.verification.second_reading.reading import NAN, Line
+from gcodejerk.verification.second_reading.sorting import Sorted
 
 QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
 _CALLS = (47, 96, 97, 98, 198)

@@ -18,10 +18,10 @@ from functools import lru_cache
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Block, Dialect, Rapids, parse_block
-from gcodejerk.verification.allowed import Allowed, point_pattern, too_long_a_number
+from gcodejerk.verification.bytes.allowed import Allowed, point_pattern, too_long_a_number
+from gcodejerk.verification.bytes.modes import WORD, Modes, read_words
+from gcodejerk.verification.bytes.source import PIECE, Window
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.modes import WORD, Modes, read_words
-from gcodejerk.verification.source import PIECE, Window
 
 LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
 """By `Rapids.terminator`."""

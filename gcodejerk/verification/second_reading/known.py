@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
-from gcodejerk.verification.reading import NAN
+from gcodejerk.verification.second_reading.reading import NAN
 
 KINDS = {
     "g": "modes",

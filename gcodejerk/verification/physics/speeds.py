@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.verification.points import Array, Index
+from gcodejerk.verification.physics.points import Array, Index
 
 Rows = NDArray[np.bool_]
 

@@ -14,10 +14,10 @@ import numpy as np
 from gcodejerk.advice import STAMP_NOTES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, REASONS, Program, find_dialect
-from gcodejerk.verification.allowed import decimals_of, line_limit
+from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
+from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
+from gcodejerk.verification.bytes.source import Window, skip_common
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.form import LINE_ENDS, Stream, StreamReader
-from gcodejerk.verification.source import Window, skip_common
 
 _STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
 _TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from gcodejerk.emit.digits import ROWS, Column, format_lines
+from gcodejerk.emit.number_format import ROWS, Column, format_lines
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.verification.reading import NAN, Line
+from gcodejerk.verification.second_reading.reading import NAN, Line
 
 LEAST = 0.001
 """Increment that a number without a decimal point counts, where it does: mm or deg."""

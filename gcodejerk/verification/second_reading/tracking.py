@@ -16,9 +16,9 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Effect
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
-from gcodejerk.verification.coding import QUIET, Codes
-from gcodejerk.verification.reading import NAN, Line, Run
-from gcodejerk.verification.sorting import Sorted
+from gcodejerk.verification.second_reading.coding import QUIET, Codes
+from gcodejerk.verification.second_reading.reading import NAN, Line, Run
+from gcodejerk.verification.second_reading.sorting import Sorted
 
 _FRAMES: frozenset[Effect] = frozenset(
     {

@@ -1,0 +1,250 @@
+"""The proof: a processed program, or a table of its streams, held against the original.
+
+Rule: files are read from their bytes and in bounded memory; what is judged where says the room's
+own docstring (`gcodejerk.verification`).
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import BinaryIO
+
+from gcodejerk.errors import VerifyError
+from gcodejerk.machine import LINUXCNC, Machine
+from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
+from gcodejerk.verification.bytes.form import Stream
+from gcodejerk.verification.bytes.source import Window
+from gcodejerk.verification.bytes.stamp import read_stamp
+from gcodejerk.verification.bytes.walk import Walk
+from gcodejerk.verification.findings import Findings, Verification
+from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
+from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
+from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.table import TableReader
+
+MOST = 100
+"""Violations that are collected, unless asked otherwise."""
+BATCH_BYTES = 1 << 20
+"""Text of streams that is judged at a time."""
+NAMES = ("<original>", "<processed>")
+
+
+def verify(
+    original: bytes | str | Path,
+    processed: bytes | str | Path,
+    machine: Machine,
+    *,
+    dialect: str | Dialect | None = None,
+    most: int = MOST,
+) -> Verification:
+    r"""Compare a processed program with its original.
+
+    Parameters
+    ----------
+    original, processed : bytes, str or Path
+        The programs themselves, or the names of their files. A file is read in bounded memory.
+    machine : Machine
+        What the program was processed for. The profile is that of the stamp, where there is one.
+    dialect : str or Dialect, optional
+        How the original is written; the stamp's by default, or the machine's.
+    most : int, optional
+        Violations after which it stops.
+
+    Returns
+    -------
+    Verification
+        With every violation that was found, in the order of the processed file.
+
+    Raises
+    ------
+    ProgramError
+        The original cannot be a program.
+    VerifyError
+        A file cannot be read.
+
+    Examples
+    --------
+    >>> from gcodejerk.machine import find_machine
+    >>> vmc = Machine.load(find_machine("vmc"))
+    >>> verify(b"G21 G90 G0 X1\nM2\n", b"G21 G90 G0 X1\nM2\n", vmc).ok
+    True
+    >>> found = verify(b"G21 G90 G0 X1\nM2\n", b"G21 G90 G0 X2\nM2\n", vmc)
+    >>> str(found.violations[0].kind), found.violations[0].line
+    ('line changed', 1)
+    """
+    with ExitStack() as stack:
+        one, other = (stack.enter_context(_opened(given)) for given in (original, processed))
+        names = (_name(original, NAMES[0]), _name(processed, NAMES[1]))
+        stamp = read_stamp(other, machine)
+        if stamp is not None and stamp.known and stamp.profile is not None:
+            design = replace(machine.design, profile=stamp.profile)
+            machine, dialect = replace(machine, design=design), dialect or stamp.dialect
+        return verify_files(one, other, machine, names=names, dialect=dialect, most=most)
+
+
+def _name(given: bytes | str | Path, instead: str) -> str:
+    """Name a file for messages."""
+    return instead if isinstance(given, bytes) else str(given)
+
+
+def _opened(given: bytes | str | Path) -> BinaryIO:
+    """Open a file for reading."""
+    if isinstance(given, bytes):
+        return io.BytesIO(given)
+    try:
+        return open(given, "rb")
+    except OSError as error:
+        raise VerifyError(
+            f"cannot read '{given}': {error.strerror}", "give the name of a file that can be read"
+        ) from error
+
+
+def verify_files(
+    original: BinaryIO,
+    processed: BinaryIO,
+    machine: Machine,
+    *,
+    names: tuple[str, str] = NAMES,
+    dialect: str | Dialect | None = None,
+    start: Start | None = None,
+    most: int = MOST,
+) -> Verification:
+    """Compare open files; see `verify`.
+
+    Parameters
+    ----------
+    original, processed : BinaryIO
+        Opened for reading bytes, at their beginning; the original is read twice, so it is seekable.
+    machine : Machine
+        What the program was processed for.
+    names : tuple of str, optional
+        For messages.
+    dialect : str or Dialect, optional
+        The machine's by default.
+    start : Start, optional
+        What the original may assume; the machine's `program` by default.
+    most : int, optional
+        Violations after which it stops.
+
+    Returns
+    -------
+    Verification
+        With every violation that was found.
+
+    Raises
+    ------
+    ProgramError
+        The original cannot be a program.
+    """
+    start = machine.program_start() if start is None else start
+    begin = original.tell()
+    program = _read(original, machine, names[0], dialect, start)
+    found = Findings(most)
+    walk = Walk(Window(original), Window(processed), program, machine, found)
+    reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
+    stride = stride_of(machine)
+    for streams in _batches(_checked(walk, reader)):
+        _judge(reader.paths(streams), program, machine, stride, found)
+    walk.check_sum()
+    original.seek(begin)
+    confirmed = confirm(original, program.dialect, start, program.rapids, walk.replaced, found)
+    return Verification(
+        len(program.rapids), walk.rewritten, walk.kept, found.sorted(), names, confirmed
+    )
+
+
+def verify_csv(
+    original: BinaryIO,
+    table: BinaryIO,
+    machine: Machine,
+    *,
+    names: tuple[str, str] = NAMES,
+    dialect: str | Dialect | None = None,
+    start: Start | None = None,
+    most: int = MOST,
+) -> Verification:
+    """Compare a table of streams (controller `csv`) with the program that it belongs to.
+
+    Parameters
+    ----------
+    original, table : BinaryIO
+        Opened for reading bytes, at their beginning.
+    machine, names, dialect, start, most
+        As for `verify_files`.
+
+    Returns
+    -------
+    Verification
+        Lines of violations are those of the table; no line counts as kept.
+
+    Raises
+    ------
+    ProgramError
+        The original cannot be a program.
+    """
+    start = machine.program_start() if start is None else start
+    begin = original.tell()
+    program = _read(original, machine, names[0], dialect, start)
+    found = Findings(most)
+    reader = TableReader(table, program.rapids, machine, found)
+    for paths in reader.paths():
+        _judge(paths, program, machine, 1, found)
+    original.seek(begin)
+    confirmed = confirm(original, program.dialect, start, program.rapids, reader.replaced, found)
+    return Verification(
+        len(program.rapids), len(reader.replaced), 0, found.sorted(), names, confirmed
+    )
+
+
+def _read(
+    original: BinaryIO,
+    machine: Machine,
+    name: str,
+    dialect: str | Dialect | None,
+    start: Start,
+) -> Program:
+    """Read the original, then go back to its beginning."""
+    begin = original.tell()
+    program = read_program(
+        original,
+        name=name,
+        dialect=dialect or machine.dialect,
+        start=start,
+        neighbours=machine.planner == LINUXCNC,
+    )
+    original.seek(begin)
+    return program
+
+
+def _checked(walk: Walk, reader: Reader) -> Iterator[Stream]:
+    """Streams whose axes are right."""
+    for stream in walk.streams():
+        if reader.check_end(stream, walk.block):
+            yield stream
+
+
+def _batches(streams: Iterator[Stream]) -> Iterator[list[Stream]]:
+    """Streams in lists, each of some MB of text."""
+    batch: list[Stream] = []
+    size = 0
+    for stream in streams:
+        batch.append(stream)
+        size += len(stream.text) + 64 * len(stream.rest)
+        if size > BATCH_BYTES:
+            yield batch
+            batch, size = [], 0
+    if batch:
+        yield batch
+
+
+def _judge(paths: Paths, program: Program, machine: Machine, stride: int, found: Findings) -> None:
+    """All checks on points."""
+    check_rapids(paths, program.rapids, machine, found)
+    check_line(paths, machine, found)
+    # A rapid without length has no time law.
+    if (paths.displacement != 0.0).any(axis=1).all():
+        check_dynamics(paths, machine, stride, found)
