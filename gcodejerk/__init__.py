@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from gcodejerk.motion import residual_acceleration
     from gcodejerk.motion.amplitudes import residual
     from gcodejerk.motion.maps import amplitude_map
-    from gcodejerk.pipeline import Result, process
     from gcodejerk.planning.move import Plan, plan_move
+    from gcodejerk.rewrite.pipeline import Result, process
     from gcodejerk.verification import Verification, verify
 
 _HOMES = {
@@ -44,7 +44,7 @@ _HOMES = {
     "gcodejerk.motion.amplitudes": ("residual",),
     "gcodejerk.motion.maps": ("amplitude_map",),
     "gcodejerk.planning.move": ("Plan", "plan_move"),
-    "gcodejerk.pipeline": ("Result", "process"),
+    "gcodejerk.rewrite.pipeline": ("Result", "process"),
     "gcodejerk.verification": ("Verification", "verify"),
 }  # fmt: skip
 

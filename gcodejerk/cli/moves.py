@@ -49,7 +49,7 @@ def plan(
     ] = None,
 ) -> None:
     """Plan one move: its profile, peaks and residuals, the conventional ones beside it."""
-    from gcodejerk.files import new_file
+    from gcodejerk.batch.files import new_file
     from gcodejerk.planning.move import plan_move
     from gcodejerk.report.records import conventional_motion, dump, move_record, stream_csv
     from gcodejerk.report.tables import move_limit, move_tables
@@ -109,7 +109,7 @@ def map_amplitudes(
     ] = None,
 ) -> None:
     """Map what is left of vibration over T1 and T_SUM, for one move of one axis."""
-    from gcodejerk.files import new_file
+    from gcodejerk.batch.files import new_file
 
     if condition.upper() not in CONDITIONS:
         raise typer.BadParameter(f"--condition {condition}: choose I, II or III")
@@ -166,7 +166,7 @@ def compare(
     ] = None,
 ) -> None:
     """Compare every profile and shaper on one move: time, peaks, vibration, settling."""
-    from gcodejerk.files import new_file
+    from gcodejerk.batch.files import new_file
     from gcodejerk.report.compare_record import compare_record
     from gcodejerk.report.compare_table import compare_notes, compare_table
     from gcodejerk.report.records import dump

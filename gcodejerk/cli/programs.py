@@ -15,10 +15,10 @@ import typer
 from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
 
 if TYPE_CHECKING:
-    from gcodejerk.batch import Done
-    from gcodejerk.gather import Found
+    from gcodejerk.batch.inputs import Found
+    from gcodejerk.batch.jobs import Done
     from gcodejerk.machine import Machine
-    from gcodejerk.pipeline import Settings
+    from gcodejerk.rewrite.pipeline import Settings
 
 
 def process(
@@ -79,9 +79,9 @@ def process(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors and notes")] = False,
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
-    from gcodejerk.batch import Job, run_jobs
-    from gcodejerk.gather import NameClashError, check_names, gather
-    from gcodejerk.pipeline import Settings
+    from gcodejerk.batch.inputs import NameClashError, check_names, gather
+    from gcodejerk.batch.jobs import Job, run_jobs
+    from gcodejerk.rewrite.pipeline import Settings
 
     if sum(map(bool, (output, output_dir, in_place))) > 1:
         raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
@@ -202,10 +202,10 @@ def inspect(
     as_json: Annotated[bool, typer.Option("--json", help="print the report as JSON")] = False,
 ) -> None:
     """Show all rapids of a program: planned, or left alone and why."""
-    from gcodejerk.batch import record_of
-    from gcodejerk.files import open_input
-    from gcodejerk.pipeline import Settings, process_file
+    from gcodejerk.batch.files import open_input
+    from gcodejerk.batch.jobs import record_of
     from gcodejerk.report.tables import rapids_table, summary_line, whole_line
+    from gcodejerk.rewrite.pipeline import Settings, process_file
 
     described = load_machine(machine, file)
     settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
@@ -237,8 +237,8 @@ def verify(
     most: Annotated[int, typer.Option(min=1, help="stop after so many violations")] = 100,
 ) -> None:
     """Prove that a program is the original with only its rapids re-timed; list what it is not."""
-    from gcodejerk.expanded import verify_expanded
-    from gcodejerk.files import open_input
+    from gcodejerk.batch.files import open_input
+    from gcodejerk.rewrite.expanded import verify_expanded
     from gcodejerk.verification import verify_csv, verify_files
     from gcodejerk.verification.bytes.stamp import read_stamp
 
@@ -315,7 +315,7 @@ def _output(
     program: Found, output: str | None, output_dir: str | None, in_place: bool, suffix: str
 ) -> str:
     """Where the result of a program goes."""
-    from gcodejerk.gather import output_name
+    from gcodejerk.batch.inputs import output_name
 
     if in_place:
         return program.path
@@ -328,7 +328,7 @@ def _output(
 
 def _report(program: Found, report: str | None, report_dir: str | None) -> str | None:
     """Where the report on a program goes."""
-    from gcodejerk.gather import report_name
+    from gcodejerk.batch.inputs import report_name
 
     return report if report_dir is None else report_name(program, report_dir)
 

@@ -20,13 +20,13 @@ from gcodejerk.machine import Machine
 from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.nc import Rapids
-from gcodejerk.pipeline import Result
 from gcodejerk.planning.designs import known_limits
 from gcodejerk.planning.independent_axes import arrivals, dogleg_notes, path_deviation
 from gcodejerk.planning.move import Plan
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left, settling_times
 from gcodejerk.reasons import REASONS
+from gcodejerk.rewrite.pipeline import Result
 
 Record = dict[str, Any]
 DIGITS = 10

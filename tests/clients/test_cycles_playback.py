@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "linuxcnc"))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from gcodejerk.cycles.expansion import expand
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import Start
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.cycles import cycle_programs
 
 HERE = Path(__file__).resolve().parent

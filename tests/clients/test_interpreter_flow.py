@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import CERTAIN, Start, read_program, trace
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 STARTUP = "G17 G21 G40 G49 G54 G64 G90 G94 G97"

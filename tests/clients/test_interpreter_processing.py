@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

@@ -14,7 +14,7 @@ import pytest
 
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import sample_laws
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "linuxcnc"))

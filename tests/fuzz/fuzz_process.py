@@ -30,10 +30,10 @@ PROFILES = ("condition3", "conventional", "condition1", "condition2", "cascade")
 
 def load():
     from gcodejerk.errors import GcodejerkError, ProgramError, VerifyError
-    from gcodejerk.expanded import TERMINATOR_LENGTH
     from gcodejerk.machine import Machine, find_machine
     from gcodejerk.nc import DIALECTS
-    from gcodejerk.pipeline import process
+    from gcodejerk.rewrite.expanded import TERMINATOR_LENGTH
+    from gcodejerk.rewrite.pipeline import process
     from gcodejerk.verification import verify
 
     machines = [

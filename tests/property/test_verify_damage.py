@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import DIALECTS as DIALECTS_BY_NAME
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.vocabulary import VOCABULARIES
 from gcodejerk.verification import verify
 

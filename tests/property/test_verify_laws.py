@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import PLANNERS, Machine, find_machine
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.machines import machines
 from gcodejerk.testing.programs import programs
 from gcodejerk.testing.vocabulary import VOCABULARIES

@@ -38,8 +38,8 @@ from hypothesis import strategies as st
 from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion.shapers import SHAPERS
-from gcodejerk.pipeline import process
 from gcodejerk.planning.plan import PROFILES
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.machines import machines
 from gcodejerk.verification import Kind, verify, verify_csv
 

@@ -16,8 +16,8 @@ from gcodejerk.advice import (
 )
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import DIALECTS
-from gcodejerk.pipeline import process
 from gcodejerk.reasons import REASONS, Reason
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import verify
 
 ROOT = Path(__file__).parents[2]

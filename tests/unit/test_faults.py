@@ -18,12 +18,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gcodejerk import files
-from gcodejerk.batch import Job, run_job
-from gcodejerk.files import PREFIX
-from gcodejerk.gather import gather
+from gcodejerk.batch import files
+from gcodejerk.batch.files import PREFIX
+from gcodejerk.batch.inputs import gather
+from gcodejerk.batch.jobs import Job, run_job
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import Settings, process
+from gcodejerk.rewrite.pipeline import Settings, process
 from gcodejerk.verification import verify
 
 COMMAND = [sys.executable, "-m", "gcodejerk.cli", "process", "part.nc", "-m", "vmc"]
@@ -64,7 +64,8 @@ def names(place="."):
 # program's own calls are counted.
 KILLED = """
 import os, signal, sys
-import gcodejerk.batch, gcodejerk.cli, gcodejerk.gather, gcodejerk.machine, gcodejerk.workers
+import gcodejerk.batch.inputs, gcodejerk.batch.jobs, gcodejerk.batch.workers
+import gcodejerk.cli, gcodejerk.machine
 import gcodejerk.emit.linuxcnc, gcodejerk.cli.programs
 
 number, left, here = int(sys.argv[1]), int(sys.argv[2]), os.getcwd()

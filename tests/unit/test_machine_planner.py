@@ -7,10 +7,10 @@ import pytest
 
 from gcodejerk.machine import BELL, LINUXCNC, Machine, MachineFileError, machine_yaml
 from gcodejerk.motion import laws_response, mode_poles
-from gcodejerk.pipeline import process
 from gcodejerk.planning.designs import Task
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plans import Modes
+from gcodejerk.rewrite.pipeline import process
 
 HEAD = "interval: 0.001\npositioning: linear\n"
 

@@ -11,8 +11,8 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, DIALECTS, Start, read_program
 from gcodejerk.nc.interpreter.modal import FIELDS, State, agree, join, same
 from gcodejerk.nc.reader import Reader
-from gcodejerk.pipeline import process
 from gcodejerk.reasons import REASONS, Reason
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.second_reading.agreement import confirm
 from gcodejerk.verification.second_reading.known import KINDS, Facts, Known

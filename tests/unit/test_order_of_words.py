@@ -10,8 +10,8 @@ import pytest
 
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import DIALECTS
-from gcodejerk.pipeline import process
 from gcodejerk.reasons import REASONS
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import verify
 
 VMC = Machine.load(find_machine("vmc"))

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from gcodejerk.batch.inputs import SUFFIXES
 from gcodejerk.cli import app, machine_app
-from gcodejerk.gather import SUFFIXES
 from gcodejerk.reasons import Reason
 
 ROOT = Path(__file__).parents[2]
@@ -58,7 +58,7 @@ def test_readme_explains_every_reason_and_no_other():
 
 def test_stream_in_the_readme_is_the_samples(samples):
     from gcodejerk.machine import Machine, find_machine
-    from gcodejerk.pipeline import process
+    from gcodejerk.rewrite.pipeline import process
 
     data = (samples / "plate.ngc").read_bytes()
     output = process(data, Machine.load(find_machine("vmc"))).output.decode().splitlines()

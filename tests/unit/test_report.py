@@ -8,10 +8,10 @@ import jsonschema
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import process
 from gcodejerk.planning.move import plan_move
 from gcodejerk.reasons import Reason
 from gcodejerk.report.records import dump, move_record, process_record, stream_csv
+from gcodejerk.rewrite.pipeline import process
 
 SCHEMA = json.loads(files("gcodejerk.report").joinpath("report.schema.json").read_text())
 PLATE = Path(__file__).parents[2] / "samples" / "plate.ngc"

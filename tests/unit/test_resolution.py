@@ -10,7 +10,7 @@ import pytest
 from gcodejerk.errors import MachineError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import DIALECTS
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 
 VMC = Machine.load(find_machine("vmc"))
 TEXT = """\

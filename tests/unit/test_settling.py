@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import process
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.settling import settling_times
 from gcodejerk.report.records import summary_of
 from gcodejerk.report.tables import summary_line, whole_line
+from gcodejerk.rewrite.pipeline import process
 
 VMC = Machine.load(find_machine("vmc"))
 PROGRAM = b"""G21 G90 G94 G17 G64 P0.01

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import verify
 
 ROOT = Path(__file__).parents[2]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import Kind, verify
 
 CENTRE = Machine.load(find_machine("centre"))

@@ -1,62 +1,26 @@
-"""Streams into a program: what is replaced, what is copied, and the stamp at the top.
+"""Streams into a program: what is replaced, and what is copied.
 
 Rule 1: what is not a planned rapid's block is copied from the source, byte for byte.
 
-Below the stamp stands one line for the operator: which override acts on streams.
-
-Rule 2: the stamp carries a sum of the whole output, itself left out, so that every later change of
-it shows, however small: an F that is 1 % off at low speed moves no point and breaks no limit.
+Rule 2: the source is read once more while it is copied, and has to be what was planned.
 """
 
 from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Sequence
 from typing import BinaryIO
 
-from gcodejerk._version import __version__
 from gcodejerk.advice import stamp_note
 from gcodejerk.emit import Controller, Options
 from gcodejerk.errors import EmitError
-from gcodejerk.expanded import TERMINATOR_LENGTH
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program
 from gcodejerk.planning.stream import Batch
+from gcodejerk.rewrite.expanded import TERMINATOR_LENGTH
+from gcodejerk.rewrite.stamp import SUM_DIGITS, SUM_MARK, SUM_UNKNOWN, SUM_WITHIN
 
 COPY_SIZE = 1 << 20
-STAMP_LENGTH = 67
-"""Of the text without its comment marks: controllers with short lines choke on longer ones."""
-SUM_DIGITS = 16
-SUM_MARK = b" sum:"
-SUM_UNKNOWN = SUM_MARK + b"0" * SUM_DIGITS
-"""The sum while it is computed: BLAKE2b, 8 bytes, over the output with these digits in it."""
-SUM_WITHIN = 1 << 17
-"""A stamp that stands farther from the top than this has no sum. [bytes]"""
-
-
-def stamp_text(machine: Machine, chosen: Sequence[str]) -> bytes:
-    """Text of the stamp: version, a hash of the settings, room for the sum, and the machine.
-
-    Parameters
-    ----------
-    machine : Machine
-        What the program runs on.
-    chosen : sequence of str
-        The user's choices that shape the output.
-
-    Returns
-    -------
-    bytes
-        Without the marks of a comment.
-    """
-    text = " ".join((machine.settings_hash, *chosen)).encode()
-    digest = hashlib.blake2b(text, digest_size=4).hexdigest()
-    plain = "".join(
-        c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name
-    )
-    head = f"gcodejerk stamp {__version__} {digest}".encode() + SUM_UNKNOWN
-    return (head + b" " + plain.encode())[:STAMP_LENGTH].rstrip()
 
 
 def digest_of(source: BinaryIO) -> bytes:
@@ -76,7 +40,7 @@ def changed_error(name: str) -> EmitError:
     )
 
 
-class Splicer:
+class Rewriter:
     """Copies the source and puts streams in the place of blocks, in one pass through the file."""
 
     def __init__(

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from gcodejerk.workers import map_jobs
+from gcodejerk.batch.workers import map_jobs
 
 
 def act(job):
@@ -63,7 +63,7 @@ def test_who_stops_listening_stops_the_workers():
 
 MASTER = """
 import os, time
-from gcodejerk.workers import map_jobs
+from gcodejerk.batch.workers import map_jobs
 
 def act(job):
     os.write(1, b"%d\\n" % os.getpid())  # in one piece: two workers write to one pipe

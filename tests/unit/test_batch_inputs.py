@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from gcodejerk.gather import SUFFIXES, Found, NameClashError, check_names, gather, output_name
+from gcodejerk.batch.inputs import SUFFIXES, Found, NameClashError, check_names, gather, output_name
 
 
 @pytest.fixture

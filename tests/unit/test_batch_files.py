@@ -9,8 +9,8 @@ import time
 
 import pytest
 
+from gcodejerk.batch.files import PREFIX, new_file, open_input, same_file
 from gcodejerk.errors import EmitError, ProgramError
-from gcodejerk.files import PREFIX, new_file, open_input, same_file
 
 COMMAND = [sys.executable, "-m", "gcodejerk.cli", "process", "part.nc", "-m", "vmc"]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.foreign import kind_of
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import process
+from gcodejerk.rewrite.foreign import kind_of
+from gcodejerk.rewrite.pipeline import process
 
 ROOT = Path(__file__).parents[2]
 VMC = Machine.load(find_machine("vmc"))

@@ -22,13 +22,6 @@ from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
-from gcodejerk.expanded import (
-    hunks,
-    in_original,
-    lines_in_original,
-    written_out,
-)
-from gcodejerk.foreign import HEAD, refuse_foreign
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
 from gcodejerk.motion.profiles.laws import Array
 from gcodejerk.nc import Program, find_dialect, read_program
@@ -37,7 +30,15 @@ from gcodejerk.planning.plan import plan_rapids
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left, left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
-from gcodejerk.splice import Splicer, changed_error, digest_of, stamp_text
+from gcodejerk.rewrite.expanded import (
+    hunks,
+    in_original,
+    lines_in_original,
+    written_out,
+)
+from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
+from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
+from gcodejerk.rewrite.stamp import stamp_text
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
 
 Progress = Callable[[str, int, int], None]
@@ -297,7 +298,7 @@ def _process(
     chosen += ["expand-cycles"] if settings.expand_cycles else []
     chosen += [f"dialect {settings.dialect}"] if settings.dialect is not None else []
     options = Options(settings.comments, find_dialect(program.dialect))
-    writer = Splicer(source, target, program, emitter, options, stamp_text(machine, chosen))
+    writer = Rewriter(source, target, program, emitter, options, stamp_text(machine, chosen))
     writer.write_header(machine)
     done = 0
     for window in make_streams(

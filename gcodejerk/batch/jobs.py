@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import BinaryIO
 
-from gcodejerk.errors import EmitError, GcodejerkError
-from gcodejerk.files import (
+from gcodejerk.batch.files import (
     STANDARD,
     is_ours,
     is_report,
@@ -31,14 +30,15 @@ from gcodejerk.files import (
     same_file,
     version,
 )
+from gcodejerk.batch.workers import map_jobs
+from gcodejerk.errors import EmitError, GcodejerkError
 from gcodejerk.machine import Machine
-from gcodejerk.pipeline import Progress, Result, Settings, process_file, silent
 from gcodejerk.planning.designs import known_limits
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line, whole_line
-from gcodejerk.splice import changed_error
-from gcodejerk.workers import map_jobs
+from gcodejerk.rewrite.pipeline import Progress, Result, Settings, process_file, silent
+from gcodejerk.rewrite.rewriter import changed_error
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from gcodejerk import batch
-from gcodejerk.batch import Job, run_jobs
-from gcodejerk.files import PREFIX
+from gcodejerk.batch import jobs
+from gcodejerk.batch.files import PREFIX
+from gcodejerk.batch.jobs import Job, run_jobs
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import Settings
+from gcodejerk.rewrite.pipeline import Settings
 
 COMMAND = [sys.executable, "-m", "gcodejerk.cli"]
 PROGRAM = b"G21 G90 G94 G64\nG0 X0 Y0 Z0\nG0 Z1. (up)\nG1 X5 F100\nG0 X40\nM2\n"
@@ -95,17 +95,17 @@ def test_failures_of_every_kind_stop_nobody_else(shop, jobs):
 
 def test_a_bug_in_one_file_is_told_with_its_traceback_and_stops_nobody(shop, monkeypatch):
     vmc = Machine.load(find_machine("vmc"))
-    whole = batch.process_file
+    whole = jobs.process_file
 
     def sometimes(source, target, machine, settings, name, progress):
         if name == "shop/b.ngc":
             raise ZeroDivisionError("drawn")
         return whole(source, target, machine, settings, name, progress)
 
-    monkeypatch.setattr(batch, "process_file", sometimes)
+    monkeypatch.setattr(jobs, "process_file", sometimes)
     names = ["shop/a.nc", "shop/b.ngc", "shop/lathe/c.TAP"]
-    jobs = [Job(name, name + ".out", None, "write", False, False) for name in names]
-    first, second, third = run_jobs(jobs, vmc, Settings(), 1, None)
+    asked = [Job(name, name + ".out", None, "write", False, False) for name in names]
+    first, second, third = run_jobs(asked, vmc, Settings(), 1, None)
     assert (first.planned, third.planned) == (2, 2)
     assert "bug of gcodejerk" in second.error
     assert "ZeroDivisionError: drawn" in second.error
@@ -253,9 +253,9 @@ def test_programs_that_freecad_posts_go_through_in_one_run(tmp_path, machine):
         shutil.copy(path, place)
     assert len(files(tree)) >= 5
     run = [*COMMAND, "process", "in", "-m", machine, "--output-dir"]
-    for jobs in ("1", "2"):
+    for many in ("1", "2"):
         done = subprocess.run(
-            [*run, f"out{jobs}", "--jobs", jobs],
+            [*run, f"out{many}", "--jobs", many],
             cwd=tmp_path, capture_output=True, text=True, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr

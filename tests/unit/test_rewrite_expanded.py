@@ -11,13 +11,13 @@ import jsonschema
 import numpy as np
 import pytest
 
-from gcodejerk.batch import record_of
+from gcodejerk.batch.jobs import record_of
 from gcodejerk.errors import EmitError, ProgramError, VerifyError
-from gcodejerk.expanded import verify_expanded
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.pipeline import Settings, process, process_file
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import dump
+from gcodejerk.rewrite.expanded import verify_expanded
+from gcodejerk.rewrite.pipeline import Settings, process, process_file
 from gcodejerk.verification import Kind
 
 SAMPLES = Path(__file__).parents[2] / "samples"

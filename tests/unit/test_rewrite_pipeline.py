@@ -7,7 +7,7 @@ import pytest
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import read_program
-from gcodejerk.pipeline import Settings, process, process_file
+from gcodejerk.rewrite.pipeline import Settings, process, process_file
 
 VMC = Machine.load(find_machine("vmc"))
 PROGRAM = b"G21 G90 G94 G64\nG0 X0 Y0 Z0\nG0 Z1.\nG1 X5 F100\nG0 X40\nM2\n"
