@@ -1,7 +1,7 @@
 """What a controller's emitter is, and how emitters are found.
 
-An emitter turns streams into text. It knows the controller's language and nothing of how a law was
-designed. Emitters are found through the entry points `gcodejerk.controllers`, ours and those of
+An emitter turns streams into text. It knows the controller's language and nothing of how a profile
+was designed. Emitters are found through the entry points `gcodejerk.controllers`, ours and those of
 other packages alike; listing them loads none.
 """
 

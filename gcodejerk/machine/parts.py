@@ -19,7 +19,7 @@ OSCILLATORS = 4
 LINUXCNC, TRAPEZOIDAL, JERK_LIMITED, BELL = PLANNERS = (
     "linuxcnc-2.9", "trapezoidal", "jerk-limited", "bell",
 )  # fmt: skip
-"""The laws that a control's own rapid may follow (`Axis.conventional`)."""
+"""The profiles that a control's own rapid may follow (`Axis.conventional`)."""
 LONE_SHARE = 0.5
 """Share of MAX_ACCELERATION that LinuxCNC 2.9 gives a lone G0.
 
@@ -79,7 +79,7 @@ class Spectrum:
     lines below 10 Hz, where it feels drift and the motion itself, would be most. A spectrum holds
     no phase, and damping only as the width of its peaks. So the planner takes several oscillators
     for a line, spread over its width, with the damping whose half-power width is the line's: they
-    overlap, and no law can hide between them (`oscillators`).
+    overlap, and no profile can hide between them (`oscillators`).
     """
 
     source: str = field(compare=False)
@@ -134,7 +134,7 @@ class Axis:
     """How it goes to an absolute position, if it is rotary: ``none``, ``shortest`` or ``sign`` as
     `gcodejerk.nc.Start` has them; None where the file does not say."""
     planner: str = JERK_LIMITED
-    """Which law the controller's own G0 follows, one of `PLANNERS`; all axes' are alike."""
+    """Which profile the controller's own G0 follows, one of `PLANNERS`; all axes' are alike."""
 
     def conventional(self, lone: bool = True) -> Limits:
         """What the controller's own G0 does: this sets the conventional time.
@@ -227,7 +227,7 @@ class Description:
 
     @property
     def planner(self) -> str:
-        """Which law the controller's own rapids follow; `jerk-limited` where any axis has a jerk.
+        """Which profile the control's own rapids follow; `jerk-limited` where any axis has a jerk.
 
         `trapezoidal` is `jerk-limited` without a jerk, so that axes of both may move together.
         """

@@ -1,18 +1,18 @@
 """Motion: profiles, residual vibration, the design of Condition III, sampling and rounding.
 
 Numbers in, arrays out: nothing here knows a file, a machine or a program. A move is described by
-its *unit law*, a rest-to-rest motion from 0 to 1; an axis sees it scaled by its own displacement,
-so that limits divided by displacements are the limits of the law, and one design serves all axes of
-a straight line.
+its *unit profile*, a rest-to-rest motion from 0 to 1; an axis sees it scaled by its own
+displacement, so that limits divided by displacements are the limits of the profile, and one design
+serves all axes of a straight line.
 """
 
-from gcodejerk.motion.profiles.laws import Laws, joined
-from gcodejerk.motion.profiles.symmetric import SymmetricLaws, conventional_laws
+from gcodejerk.motion.profiles.profile import Profiles, joined
+from gcodejerk.motion.profiles.symmetric import SymmetricProfiles, conventional_profiles
 from gcodejerk.motion.residual import (
     grouped,
-    laws_response,
     mode_poles,
     polyline_response,
+    profiles_response,
     residual_acceleration,
     residual_displacement,
     symmetric_response,
@@ -22,7 +22,7 @@ from gcodejerk.motion.sampling import (
     GRID_TOLERANCE,
     Grid,
     knots_response,
-    sample_laws,
+    sample_profiles,
     sampled_response,
     whole_intervals,
 )
@@ -36,23 +36,23 @@ from gcodejerk.motion.search.objective import Objective
 __all__ = [
     "GRID_TOLERANCE",
     "Grid",
-    "Laws",
     "Objective",
-    "SymmetricLaws",
-    "conventional_laws",
+    "Profiles",
+    "SymmetricProfiles",
+    "conventional_profiles",
     "design_condition3",
     "design_four_segments",
     "four_segment_range",
     "grouped",
     "joined",
     "knots_response",
-    "laws_response",
     "mode_poles",
     "polyline_response",
+    "profiles_response",
     "residual_acceleration",
     "residual_displacement",
     "round_positions",
-    "sample_laws",
+    "sample_profiles",
     "sampled_response",
     "symmetric_response",
     "whole_intervals",

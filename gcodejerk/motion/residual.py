@@ -9,8 +9,9 @@ has after the move's end T the envelope
 .. math:: D = \frac{p}{\omega_d} \left| \int_0^T a(t)\, e^{\lambda (T - t)} dt \right|,
           \qquad \lambda = -\zeta\omega + j\omega_d .
 
-This module owns that integral, called the *response* [mm/s] (of a unit law: [1/s]), for each way in
-which a motion is given: jerk steps, laws, polylines of samples. Everything is exact, damping too.
+This module owns that integral, called the *response* [mm/s] (of a unit profile: [1/s]), for each
+way in which a motion is given: jerk steps, profiles, polylines of samples. Everything is exact,
+damping too.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion.profiles.laws import Array, Laws
-from gcodejerk.motion.profiles.symmetric import SymmetricLaws
+from gcodejerk.motion.profiles.profile import Array, Profiles
+from gcodejerk.motion.profiles.symmetric import SymmetricProfiles
 
 Complex = NDArray[np.complex128]
 
@@ -148,13 +149,13 @@ def grouped(amplitude: Array, group: NDArray[np.int64]) -> Array:
     return together
 
 
-def laws_response(laws: Laws, poles: Complex) -> Complex:
-    r"""Response of modes to unit laws, exact.
+def profiles_response(profiles: Profiles, poles: Complex) -> Complex:
+    r"""Response of modes to unit profiles, exact.
 
     Parameters
     ----------
-    laws : Laws
-        n laws.
+    profiles : Profiles
+        n profiles.
     poles : ndarray of complex, shape (m,)
         From `mode_poles`. [rad/s]
 
@@ -167,27 +168,27 @@ def laws_response(laws: Laws, poles: Complex) -> Complex:
     -----
     With the steps of acceleration and jerk at the moments :math:`t_k`,
     :math:`\sum_k (\Delta a_k/\lambda + \Delta j_k/\lambda^2)\, e^{\lambda (T - t_k)}`: what the
-    integration leaves besides is zero where a law ends at rest.
+    integration leaves besides is zero where a profile ends at rest.
     """
-    response = np.empty((len(laws), len(poles)), dtype=np.complex128)
-    if not len(laws):
+    response = np.empty((len(profiles), len(poles)), dtype=np.complex128)
+    if not len(profiles):
         return response
-    first = laws.first[:-1] + np.arange(len(laws))
-    left = np.repeat(laws.total, np.diff(laws.first) + 1) - laws.step_times()
-    a, j = laws.acceleration_steps(), laws.jerk_steps()
+    first = profiles.first[:-1] + np.arange(len(profiles))
+    left = np.repeat(profiles.total, np.diff(profiles.first) + 1) - profiles.step_times()
+    a, j = profiles.acceleration_steps(), profiles.jerk_steps()
     for m, pole in enumerate(poles):
         each = (a + j / pole) * (_exponential(pole, left) / pole)
         response[:, m] = np.add.reduceat(each, first)
     return response
 
 
-def symmetric_response(laws: SymmetricLaws, poles: Complex) -> Complex:
-    r"""The same for symmetric laws, from their four durations: what searches evaluate.
+def symmetric_response(profiles: SymmetricProfiles, poles: Complex) -> Complex:
+    r"""The same for symmetric profiles, from their four durations: what searches evaluate.
 
     Parameters
     ----------
-    laws : SymmetricLaws
-        n laws.
+    profiles : SymmetricProfiles
+        n profiles.
     poles : ndarray of complex, shape (m,)
         From `mode_poles`. [rad/s]
 
@@ -201,13 +202,13 @@ def symmetric_response(laws: SymmetricLaws, poles: Complex) -> Complex:
     A ramp of acceleration from 0 to A within T1 contributes
     :math:`(A/\lambda)\, e^{\lambda (T - t)} \varphi(\lambda T_1)`, where t is its beginning and
     :math:`\varphi(x) = (1 - e^{-x})/x`, which is 1 for a step of the acceleration: a trapezoid of
-    velocity needs no case of its own. The four ramps of a law share the powers of its segments.
+    velocity needs no case of its own. The four ramps of a profile share the powers of its segments.
     """
-    A = laws.acceleration
-    response = np.empty((len(laws), len(poles)), dtype=np.complex128)
+    A = profiles.acceleration
+    response = np.empty((len(profiles), len(poles)), dtype=np.complex128)
     for m, pole in enumerate(poles):
-        E1, Ea, E2, Ev = (_exponential(pole, duration) for duration in laws.columns())
-        up, down = _ramp(pole, laws.T1, E1), _ramp(pole, laws.T2, E2)
+        E1, Ea, E2, Ev = (_exponential(pole, duration) for duration in profiles.columns())
+        up, down = _ramp(pole, profiles.T1, E1), _ramp(pole, profiles.T2, E2)
         first = E1 * Ea
         cruise_end = first * E2 * Ev
         response[:, m] = up * (1.0 + cruise_end * Ea * E2) - down * (cruise_end + first)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.sampling import Counts, Grid
 

@@ -1,4 +1,4 @@
-"""Samples of laws at the command interval, many laws at once.
+"""Samples of profiles at the command interval, many profiles at once.
 
 This module owns the layout of sampled moves: a matrix with one move a row, *aligned at its end*, so
 that the last column is every move's arrival, the column before it one step earlier, and a short
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.residual import Complex
 
 Counts = NDArray[np.int64]
@@ -82,34 +82,36 @@ def whole_intervals(time: Array, interval: float) -> Counts:
     return counts
 
 
-def sample_laws(laws: Laws, moments: Counts, interval: float) -> tuple[Array, Array]:
-    """Position and velocity of unit laws at whole intervals.
+def sample_profiles(profiles: Profiles, moments: Counts, interval: float) -> tuple[Array, Array]:
+    """Position and velocity of unit profiles at whole intervals.
 
     Parameters
     ----------
-    laws : Laws
-        n laws.
+    profiles : Profiles
+        n profiles.
     moments : ndarray of int, shape (n, k)
-        Intervals since the start of each; the law rests at 0 before it begins and at 1 after.
+        Intervals since the start of each; the profile rests at 0 before it begins and at 1 after.
     interval : float
         Command interval. [s]
 
     Returns
     -------
     tuple of ndarray, shape (n, k)
-        Position [-] and velocity [1/s]. The position is 1 exactly from the law's end on.
+        Position [-] and velocity [1/s]. The position is 1 exactly from the profile's end on.
     """
-    total = laws.total
-    row = np.arange(len(laws))[:, np.newaxis]
+    total = profiles.total
+    row = np.arange(len(profiles))[:, np.newaxis]
     t = np.clip(moments * interval, 0.0, total[:, np.newaxis])
-    # The segment of each moment: laws one behind the other on a common clock.
+    # The segment of each moment: profiles one behind the other on a common clock.
     clock = float(total.max(initial=0.0)) + 1.0
-    segment = np.searchsorted(laws.owner * clock + laws.begin, row * clock + t, side="right") - 1
-    segment = np.clip(segment, laws.first[:-1, np.newaxis], laws.first[1:, np.newaxis] - 1)
-    tau = t - laws.begin[segment]
-    a, j = laws.acceleration[segment], laws.jerk[segment]
-    v = laws.velocity[segment]
-    position = laws.position[segment] + (v + (0.5 * a + j * tau / 6.0) * tau) * tau
+    segment = (
+        np.searchsorted(profiles.owner * clock + profiles.begin, row * clock + t, side="right") - 1
+    )
+    segment = np.clip(segment, profiles.first[:-1, np.newaxis], profiles.first[1:, np.newaxis] - 1)
+    tau = t - profiles.begin[segment]
+    a, j = profiles.acceleration[segment], profiles.jerk[segment]
+    v = profiles.velocity[segment]
+    position = profiles.position[segment] + (v + (0.5 * a + j * tau / 6.0) * tau) * tau
     velocity = v + (a + 0.5 * j * tau) * tau
     arrived = t >= total[:, np.newaxis] - GRID_TOLERANCE * interval
     return np.where(arrived, 1.0, np.minimum(position, 1.0)), np.where(arrived, 0.0, velocity)

@@ -29,7 +29,7 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.residual import mode_poles
 
 SHAPERS = ("zv", "zvd", "ei", "mzv", "fir", "posicast")
@@ -94,20 +94,22 @@ def shaper_impulses(name: str, frequency: float, damping: float = 0.0) -> tuple[
     return np.array(halves) * period, shares / shares.sum()
 
 
-def shaped_law(law: Laws, name: str, frequency: float, damping: float = 0.0) -> Laws:
-    """One law behind a shaper.
+def shaped_profile(
+    profile: Profiles, name: str, frequency: float, damping: float = 0.0
+) -> Profiles:
+    """One profile behind a shaper.
 
     Parameters
     ----------
-    law : Laws
-        One law.
+    profile : Profiles
+        One profile.
     name, frequency, damping
         As in `shaper_impulses`.
 
     Returns
     -------
-    Laws
-        One law, longer by the last delay.
+    Profiles
+        One profile, longer by the last delay.
 
     Raises
     ------
@@ -115,12 +117,12 @@ def shaped_law(law: Laws, name: str, frequency: float, damping: float = 0.0) -> 
         As `shaper_impulses`.
     """
     delays, amplitudes = shaper_impulses(name, frequency, damping)
-    times = (law.step_times() + delays[:, np.newaxis]).ravel()
+    times = (profile.step_times() + delays[:, np.newaxis]).ravel()
     order = np.argsort(times, kind="stable")
     times = times[order]
     steps = [
         (amplitudes[:, np.newaxis] * step).ravel()[order]
-        for step in (law.acceleration_steps(), law.jerk_steps())
+        for step in (profile.acceleration_steps(), profile.jerk_steps())
     ]
     duration = np.diff(times)
     jerk = np.cumsum(steps[1])[:-1]
@@ -129,4 +131,4 @@ def shaped_law(law: Laws, name: str, frequency: float, damping: float = 0.0) -> 
     used = duration > 1e-12
     jerk = np.where(np.abs(jerk) < 1e-12 * np.abs(jerk).max(initial=0.0), 0.0, jerk)
     first = np.array([0, np.count_nonzero(used)])
-    return Laws.of(first, duration[used], acceleration[used], jerk[used])
+    return Profiles.of(first, duration[used], acceleration[used], jerk[used])

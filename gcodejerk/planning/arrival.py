@@ -1,15 +1,15 @@
-"""What one move leaves when the last of its laws has ended, at its modes and in bands around them.
+"""What one move leaves when the last of its profiles has ended, at its modes and around them.
 
-This module owns the exact residual of a profile that is no stream: of laws that begin together and
-may end at different times, as axes that position on their own do.
+This module owns the exact residual of a profile that is no stream: of profiles that begin together
+and may end at different times, as axes that position on their own do.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from gcodejerk.motion import Laws, grouped, laws_response
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion import Profiles, grouped, profiles_response
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.search.objective import DENSE
 from gcodejerk.planning.plans import Modes
@@ -18,13 +18,13 @@ BANDS = (0.05, 0.10)
 """Relative errors of the frequencies for which the worst is looked for. [-]"""
 
 
-def arrival_response(laws: Laws, weights: Array, poles: Complex) -> Complex:
-    """Response of modes to one move, when the last of its laws has ended.
+def arrival_response(profiles: Profiles, weights: Array, poles: Complex) -> Complex:
+    """Response of modes to one move, when the last of its profiles has ended.
 
     Parameters
     ----------
-    laws : Laws
-        l unit laws that begin together; the modes ring on after those that end early.
+    profiles : Profiles
+        l unit profiles that begin together; the modes ring on after those that end early.
     weights : ndarray, shape (l, m)
         Participation times displacement, with its sign. [mm]
     poles : ndarray of complex, shape (m,)
@@ -35,19 +35,21 @@ def arrival_response(laws: Laws, weights: Array, poles: Complex) -> Complex:
     ndarray of complex, shape (m,)
         [mm/s]
     """
-    left = (laws.total.max() - laws.total)[:, np.newaxis]
-    response: Complex = (laws_response(laws, poles) * np.exp(poles * left) * weights).sum(axis=0)
+    left = (profiles.total.max() - profiles.total)[:, np.newaxis]
+    response: Complex = (profiles_response(profiles, poles) * np.exp(poles * left) * weights).sum(
+        axis=0
+    )
     return response
 
 
 def worst_in_bands(
-    laws: Laws, weights: Array, modes: Modes
+    profiles: Profiles, weights: Array, modes: Modes
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """The worst that any mode keeps where its frequency is off by any share within `BANDS`.
 
     Parameters
     ----------
-    laws, weights
+    profiles, weights
         As in `arrival_response`.
     modes : Modes
         The modes; the lines of a spectrum are off by the same share.
@@ -62,10 +64,10 @@ def worst_in_bands(
         index = np.flatnonzero(modes.group == entry)
         if not weights[:, index].any():
             continue
-        relative = _relative(laws, modes.poles[index])
+        relative = _relative(profiles, modes.poles[index])
         poles = np.outer(relative, modes.poles[index]).ravel()
         every = np.tile(index, len(relative))
-        D = np.abs(arrival_response(laws, weights[:, every], poles)) / poles.imag
+        D = np.abs(arrival_response(profiles, weights[:, every], poles)) / poles.imag
         displacement = grouped(D, np.repeat(np.arange(len(relative)), len(index)))
         # As `Modes.accelerations` states them, at a frequency that is off by the share.
         omega = 2.0 * np.pi * modes.modes[entry].frequency * relative
@@ -76,13 +78,13 @@ def worst_in_bands(
     return tuple(worst[0].tolist()), tuple(worst[1].tolist())
 
 
-def _relative(laws: Laws, poles: Complex) -> Array:
+def _relative(profiles: Profiles, poles: Complex) -> Array:
     """Relative frequencies at which a band is looked at; the bands' ends are among them.
 
     The square of a residual, as a function of omega T, has no faster part than cos(omega T): a
     parabola through three points `DENSE` apart in omega T/2 is right to 1e-4.
     """
-    phase = 0.5 * max(BANDS) * float(np.abs(poles).max()) * float(laws.total.max())
+    phase = 0.5 * max(BANDS) * float(np.abs(poles).max()) * float(profiles.total.max())
     half = 2 * max(int(np.ceil(0.5 * phase / DENSE)), 1)
     return np.linspace(1.0 - max(BANDS), 1.0 + max(BANDS), 2 * half + 1)
 

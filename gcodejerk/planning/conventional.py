@@ -1,6 +1,6 @@
-"""What a machine's control does today: the limits and the laws of its own rapids.
+"""What a machine's control does today: the limits and the profiles of its own rapids.
 
-Which law that is the machine file says (`rapid.planner`) or its control: all that a design is
+Which profile that is the machine file says (`rapid.planner`) or its control: all that a design is
 compared with, T_SUM and the conventional residual, comes from here. A rapid is taken from rest to
 rest. Where LinuxCNC rounds the corner between two G0 (G64), it does not come to rest there; the
 streams that replace them do, so what is compared is the same move.
@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Limits, Machine
-from gcodejerk.motion import Laws, SymmetricLaws, conventional_laws
-from gcodejerk.motion.profiles.bell import bell_laws
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion import Profiles, SymmetricProfiles, conventional_profiles
+from gcodejerk.motion.profiles.bell import bell_profiles
+from gcodejerk.motion.profiles.profile import Array
 
 
-def todays_laws(machine: Machine, limits: tuple[Array, Array, Array]) -> tuple[SymmetricLaws, Laws]:
-    """Laws of the control's own rapids.
+def todays_profiles(
+    machine: Machine, limits: tuple[Array, Array, Array]
+) -> tuple[SymmetricProfiles, Profiles]:
+    """Profiles of the control's own rapids.
 
     Parameters
     ----------
@@ -32,17 +34,17 @@ def todays_laws(machine: Machine, limits: tuple[Array, Array, Array]) -> tuple[S
 
     Returns
     -------
-    symmetric : SymmetricLaws
-        The fastest symmetric laws within these limits: those of the control, but for a bell.
-    conventional : Laws
+    symmetric : SymmetricProfiles
+        The fastest symmetric profiles within these limits: those of the control, but for a bell.
+    conventional : Profiles
         Those of the control.
     """
-    symmetric = conventional_laws(*limits)
-    return symmetric, bell_laws(*limits) if machine.planner == BELL else symmetric.general()
+    symmetric = conventional_profiles(*limits)
+    return symmetric, bell_profiles(*limits) if machine.planner == BELL else symmetric.general()
 
 
 def unit_limits(machine: Machine, share: Array) -> tuple[Array, Array, Array]:
-    """Limits of unit laws of a design: each axis's `limit`, divided by its displacement.
+    """Limits of unit profiles of a design: each axis's `limit`, divided by its displacement.
 
     Parameters
     ----------
@@ -86,7 +88,7 @@ def conventional_limits(
 
 
 def _unit(limits: Mapping[str, Limits], share: Array) -> tuple[Array, Array, Array]:
-    """Limits of axes as those of unit laws; axes that are not there have none."""
+    """Limits of axes as those of unit profiles; axes that are not there have none."""
     columns = []
     for quantity in ("velocity", "acceleration", "jerk"):
         axes = np.array([getattr(limits[a], quantity) if a in limits else np.inf for a in AXES])

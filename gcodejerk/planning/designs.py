@@ -1,8 +1,8 @@
-"""Designs: for each profile, how the laws of many moves are found in the time that they have.
+"""Designs: for each profile, how the profiles of many moves are found in the time that they have.
 
 This module owns the table from a profile's name to its design. A design gets moves as columns
-(their time, their limits, what they excite) and gives a law for each, with what it leaves. When a
-design is used, and what happens where it finds nothing, the planner decides.
+(their time, their limits, what they excite) and gives a profile for each, with what it leaves. When
+a design is used, and what happens where it finds nothing, the planner decides.
 
 Rule: a design changes no move's time, but for `shortest`, whose result the time is.
 """
@@ -18,25 +18,25 @@ from numpy.typing import NDArray
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import (
-    Laws,
     Objective,
-    SymmetricLaws,
+    Profiles,
+    SymmetricProfiles,
     design_condition3,
     design_four_segments,
     four_segment_range,
     whole_intervals,
 )
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.cascade import design_cascade
 from gcodejerk.motion.search.conditions import design_condition
-from gcodejerk.motion.search.optimal import Move, Optimum, optimum_laws
+from gcodejerk.motion.search.optimal import Move, Optimum, optimum_profiles
 from gcodejerk.motion.search.socp import require_solver
-from gcodejerk.planning.conventional import conventional_limits, todays_laws, unit_limits
+from gcodejerk.planning.conventional import conventional_limits, todays_profiles, unit_limits
 from gcodejerk.planning.optima import Progress, Question, answers
 from gcodejerk.planning.plans import Modes, Plans
 
 ALLOWED = 0.97
-"""Share of the tolerance that a law may use; rounding to the resolution needs some, too."""
+"""Share of the tolerance that a profile may use; rounding to the resolution needs some, too."""
 COARSE = 24
 """Moves of so few intervals may gain from segments that end between them."""
 
@@ -50,11 +50,12 @@ class Task:
     counts : ndarray of int, shape (n,)
         T_SUM. [intervals]
     limits : tuple of ndarray, shape (n,)
-        Velocity, acceleration and jerk of the unit laws. [1/s], [1/s^2], [1/s^3]
-    conventional : Laws
+        Velocity, acceleration and jerk of the unit profiles. [1/s], [1/s^2], [1/s^3]
+    conventional : Profiles
         What the controller does today.
-    symmetric : SymmetricLaws
-        The fastest symmetric laws within the same limits: what the controller does, but for a bell.
+    symmetric : SymmetricProfiles
+        The fastest symmetric profiles within the same limits: what the controller does, but for a
+        bell.
     objective : Objective
         What they are judged by.
     interval, band, tolerance : float
@@ -65,8 +66,8 @@ class Task:
 
     counts: NDArray[np.int64]
     limits: tuple[Array, Array, Array]
-    conventional: Laws
-    symmetric: SymmetricLaws
+    conventional: Profiles
+    symmetric: SymmetricProfiles
     objective: Objective
     interval: float
     band: float
@@ -94,7 +95,7 @@ class Task:
         progress : callable, optional
             See `Progress`.
         speed : ndarray, shape (n,), optional
-            Speed of unit laws that the program states, which no law exceeds; NaN for none. [1/s]
+            Speed that the program states, which no unit profile exceeds; NaN for none. [1/s]
         lone : ndarray of bool, shape (n,), optional
             No other motion follows directly (`Axis.conventional`); all of them by default.
 
@@ -105,7 +106,7 @@ class Task:
         rapid, limits = conventional_limits(machine, share, lone), unit_limits(machine, share)
         if speed is not None:
             rapid, limits = ((np.fmin(V, speed), A, J) for V, A, J in (rapid, limits))
-        symmetric, conventional = todays_laws(machine, rapid)
+        symmetric, conventional = todays_profiles(machine, rapid)
         if counts is None:
             counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
         weights = np.abs(share @ modes.participation.T)
@@ -145,62 +146,62 @@ class Task:
         return replace(self, counts=counts)
 
 
-Design = Callable[[Task], tuple[Laws, Array]]
-"""Laws of the moves, and the largest residual of each [mm], infinite where there is none."""
+Design = Callable[[Task], tuple[Profiles, Array]]
+"""Profiles of the moves, and the largest residual of each [mm], infinite where there is none."""
 
 
-def condition3(task: Task) -> tuple[Laws, Array]:
+def condition3(task: Task) -> tuple[Profiles, Array]:
     """Condition III, or its generalisation where a limit binds."""
     V, A, J = task.limits
     conventional, total = task.symmetric, task.total
-    # Four segments where the conventional law has them: it is then a member of the family.
+    # Four segments where the conventional profile has them: it is then a member of the family.
     four = (conventional.Ta == 0.0) & (conventional.Tv == 0.0)
     low, high = four_segment_range(total, V, A, J, task.interval)
     four &= low <= high
-    laws, worst = conventional, np.full(len(task), np.inf)
+    profiles, worst = conventional, np.full(len(task), np.inf)
     index = np.nonzero(four)[0]
     found, worst[index] = design_four_segments(
         total[index], low[index], high[index], task.objective.take(index)
     )
-    laws = laws.replaced(index, found)
+    profiles = profiles.replaced(index, found)
     index = np.nonzero(~four)[0]
     found, worst[index], _ = design_condition3(
         total[index], V[index], A[index], J[index], task.objective.take(index),
         task.interval, conventional.take(index),
     )  # fmt: skip
-    # A law that is not feasible may have no shape at all.
+    # A profile that is not feasible may have no shape at all.
     feasible = index[np.isfinite(worst[index])]
-    laws = laws.replaced(feasible, found.take(np.isfinite(worst[index])))
-    return laws.general(), worst
+    profiles = profiles.replaced(feasible, found.take(np.isfinite(worst[index])))
+    return profiles.general(), worst
 
 
-def condition1(task: Task) -> tuple[Laws, Array]:
+def condition1(task: Task) -> tuple[Profiles, Array]:
     """Condition I at its best T1."""
     return design_condition("I", task.total, *task.limits, task.objective, task.interval)
 
 
-def condition2(task: Task) -> tuple[Laws, Array]:
+def condition2(task: Task) -> tuple[Profiles, Array]:
     """Condition II at its best T1."""
     return design_condition("II", task.total, *task.limits, task.objective, task.interval)
 
 
-def cascade(task: Task) -> tuple[Laws, Array]:
+def cascade(task: Task) -> tuple[Profiles, Array]:
     """Moving averages as wide as the modes' periods, in the unchanged time."""
-    laws, worst = design_cascade(task.total, *task.limits, task.objective, task.interval)
-    return _with(task.conventional, np.isfinite(worst), laws), worst
+    profiles, worst = design_cascade(task.total, *task.limits, task.objective, task.interval)
+    return _with(task.conventional, np.isfinite(worst), profiles), worst
 
 
-def optimal(task: Task) -> tuple[Laws, Array]:
-    """The least worst residual over the band, of all laws there are.
+def optimal(task: Task) -> tuple[Profiles, Array]:
+    """The least worst residual over the band, of all profiles there are.
 
-    The programme knows jerks that change at whole intervals only. Where a law of another design,
-    whose segments need not end there, is better still, that one is taken.
+    The programme knows jerks that change at whole intervals only. Where a profile of another
+    design, whose segments need not end there, is better still, that one is taken.
     """
-    laws, worst = task.conventional, np.full(len(task), np.inf)
+    profiles, worst = task.conventional, np.full(len(task), np.inf)
     rows = np.nonzero(task.objective.weights.any(axis=1))[0]
     reference = task.objective.of(task.conventional)
     found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
-    laws, worst = _answered(task, rows, found, laws, worst)
+    profiles, worst = _answered(task, rows, found, profiles, worst)
     everything = np.ones(len(task), dtype=bool)
     for rival, where in (
         (condition3, everything),
@@ -215,12 +216,12 @@ def optimal(task: Task) -> tuple[Laws, Array]:
         hope = np.isfinite(nominal) & (nominal < worst[index])
         residual[index[hope]] = worst_in_band(task.take(index[hope]), others.take(hope))
         better = residual < worst
-        laws = laws.replaced(better, others.take(better[index]))
+        profiles = profiles.replaced(better, others.take(better[index]))
         worst = np.where(better, residual, worst)
-    return laws, worst
+    return profiles, worst
 
 
-def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Laws, Array, NDArray[np.int64]]:
+def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Profiles, Array, NDArray[np.int64]]:
     """The least time in which no mode is left with more than the tolerance, over the band.
 
     Parameters
@@ -232,7 +233,7 @@ def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Laws, Array, NDArr
 
     Returns
     -------
-    laws, worst : Laws and ndarray, shape (n,)
+    profiles, worst : Profiles and ndarray, shape (n,)
         As of a `Design`.
     counts : ndarray of int, shape (n,)
         T_SUM of each. [intervals]
@@ -255,29 +256,29 @@ def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Laws, Array, NDArr
         high[rows[quiet]] = middle[quiet]
         low[rows[~quiet]] = middle[~quiet]
     final = task.after(high)
-    laws, worst = _quiet(final, reference)
+    profiles, worst = _quiet(final, reference)
     # Within the tolerance all are equal: the smoothest is taken.
     rows = np.nonzero(possible & task.objective.weights.any(axis=1))[0]
     questions = [
         _question(final, k, float(reference[k]), task.tolerance, smooth=True) for k in rows
     ]
-    return *_answered(final, rows, answers(questions, task.progress), laws, worst), high
+    return *_answered(final, rows, answers(questions, task.progress), profiles, worst), high
 
 
-def _quiet(task: Task, reference: Array) -> tuple[Laws, Array]:
-    """Laws within the tolerance over the band, of Condition III or optimal; else infinite."""
-    laws, nominal = condition3(task)
+def _quiet(task: Task, reference: Array) -> tuple[Profiles, Array]:
+    """Profiles within the tolerance over the band, of Condition III or optimal; else infinite."""
+    profiles, nominal = condition3(task)
     worst = np.full(len(task), np.inf)
     hope = nominal <= task.tolerance
-    worst[hope] = worst_in_band(task.take(hope), laws.take(hope))
+    worst[hope] = worst_in_band(task.take(hope), profiles.take(hope))
     worst = np.where(worst <= task.tolerance, worst, np.inf)
     rows = np.nonzero(~np.isfinite(worst))[0]
     questions = [_question(task, k, float(reference[k]), task.tolerance) for k in rows]
-    return _answered(task, rows, answers(questions, task.progress), laws, worst)
+    return _answered(task, rows, answers(questions, task.progress), profiles, worst)
 
 
 def bounds(task: Task) -> Array:
-    """The least residual that any law within the limits leaves, at the modes' own frequencies.
+    """The least residual that any profile within the limits leaves, at the modes' own frequencies.
 
     Parameters
     ----------
@@ -287,7 +288,7 @@ def bounds(task: Task) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        NaN where no law on the grid keeps the limits. [mm]
+        NaN where no profile on the grid keeps the limits. [mm]
 
     Raises
     ------
@@ -318,7 +319,7 @@ def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
     -------
     ndarray, shape (n,)
         Largest residual displacement over the modes, at their own frequencies; NaN where a move is
-        not planned or no law on the grid keeps the limits. Of axes that move each on its own, a
+        not planned or no profile on the grid keeps the limits. Of axes that move each on its own, a
         mode that several of them excite is left out: they might cancel each other. [mm]
 
     Raises
@@ -326,7 +327,7 @@ def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
     PlanError
         scipy or clarabel is not installed.
     """
-    task = Task.of(plans.machine, plans.modes, plans.share, plans.law_counts, progress)
+    task = Task.of(plans.machine, plans.modes, plans.share, plans.profile_counts, progress)
     excited = np.zeros((len(plans), len(plans.modes.poles)), dtype=np.int64)
     np.add.at(excited, plans.move, task.objective.weights > 0.0)
     weights = np.where(excited[plans.move] > 1, 0.0, task.objective.weights)
@@ -346,14 +347,14 @@ def known_limits(plans: Plans, progress: Progress | None = None) -> Array | None
     return least_residuals(plans, progress)
 
 
-def worst_in_band(task: Task, laws: Laws) -> Array:
-    """Largest residual displacement of laws with every frequency anywhere within the band.
+def worst_in_band(task: Task, profiles: Profiles) -> Array:
+    """Largest residual displacement of profiles with every frequency anywhere within the band.
 
     Parameters
     ----------
     task : Task
         The moves.
-    laws : Laws
+    profiles : Profiles
         One for each.
 
     Returns
@@ -362,13 +363,13 @@ def worst_in_band(task: Task, laws: Laws) -> Array:
         [mm]
     """
     worst = np.zeros(len(task))
-    total = laws.total
+    total = profiles.total
     # A longer move needs more frequencies: moves of like duration together.
     octave = np.frexp(total)[1]
     for k in np.unique(octave):
         index = np.nonzero(octave == k)[0]
         objective = task.objective.take(index).in_band(task.band, float(total[index].max()))
-        worst[index] = objective.of(laws.take(index))
+        worst[index] = objective.of(profiles.take(index))
     return worst
 
 
@@ -386,22 +387,26 @@ def _question(
 
 
 def _answered(
-    task: Task, rows: NDArray[np.intp], found: list[Optimum | None], laws: Laws, worst: Array
-) -> tuple[Laws, Array]:
-    """Laws and residuals with those of the answers in the place of what they answer."""
+    task: Task,
+    rows: NDArray[np.intp],
+    found: list[Optimum | None],
+    profiles: Profiles,
+    worst: Array,
+) -> tuple[Profiles, Array]:
+    """Profiles and residuals with those of the answers in the place of what they answer."""
     solved = [(row, optimum) for row, optimum in zip(rows, found, strict=True) if optimum]
     if not solved:
-        return laws, worst
+        return profiles, worst
     index = np.array([row for row, _ in solved])
     worst = worst.copy()
     worst[index] = [optimum.worst for _, optimum in solved]
     optima = [optimum for _, optimum in solved]
-    return laws.replaced(index, optimum_laws(optima, task.interval)), worst
+    return profiles.replaced(index, optimum_profiles(optima, task.interval)), worst
 
 
-def _with(laws: Laws, where: NDArray[np.bool_], others: Laws) -> Laws:
-    """These laws with others in some places; both have a law for each move."""
-    return laws.replaced(where, others.take(where))
+def _with(profiles: Profiles, where: NDArray[np.bool_], others: Profiles) -> Profiles:
+    """These profiles with others in some places; both have a profile for each move."""
+    return profiles.replaced(where, others.take(where))
 
 
 DESIGNS: dict[str, Design] = {

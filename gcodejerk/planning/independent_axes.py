@@ -1,8 +1,8 @@
 """Rapids under independent positioning: when each axis arrives, and where the path runs.
 
 Under `positioning: independent` every axis runs on its own, so a rapid of several axes is a dogleg.
-A designed law keeps each axis's ends and time but not its place at every moment in between, so the
-path differs a little from the one that the control itself takes. This module owns how much.
+A designed profile keeps each axis's ends and time but not its place at every moment in between, so
+the path differs a little from the one that the control itself takes. This module owns how much.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.motion import sample_laws
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion import sample_profiles
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Batch
 
@@ -36,10 +36,10 @@ def arrivals(plans: Plans, move: int) -> dict[str, tuple[float, float]]:
         Axis -> time after the start.
     """
     out = {}
-    for law in plans.laws_of(move):
-        axis = int(np.argmax(plans.share[law] != 0.0))
-        planned = float(plans.law_counts[law]) * plans.machine.interval
-        out[AXES[axis]] = (planned, float(plans.conventional.total[law]))
+    for profile in plans.profiles_of(move):
+        axis = int(np.argmax(plans.share[profile] != 0.0))
+        planned = float(plans.profile_counts[profile]) * plans.machine.interval
+        out[AXES[axis]] = (planned, float(plans.conventional.total[profile]))
     return out
 
 
@@ -59,13 +59,13 @@ def path_deviation(batch: Batch) -> Array:
         one linear axis moves. [mm]
     """
     plans, moves = batch.plans, batch.moves
-    rows = np.concatenate([np.array(plans.laws_of(int(move))) for move in moves])
+    rows = np.concatenate([np.array(plans.profiles_of(int(move))) for move in moves])
     row_of = np.searchsorted(moves, plans.move[rows])
     linear = [a for a in batch.exact if not _rotary(plans, a)]
     out = np.zeros(len(moves))
     if plans.machine.positioning == "linear" or len(linear) < 2:
         return out
-    unit, _ = sample_laws(
+    unit, _ = sample_profiles(
         plans.conventional.take(rows), batch.grid.knots[row_of], plans.machine.interval
     )
     planned, own = (np.zeros((len(moves), unit.shape[1], len(linear))) for _ in range(2))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
-from gcodejerk.motion import laws_response
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion import profiles_response
+from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Batch, Spelling, make_streams
@@ -60,7 +60,7 @@ class Plan:
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Whether the conventional law is written, shape (1,)."""
+        """Whether the conventional profile is written, shape (1,)."""
         return self.batch.kept
 
     @property
@@ -69,9 +69,9 @@ class Plan:
         return "conventional" if self.batch.kept[0] else self.plans.designed
 
     @property
-    def laws(self) -> Laws:
-        """The unit law that is written, or one for each axis under independent positioning."""
-        return self.batch.laws
+    def profiles(self) -> Profiles:
+        """The unit profile that is written, or one for each axis under independent positioning."""
+        return self.batch.profiles
 
     @property
     def t(self) -> Array:
@@ -106,10 +106,12 @@ class Plan:
         modes, share = self.plans.modes, self.plans.share
         weights = share @ modes.participation.T
         columns = []
-        for laws in (self.batch.laws, self.plans.conventional):
-            # Laws of one move end at different times; each rings on until the last has ended.
-            left = (laws.total.max() - laws.total)[:, np.newaxis]
-            response = laws_response(laws, modes.poles) * np.exp(modes.poles * left) * weights
+        for profiles in (self.batch.profiles, self.plans.conventional):
+            # Profiles of one move end at different times; each rings on until the last has ended.
+            left = (profiles.total.max() - profiles.total)[:, np.newaxis]
+            response = (
+                profiles_response(profiles, modes.poles) * np.exp(modes.poles * left) * weights
+            )
             displacement = np.abs(response.sum(axis=0)) / modes.poles.imag
             columns.append(modes.accelerations(displacement))
         return [(float(columns[0][m]), float(columns[1][m])) for m in self.plans.excited(0)]
@@ -136,7 +138,7 @@ def plan_move(
     time : float, optional
         T_SUM, rounded up to whole intervals; the conventional time by default. [s]
     T1 : float, optional
-        T1 of a four-segment law; the best by default. [s]
+        T1 of a four-segment profile; the best by default. [s]
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Optimal laws of many moves: each distinct problem once, on all cores, remembered on disk.
+"""Optimal profiles of many moves: each distinct problem once, on all cores, remembered on disk.
 
 This module owns what makes optima affordable. A problem does not depend on the length of its move,
 only on the number of intervals, on the limits relative to the length, on the poles and on the
@@ -27,12 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.optimal import (
     Move,
     Optimum,
     least_residual,
-    optimum_laws,
+    optimum_profiles,
     quiet_enough,
     smoothest_within,
 )
@@ -63,9 +63,9 @@ class Question:
     move : Move
         The move.
     reference : float
-        Residual of the controller's own law: the measure for what is small. [mm]
+        Residual of the controller's own profile: the measure for what is small. [mm]
     allowed : float
-        0: the least residual. Above: a law that leaves no more. [mm]
+        0: the least residual. Above: a profile that leaves no more. [mm]
     smooth : bool
         Of those that leave no more than allowed, the one with the least peak jerk.
     """
@@ -110,7 +110,7 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     Returns
     -------
     list of Optimum or None
-        n answers; None where no law keeps the limits.
+        n answers; None where no profile keeps the limits.
 
     Raises
     ------
@@ -211,28 +211,28 @@ def _solved(question: Question) -> Optimum | None:
 
 
 def _holding(optima: list[Optimum], moves: list[Move]) -> NDArray[np.bool_]:
-    """Whether solutions are laws of these moves: their grid, their end, limits, no way back."""
+    """Whether solutions are profiles of these moves: their grid, their end, limits, no way back."""
     sound = np.array([_sound(o, move) for o, move in zip(optima, moves, strict=True)], dtype=bool)
     rows = np.nonzero(sound)[0]
     if not len(rows):
         return sound
     interval = moves[0].interval
-    laws = optimum_laws([optima[k] for k in rows], interval)
+    profiles = optimum_profiles([optima[k] for k in rows], interval)
     V = np.array([moves[k].velocity for k in rows])
     A = np.array([moves[k].acceleration for k in rows])
     J = np.minimum([moves[k].jerk for k in rows], A / interval)
-    last = laws.first[1:] - 1
-    d, j = laws.duration[last], laws.jerk[last]
-    a, v, s = laws.acceleration[last], laws.velocity[last], laws.position[last]
-    peak, steepest = laws.peak_velocity, laws.peak_acceleration
+    last = profiles.first[1:] - 1
+    d, j = profiles.duration[last], profiles.jerk[last]
+    a, v, s = profiles.acceleration[last], profiles.velocity[last], profiles.position[last]
+    peak, steepest = profiles.peak_velocity, profiles.peak_acceleration
     sound[rows] = (
         (np.abs(s + (v + (0.5 * a + j * d / 6.0) * d) * d - 1.0) <= ARRIVED)
         & (np.abs(v + (a + 0.5 * j * d) * d) <= ARRIVED * peak)
         & (np.abs(a + j * d) <= ARRIVED * steepest)
         & (peak <= V * (1.0 + HELD))
-        & (laws.least_velocity >= -HELD * peak)
+        & (profiles.least_velocity >= -HELD * peak)
         & (steepest <= A * (1.0 + HELD))
-        & (laws.greatest_jerk <= J * (1.0 + HELD))
+        & (profiles.greatest_jerk <= J * (1.0 + HELD))
     )
     return sound
 

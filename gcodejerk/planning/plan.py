@@ -1,8 +1,8 @@
-"""The planner: moves on a machine become time laws, all moves of a program at once.
+"""The planner: moves on a machine become time profiles, all moves of a program at once.
 
 This module owns the decisions between the program and the physics: how long a move takes (its
-conventional time, rounded up to whole intervals), which laws compete, when the conventional one
-stays, and why a move cannot be planned. Numbers are columns: one row a move, one row a law.
+conventional time, rounded up to whole intervals), which profiles compete, when the conventional one
+stays, and why a move cannot be planned. Numbers are columns: one row a move, one row a profile.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import (
     GRID_TOLERANCE,
-    Laws,
-    SymmetricLaws,
-    conventional_laws,
+    Profiles,
+    SymmetricProfiles,
+    conventional_profiles,
     four_segment_range,
     joined,
     whole_intervals,
 )
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.condition3 import TIE
-from gcodejerk.motion.shapers import SHAPERS, shaped_law
+from gcodejerk.motion.shapers import SHAPERS, shaped_profile
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.conventional import least_time
 from gcodejerk.planning.designs import DESIGNS, Task, shortest, worst_in_band
@@ -67,7 +67,7 @@ def plan_moves(
     time : float, optional
         T_SUM for all moves, in place of the conventional time rounded up. [s]
     T1 : float, optional
-        T1 of a four-segment law for all moves, in place of the best. [s]
+        T1 of a four-segment profile for all moves, in place of the best. [s]
     progress : callable, optional
         Called while optima are computed.
     speed : ndarray, shape (n,), optional
@@ -188,7 +188,7 @@ def plan_rapids(
     _rule_out(reason, np.asarray(stops.any(axis=1)), Reason.NO_BLENDING)
     _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
     if only_gains and profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
-        # Those keep the law or save time; all others do nothing but keep modes still.
+        # Those keep the profile or save time; all others do nothing but keep modes still.
         _rule_out(reason, length > 0.0, Reason.NO_MODE)
     return plan_moves(
         displacement, machine, profile, reason,
@@ -202,7 +202,7 @@ def _rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) 
 
 
 class _Planner:
-    """One call of `plan_moves`: its laws, from limits to designs."""
+    """One call of `plan_moves`: its profiles, from limits to designs."""
 
     def __init__(
         self,
@@ -238,61 +238,63 @@ class _Planner:
         self.limits, self.conventional = self.task.limits, self.task.conventional
 
     def run(self) -> Plans:
-        """Design every law, then gather the moves."""
+        """Design every profile, then gather the moves."""
         total = (
             self.conventional.total if self.time is None else np.full(len(self.share), self.time)
         )
         counts = np.maximum(whole_intervals(total, self.interval), 1)
         kept = np.zeros(len(counts), dtype=bool)
         if self.profile == "conventional":
-            laws, feasible = self._conventional(counts)
+            profiles, feasible = self._conventional(counts)
             kept[:] = True
         elif self.profile in SHAPERS:
-            laws, counts, feasible = self._shaped()
+            profiles, counts, feasible = self._shaped()
         elif self.T1 is not None:
-            laws, feasible = self._given_T1(counts)
+            profiles, feasible = self._given_T1(counts)
         elif self.profile == "shortest":
-            laws, counts, feasible = self._shortest(counts)
+            profiles, counts, feasible = self._shortest(counts)
         else:
-            laws, counts, feasible, kept = self._designed(counts)
-        self._rule_out_laws(~feasible, Reason.LIMITS)
-        return self._plans(laws, counts, kept)
+            profiles, counts, feasible, kept = self._designed(counts)
+        self._rule_out_profiles(~feasible, Reason.LIMITS)
+        return self._plans(profiles, counts, kept)
 
-    def _conventional(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
-        """The controller's own laws; a trapezoid cannot be written with finite jerk."""
-        laws = self.conventional
+    def _conventional(self, counts: NDArray[np.int64]) -> tuple[Profiles, NDArray[np.bool_]]:
+        """The controller's own profiles; a trapezoid cannot be written with finite jerk."""
+        profiles = self.conventional
         if self.time is not None:
-            laws = laws.stretched(counts * self.interval / laws.total)
-        return laws, self._within_limits(laws)
+            profiles = profiles.stretched(counts * self.interval / profiles.total)
+        return profiles, self._within_limits(profiles)
 
-    def _within_limits(self, laws: Laws) -> NDArray[np.bool_]:
-        """Whether laws keep the limits of a designed profile."""
+    def _within_limits(self, profiles: Profiles) -> NDArray[np.bool_]:
+        """Whether profiles keep the limits of a designed profile."""
         V, A, J = (limit * (1.0 + 1e-9) for limit in self.limits)
-        jerk = laws.peak_jerk
-        fits: NDArray[np.bool_] = (laws.peak_velocity <= V) & (laws.peak_acceleration <= A)
+        jerk = profiles.peak_jerk
+        fits: NDArray[np.bool_] = (profiles.peak_velocity <= V) & (profiles.peak_acceleration <= A)
         return fits & (jerk <= J) & np.isfinite(jerk)
 
-    def _shaped(self) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_]]:
-        """The conventional laws behind an input shaper, for the mode that shakes most."""
+    def _shaped(self) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_]]:
+        """The conventional profiles behind an input shaper, for the mode that shakes most."""
         if self.time is not None:
             raise PlanError(
                 f"the time of profile {self.profile} follows from its shaper",
                 "leave out --time, or choose another profile",
             )
-        laws = self.conventional
+        profiles = self.conventional
         modes = self.modes
         if len(modes.poles):
-            frequency = np.abs(modes.poles[self.task.objective.dominant(laws)]) / (2.0 * np.pi)
-            laws = joined(
+            frequency = np.abs(modes.poles[self.task.objective.dominant(profiles)]) / (2.0 * np.pi)
+            profiles = joined(
                 [
-                    shaped_law(laws.take(np.array([row])), self.profile, float(frequency[row]))
-                    for row in range(len(laws))
+                    shaped_profile(
+                        profiles.take(np.array([row])), self.profile, float(frequency[row])
+                    )
+                    for row in range(len(profiles))
                 ]
             )
         fits = self._within_limits(self.conventional)
-        return laws, whole_intervals(laws.total, self.interval), fits
+        return profiles, whole_intervals(profiles.total, self.interval), fits
 
-    def _given_T1(self, counts: NDArray[np.int64]) -> tuple[Laws, NDArray[np.bool_]]:
+    def _given_T1(self, counts: NDArray[np.int64]) -> tuple[Profiles, NDArray[np.bool_]]:
         """Four segments with the T1 that the user asked for."""
         assert self.T1 is not None
         total: Array = np.asarray(counts * self.interval, dtype=float)
@@ -305,76 +307,76 @@ class _Planner:
         low, high = four_segment_range(total, *self.limits, self.interval)
         T1 = np.full(len(total), self.T1)
         zero = np.zeros(len(total))
-        laws = SymmetricLaws(T1, zero, 0.5 * total - T1, zero)
+        profiles = SymmetricProfiles(T1, zero, 0.5 * total - T1, zero)
         tolerance = 1e-9 * self.interval
         bad = ~((low - tolerance <= T1) & (high + tolerance >= T1))
         if bad.any():
             row = int(np.nonzero(bad)[0][0])
             raise limit_error(
-                self.machine, self.share[row], laws.take(slice(row, row + 1)),
+                self.machine, self.share[row], profiles.take(slice(row, row + 1)),
                 f"with T1 = {self.T1:g} s ",
             )  # fmt: skip
-        return laws.general(), ~bad
+        return profiles.general(), ~bad
 
     def _shortest(
         self, least: NDArray[np.int64]
-    ) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_]]:
+    ) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_]]:
         """The least time in which the vibration stays within the tolerance."""
         if self.time is not None:
             raise PlanError(
                 "the time of profile shortest is what it looks for",
                 "leave out --time, or choose profile optimal",
             )
-        fastest = conventional_laws(*self.limits, self.interval).total
+        fastest = conventional_profiles(*self.limits, self.interval).total
         # What the controller's own move and two periods of every mode take is always enough...
         slack = 2.0 * float((2.0 * np.pi / self.modes.poles.imag).sum())
         longest = whole_intervals(
             np.maximum(fastest, self.conventional.total) + slack, self.interval
         )
         task = self.task.after(whole_intervals(fastest, self.interval))
-        laws, worst, counts = shortest(task, longest)
-        return laws, counts, np.isfinite(worst)
+        profiles, worst, counts = shortest(task, longest)
+        return profiles, counts, np.isfinite(worst)
 
     def _designed(
         self, counts: NDArray[np.int64]
-    ) -> tuple[Laws, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    ) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
         """A profile of unchanged time; longer only where the limits leave no room."""
-        laws, worst = DESIGNS[self.profile](self.task.after(counts))
+        profiles, worst = DESIGNS[self.profile](self.task.after(counts))
         kept = np.zeros(len(counts), dtype=bool)
         fits = self._within_limits(self.conventional)
         if self.time is None:
             reference = self._judged(self.task.after(counts), self.conventional)
             keep = fits & (worst >= reference - self._worthwhile())
-            laws = laws.replaced(keep, self.conventional.take(keep))
+            profiles = profiles.replaced(keep, self.conventional.take(keep))
             worst = np.where(keep, reference, worst)
             kept |= keep
-            laws, counts, worst = self._extend(laws, counts, worst)
+            profiles, counts, worst = self._extend(profiles, counts, worst)
             # A trapezoid cannot be written: where the design shakes more, it is left alone.
             worse = ~fits & np.isfinite(worst) & (worst > reference)
-            self._rule_out_laws(worse, Reason.NOT_BETTER)
+            self._rule_out_profiles(worse, Reason.NOT_BETTER)
         elif not np.isfinite(worst).all():
             row = int(np.nonzero(~np.isfinite(worst))[0][0])
             limits = tuple(limit[row : row + 1] for limit in self.limits)
             total = float(counts[row] * self.interval)
             raise time_error(self.machine, self.share[row], limits, total, self.profile)
-        return laws, counts, np.isfinite(worst), kept
+        return profiles, counts, np.isfinite(worst), kept
 
-    def _judged(self, task: Task, laws: Laws) -> Array:
-        """Largest residual displacement of laws, as the profile judges its own [mm]."""
-        nominal = task.objective.of(laws)
-        return worst_in_band(task, laws) if self.profile == "optimal" else nominal
+    def _judged(self, task: Task, profiles: Profiles) -> Array:
+        """Largest residual displacement of profiles, as the profile judges its own [mm]."""
+        nominal = task.objective.of(profiles)
+        return worst_in_band(task, profiles) if self.profile == "optimal" else nominal
 
     def _extend(
-        self, laws: Laws, counts: NDArray[np.int64], worst: Array
-    ) -> tuple[Laws, NDArray[np.int64], Array]:
+        self, profiles: Profiles, counts: NDArray[np.int64], worst: Array
+    ) -> tuple[Profiles, NDArray[np.int64], Array]:
         """The least feasible time, at most `max_extension` longer, where T_SUM is impossible."""
         rows = np.nonzero(~np.isfinite(worst))[0]
         if not len(rows):
-            return laws, counts, worst
+            return profiles, counts, worst
         counts = counts.copy()
         longest = (1.0 + self.machine.design.max_extension) * self.conventional.total
         most = np.floor(longest / self.interval + GRID_TOLERANCE).astype(np.int64)
-        fastest = conventional_laws(*self.limits, self.interval).total
+        fastest = conventional_profiles(*self.limits, self.interval).total
         least = whole_intervals(fastest, self.interval)
         counts[rows] = np.maximum(counts[rows] + 1, least[rows])
         for _ in range(8):
@@ -383,14 +385,14 @@ class _Planner:
                 break
             found, value = DESIGNS[self.profile](self.task.after(counts).take(rows))
             done = np.isfinite(value)
-            laws = laws.replaced(rows[done], found.take(done))
+            profiles = profiles.replaced(rows[done], found.take(done))
             worst[rows[done]] = value[done]
             rows = rows[~done]
             counts[rows] += 1
-        return laws, counts, worst
+        return profiles, counts, worst
 
     def _worthwhile(self) -> Array:
-        """The gain below which the conventional law stays: what rounding may add to it [mm].
+        """The gain below which the conventional profile stays: what rounding may add to it [mm].
 
         The optimum promises the least there is; where rounding spoils it, its stream falls back.
         """
@@ -404,14 +406,16 @@ class _Planner:
         noise: Array = np.minimum(each, 1.0).max(axis=1, initial=0.0)
         return noise
 
-    def _rule_out_laws(self, where: NDArray[np.bool_], why: Reason) -> None:
-        """Give a reason to the moves of these laws."""
+    def _rule_out_profiles(self, where: NDArray[np.bool_], why: Reason) -> None:
+        """Give a reason to the moves of these profiles."""
         moves = np.zeros(len(self.reason), dtype=bool)
         moves[self.move[where]] = True
         _rule_out(self.reason, moves, why)
 
-    def _plans(self, laws: Laws, counts: NDArray[np.int64], kept: NDArray[np.bool_]) -> Plans:
-        """The laws of planned moves, and the moves' own columns."""
+    def _plans(
+        self, profiles: Profiles, counts: NDArray[np.int64], kept: NDArray[np.bool_]
+    ) -> Plans:
+        """The profiles of planned moves, and the moves' own columns."""
         conventional_time = np.zeros(len(self.reason))
         np.maximum.at(conventional_time, self.move, self.conventional.total)
         keep = np.nonzero(self.reason[self.move] == CERTAIN)[0]
@@ -427,9 +431,9 @@ class _Planner:
             counts=move_counts,
             move=self.move[keep],
             share=self.share[keep],
-            laws=laws.take(keep),
+            profiles=profiles.take(keep),
             conventional=self.conventional.take(keep),
-            law_counts=counts[keep],
+            profile_counts=counts[keep],
             kept=kept[keep],
             designed=self.profile,
         )

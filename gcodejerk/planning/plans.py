@@ -1,8 +1,8 @@
-"""Plans: what was decided for many moves at once, as columns of moves and of laws.
+"""Plans: what was decided for many moves at once, as columns of moves and of profiles.
 
-A move along a straight line has one law, which every axis follows in proportion to its
-displacement. Under `positioning: independent` each axis has a law of its own. Both are the same
-thing here: a law has a *share*, the displacement of every axis that it carries.
+A move along a straight line has one profile, which every axis follows in proportion to its
+displacement. Under `positioning: independent` each axis has a profile of its own. Both are the same
+thing here: a profile has a *share*, the displacement of every axis that it carries.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, Mode
-from gcodejerk.motion import Laws, grouped, mode_poles
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion import Profiles, grouped, mode_poles
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.reasons import CERTAIN
 
@@ -95,7 +95,7 @@ class Modes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plans:
-    """Planned moves: columns of n moves, and of the l laws that they follow.
+    """Planned moves: columns of n moves, and of the l profiles that they follow.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Plans:
     modes : Modes
         Its modes.
     reason : ndarray of uint8, shape (n,)
-        CERTAIN, or the index in `REASONS` of why the move is not planned; it then has no law.
+        CERTAIN, or the index in `REASONS` of why the move is not planned; it then has no profile.
     displacement : ndarray, shape (n, 9)
         Of each axis. [mm] or [deg]
     length : ndarray, shape (n,)
@@ -114,17 +114,17 @@ class Plans:
     counts : ndarray of int, shape (n,)
         T_SUM; 0 where the move is not planned. [intervals]
     move : ndarray of int, shape (l,)
-        The move of each law, ascending.
+        The move of each profile, ascending.
     share : ndarray, shape (l, 9)
-        Displacement of each axis that the law carries. [mm] or [deg]
-    laws, conventional : Laws
-        The designed laws, and those of the controller's own G0.
-    law_counts : ndarray of int, shape (l,)
-        T_SUM of each law. [intervals]
+        Displacement of each axis that the profile carries. [mm] or [deg]
+    profiles, conventional : Profiles
+        The designed profiles, and those of the controller's own G0.
+    profile_counts : ndarray of int, shape (l,)
+        T_SUM of each profile. [intervals]
     kept : ndarray of bool, shape (l,)
-        The law is the conventional one, because none is better.
+        The profile is the conventional one, because none is better.
     designed : str
-        Name of the profile that all other laws follow.
+        Name of the profile that all other profiles follow.
     """
 
     machine: Machine
@@ -136,9 +136,9 @@ class Plans:
     counts: NDArray[np.int64]
     move: NDArray[np.int64]
     share: Array
-    laws: Laws
-    conventional: Laws
-    law_counts: NDArray[np.int64]
+    profiles: Profiles
+    conventional: Profiles
+    profile_counts: NDArray[np.int64]
     kept: NDArray[np.bool_]
     designed: str
 
@@ -151,9 +151,9 @@ class Plans:
         planned: NDArray[np.bool_] = self.reason == CERTAIN
         return planned
 
-    def profile(self, law: int) -> str:
-        """Name of the profile that a law follows."""
-        return "conventional" if self.kept[law] else self.designed
+    def profile(self, profile: int) -> str:
+        """Name of the profile that a profile follows."""
+        return "conventional" if self.kept[profile] else self.designed
 
     def excited(self, move: int) -> list[int]:
         """The entries of the modes that a move excites."""
@@ -161,8 +161,8 @@ class Plans:
         used = ((self.modes.participation != 0.0) & moving).any(axis=1)
         return sorted(set(self.modes.group[used].tolist()))
 
-    def laws_of(self, move: int) -> range:
-        """The laws of a move."""
+    def profiles_of(self, move: int) -> range:
+        """The profiles of a move."""
         begin, end = np.searchsorted(self.move, [move, move + 1])
         return range(int(begin), int(end))
 

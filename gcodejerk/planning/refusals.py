@@ -11,19 +11,19 @@ import numpy as np
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
-from gcodejerk.motion import SymmetricLaws, conventional_laws, whole_intervals
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion import SymmetricProfiles, conventional_profiles, whole_intervals
+from gcodejerk.motion.profiles.profile import Array
 
 
-def _squeezed(fastest: SymmetricLaws, total: float, interval: float) -> SymmetricLaws:
-    """One law squeezed into a shorter time, its segments no shorter than the interval."""
+def _squeezed(fastest: SymmetricProfiles, total: float, interval: float) -> SymmetricProfiles:
+    """One profile squeezed into a shorter time, its segments no shorter than the interval."""
     stretch = total / fastest.total
     ramp = np.clip(fastest.T1 * stretch, interval, 0.25 * total)
     Ta = np.clip(fastest.Ta * stretch, 0.0, 0.5 * total - 2.0 * ramp)
-    return SymmetricLaws(ramp, Ta, ramp, total - 4.0 * ramp - 2.0 * Ta)
+    return SymmetricProfiles(ramp, Ta, ramp, total - 4.0 * ramp - 2.0 * Ta)
 
 
-def limit_error(machine: Machine, share: Array, law: SymmetricLaws, how: str) -> PlanError:
+def limit_error(machine: Machine, share: Array, profile: SymmetricProfiles, how: str) -> PlanError:
     """Which axis passes which limit, in the words of its unit.
 
     Parameters
@@ -32,8 +32,8 @@ def limit_error(machine: Machine, share: Array, law: SymmetricLaws, how: str) ->
         Its limits.
     share : ndarray, shape (9,)
         Displacement of each axis. [mm] or [deg]
-    law : SymmetricLaws
-        The one law that breaks a limit.
+    profile : SymmetricProfiles
+        The one profile that breaks a limit.
     how : str
         What the message begins with.
 
@@ -41,17 +41,17 @@ def limit_error(machine: Machine, share: Array, law: SymmetricLaws, how: str) ->
     -------
     PlanError
     """
-    total = float(law.total[0])
-    if float(np.minimum(law.T1, law.T2)[0]) < machine.interval * (1.0 - 1e-9):
+    total = float(profile.total[0])
+    if float(np.minimum(profile.T1, profile.T2)[0]) < machine.interval * (1.0 - 1e-9):
         return PlanError(
-            f"T1 = {float(law.T1[0]):g} s leaves a segment shorter than the interval "
+            f"T1 = {float(profile.T1[0]):g} s leaves a segment shorter than the interval "
             f"of {machine.interval:g} s",
             f"give a T1 from {machine.interval:g} to {0.5 * total - machine.interval:g} s",
         )
     units = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
     for quantity in ("velocity", "acceleration", "jerk"):
         for axis in machine.axes:
-            peak = float(getattr(law, quantity)[0] * abs(share[AXES.index(axis.name)]))
+            peak = float(getattr(profile, quantity)[0] * abs(share[AXES.index(axis.name)]))
             limit = getattr(axis.limit, quantity)
             if peak > limit * (1.0 + 1e-9):
                 unit = ("deg" if axis.rotary else "mm") + units[quantity]
@@ -60,7 +60,7 @@ def limit_error(machine: Machine, share: Array, law: SymmetricLaws, how: str) ->
                     f"in {total:.3f} s, above its limit of {limit:.6g} {unit}",
                     f"allow more time (--time), or raise axes.{axis.name}.limit.{quantity}",
                 )
-    raise AssertionError("a law outside its range keeps every limit")
+    raise AssertionError("a profile outside its range keeps every limit")
 
 
 def time_error(
@@ -79,7 +79,7 @@ def time_error(
     share : ndarray, shape (9,)
         Displacement of each axis. [mm] or [deg]
     limits : tuple of ndarray, shape (1,)
-        Velocity, acceleration and jerk of the unit law.
+        Velocity, acceleration and jerk of the unit profile.
     total : float
         The time that was asked for. [s]
     profile : str
@@ -90,7 +90,7 @@ def time_error(
     PlanError
     """
     V, A, J = limits
-    fastest = conventional_laws(V, A, J, machine.interval)
+    fastest = conventional_profiles(V, A, J, machine.interval)
     least = float(whole_intervals(fastest.total, machine.interval)[0] * machine.interval)
     if total >= least * (1.0 - 1e-9):
         return PlanError(
@@ -98,9 +98,9 @@ def time_error(
             "choose profile condition3 or optimal, or give another time (--time)",
         )
     if total >= 4.0 * machine.interval:
-        law = _squeezed(fastest, total, machine.interval)
-        if bool((law.velocity > V) | (law.acceleration > A) | (law.jerk > J)):
-            error = limit_error(machine, share, law, "")
+        squeezed = _squeezed(fastest, total, machine.interval)
+        if bool((squeezed.velocity > V) | (squeezed.acceleration > A) | (squeezed.jerk > J)):
+            error = limit_error(machine, share, squeezed, "")
             return PlanError(error.problem, f"allow at least {least:.6g} s (--time {least:.6g})")
     return PlanError(
         f"no profile of {total:g} s keeps the limits and has segments of at least "

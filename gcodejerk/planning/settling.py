@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.planning.designs import Task
@@ -97,12 +97,12 @@ def _today(plans: Plans, moved: Array, lone: NDArray[np.bool_]) -> tuple[Array, 
         move, axis = np.nonzero(moved)
         share = np.zeros((len(move), len(AXES)))
         share[np.arange(len(move)), axis] = moved[move, axis]
-    laws = Task.of(machine, modes, share, lone=lone[move]).conventional
+    profiles = Task.of(machine, modes, share, lone=lone[move]).conventional
     weights = share @ modes.participation.T
     residual, time = np.zeros((len(moved), len(modes.poles))), np.zeros(len(moved))
     for row in range(len(moved)):
         own = np.flatnonzero(move == row) if machine.positioning != "linear" else np.array([row])
-        part = laws.take(own)
+        part = profiles.take(own)
         response = arrival_response(part, weights[own], modes.poles)
         residual[row] = np.abs(response) / modes.poles.imag
         time[row] = float(part.total.max())

@@ -1,11 +1,11 @@
 """Streams: planned moves as the points that are written, and what these leave in the modes.
 
-This module owns the step from laws to written numbers: sampling at the interval, rounding to whole
-steps, and the residual of exactly what was rounded. It works on batches, so that a program with a
-hundred thousand rapids needs no more memory than one with a thousand.
+This module owns the step from profiles to written numbers: sampling at the interval, rounding to
+whole steps, and the residual of exactly what was rounded. It works on batches, so that a program
+with a hundred thousand rapids needs no more memory than one with a thousand.
 
 Rule: a report speaks of the stream as written. Where rounding has made a design worse than the
-conventional law, the conventional law is written instead.
+conventional profile, the conventional profile is written instead.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.motion import (
     Grid,
-    Laws,
+    Profiles,
     knots_response,
     residual_displacement,
     round_positions,
-    sample_laws,
+    sample_profiles,
     sampled_response,
     whole_intervals,
 )
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.planning.plans import Plans
 
@@ -93,9 +93,9 @@ class Batch:
         Displacement envelope of each mode at arrival, of the stream as written and of the
         controller's own rapid sampled at the interval. [mm]
     kept : ndarray of bool, shape (b,)
-        The stream is the conventional law.
-    laws : Laws
-        The laws that are written, one for each of the plans' laws of these moves.
+        The stream is the conventional profile.
+    profiles : Profiles
+        The profiles that are written, one for each of the plans' profiles of these moves.
     """
 
     moves: NDArray[np.int64]
@@ -109,7 +109,7 @@ class Batch:
     residual: Array
     conventional_residual: Array
     kept: NDArray[np.bool_]
-    laws: Laws
+    profiles: Profiles
 
     def __len__(self) -> int:
         return len(self.moves)
@@ -166,36 +166,37 @@ def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[list
 
 
 def _make_batch(plans: Plans, moves: NDArray[np.int64], spelling: Spelling, stride: int) -> Batch:
-    """One batch; where rounding made a move worse than the conventional law, it gets that law."""
+    """One batch; a move that rounding made worse than the conventional profile gets that one."""
     rows = np.concatenate([np.arange(*_bounds(plans, move)) for move in moves]).astype(np.int64)
     row_of = np.searchsorted(moves, plans.move[rows])
-    # Of axes that run on their own, some may keep the conventional law: the move has not kept it.
+    # Of axes that run on their own, some may keep the conventional profile: the move has not kept
+    # it.
     kept = np.ones(len(moves), dtype=bool)
     np.logical_and.at(kept, row_of, plans.kept[rows])
     made = _Maker(plans, moves, rows, row_of, spelling, stride)
     conventional = made.conventional_residual()
-    batch = made.batch(plans.laws.take(rows), kept, conventional)
+    batch = made.batch(plans.profiles.take(rows), kept, conventional)
     worst = plans.modes.grouped(batch.residual).max(axis=1, initial=0.0)
     reference = plans.modes.grouped(conventional).max(axis=1, initial=0.0)
     worse = (worst > reference) & made.writable(plans.conventional.take(rows)) & ~kept
     if worse.any():
-        laws = plans.laws.take(rows)
+        profiles = plans.profiles.take(rows)
         again = worse[row_of]
-        laws = laws.replaced(again, plans.conventional.take(rows[again]))
-        batch = made.batch(laws, kept | worse, conventional)
-    # What is written as the conventional law is the conventional law, rounding included.
+        profiles = profiles.replaced(again, plans.conventional.take(rows[again]))
+        batch = made.batch(profiles, kept | worse, conventional)
+    # What is written as the conventional profile is the conventional profile, rounding included.
     same = batch.kept[:, np.newaxis]
     return replace(batch, conventional_residual=np.where(same, batch.residual, conventional))
 
 
 def _bounds(plans: Plans, move: int) -> tuple[int, int]:
-    """First law of a move, and the one behind its last."""
-    laws = plans.laws_of(int(move))
-    return laws.start, laws.stop
+    """First profile of a move, and the one behind its last."""
+    profiles = plans.profiles_of(int(move))
+    return profiles.start, profiles.stop
 
 
 class _Maker:
-    """The parts of a batch that do not depend on which law is written."""
+    """The parts of a batch that do not depend on which profile is written."""
 
     def __init__(
         self,
@@ -222,12 +223,12 @@ class _Maker:
             spelling.finer,
         )
 
-    def writable(self, laws: Laws) -> NDArray[np.bool_]:
-        """Whether the moves' laws, all of them, fit the time and have jerk within the limits."""
+    def writable(self, profiles: Profiles) -> NDArray[np.bool_]:
+        """Whether the moves' profiles, all of them, fit the time and keep the limits of jerk."""
         out = np.ones(len(self.moves), dtype=bool)
         room = self.grid.counts[self.row_of] * self.interval * (1.0 + 1e-9)
-        np.logical_and.at(out, self.row_of, laws.total <= room)
-        jerk = laws.peak_jerk
+        np.logical_and.at(out, self.row_of, profiles.total <= room)
+        jerk = profiles.peak_jerk
         finite = np.isfinite(jerk)
         np.logical_and.at(out, self.row_of, finite)
         jerk = np.where(finite, jerk, 0.0)
@@ -238,20 +239,20 @@ class _Maker:
 
     def conventional_residual(self) -> Array:
         """Of the controller's own rapid, sampled at the interval, shape (b, m) [mm]."""
-        laws = self.plans.conventional.take(self.rows)
-        counts = whole_intervals(laws.total, self.interval)
+        profiles = self.plans.conventional.take(self.rows)
+        counts = whole_intervals(profiles.total, self.interval)
         longest = np.zeros(len(self.moves), dtype=np.int64)
         np.maximum.at(longest, self.row_of, counts)
-        return residual_displacement(self._response(laws, longest), self.modes.poles)
+        return residual_displacement(self._response(profiles, longest), self.modes.poles)
 
-    def batch(self, laws: Laws, kept: NDArray[np.bool_], conventional: Array) -> Batch:
+    def batch(self, profiles: Profiles, kept: NDArray[np.bool_], conventional: Array) -> Batch:
         """Sample, round, and see what is left in the modes."""
         moments = self.grid.knots[self.row_of]
-        unit, speed = sample_laws(laws, moments, self.interval)
+        unit, speed = sample_profiles(profiles, moments, self.interval)
         exact: dict[int, Array] = {}
         whole: dict[int, NDArray[np.int64]] = {}
         velocity: dict[int, Array] = {}
-        response = self._response(laws, self.grid.counts)
+        response = self._response(profiles, self.grid.counts)
         for axis in self.axes:
             # Where an axis stands still its position may be unknown, and nothing is written of it.
             moving = self.plans.displacement[self.moves, axis] != 0.0
@@ -284,20 +285,20 @@ class _Maker:
             residual=residual_displacement(response, self.modes.poles),
             conventional_residual=conventional,
             kept=kept,
-            laws=laws,
+            profiles=profiles,
         )
 
     def _gather(self, unit: Array, axis: int) -> Array:
-        """Sum of an axis's laws times its share of each, shape (b, k)."""
+        """Sum of an axis's profiles times its share of each, shape (b, k)."""
         out = np.zeros((len(self.moves), unit.shape[1]))
         used = self.share[:, axis] != 0.0
         np.add.at(out, self.row_of[used], unit[used] * self.share[used, axis, np.newaxis])
         return out
 
-    def _response(self, laws: Laws, counts: NDArray[np.int64]) -> Complex:
+    def _response(self, profiles: Profiles, counts: NDArray[np.int64]) -> Complex:
         """Response of the modes to moves sampled at every interval, not rounded, shape (b, m)."""
         every = Grid.every(counts, 1, self.interval)
-        unit, _ = sample_laws(laws, every.knots[self.row_of], self.interval)
+        unit, _ = sample_profiles(profiles, every.knots[self.row_of], self.interval)
         each = sampled_response(unit, self.interval, self.modes.poles)
         weights = self.share @ self.modes.participation.T
         response = np.zeros((len(self.moves), len(self.modes.poles)), dtype=np.complex128)

@@ -17,8 +17,8 @@ import numpy as np
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Mode
-from gcodejerk.motion import laws_response, mode_poles
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion import mode_poles, profiles_response
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.report.figures import acceleration_curve, new_figure
@@ -118,8 +118,8 @@ class _Drawing:
         self.others = [c for c in comparison.contenders if c.name not in self.styles]
         self.axis = comparison.longest
         column = comparison.share[:, AXES.index(self.axis)]
-        self.law = int(np.argmax(np.abs(column)))
-        self.length = float(column[self.law])
+        self.profile = int(np.argmax(np.abs(column)))
+        self.length = float(column[self.profile])
         rotary = comparison.machine.axis(self.axis).rotary
         self.unit, self.small = ("deg", "deg/1000") if rotary else ("mm", "µm")
 
@@ -181,7 +181,9 @@ class _Drawing:
         """Acceleration of the axis that moves farthest."""
         curves = []
         for contender in self.shown:
-            t, a = acceleration_curve(contender.laws.take(slice(self.law, self.law + 1)))
+            t, a = acceleration_curve(
+                contender.profiles.take(slice(self.profile, self.profile + 1))
+            )
             curves.append((t, self.length * a))
         scale = max(float(np.abs(a).max()) for _, a in curves)
         for k, (contender, (t, a)) in enumerate(zip(self.shown, curves, strict=True)):
@@ -206,7 +208,7 @@ class _Drawing:
         for contender in self.shown:
             count = int(np.clip(30.0 * fastest * (end - contender.time), 400, 8000))
             t = np.linspace(0.0, end - contender.time, count)
-            response = arrival_response(contender.laws, weights, modes.poles) / modes.poles.imag
+            response = arrival_response(contender.profiles, weights, modes.poles) / modes.poles.imag
             swing = np.zeros(count)
             for pole, amplitude in zip(modes.poles, response, strict=True):
                 swing -= (amplitude * np.exp(pole * t)).imag
@@ -230,7 +232,9 @@ class _Drawing:
     def frequencies(self, axes: Axes) -> str:
         """What a mode of any frequency would keep, and where the machine's own modes are."""
         modes = self.comparison.modes
-        weights = np.abs(modes.participation @ self.comparison.share[self.law]) / abs(self.length)
+        weights = np.abs(modes.participation @ self.comparison.share[self.profile]) / abs(
+            self.length
+        )
         own: list[tuple[Mode, float]] = []
         lines: list[Array] = []
         for g in self.comparison.excited:
@@ -248,8 +252,8 @@ class _Drawing:
         poles = mode_poles(frequency, _damping(frequency, [m for m, _ in own]))
         top = 0.0
         for contender in (*self.others, *self.shown):
-            law = contender.laws.take(slice(self.law, self.law + 1))
-            D = UM * abs(self.length) * np.abs(laws_response(law, poles)[0]) / poles.imag
+            profile = contender.profiles.take(slice(self.profile, self.profile + 1))
+            D = UM * abs(self.length) * np.abs(profiles_response(profile, poles)[0]) / poles.imag
             top = max(top, float(D.max()))
             style = OTHERS if contender in self.others else self._style(contender)
             axes.plot(frequency, D, **style)

@@ -88,7 +88,7 @@ def axis_peaks(comparison: Comparison, contender: Contender) -> dict[str, Record
     Parameters
     ----------
     comparison : Comparison
-        Tells what each law carries.
+        Tells what each profile carries.
     contender : Contender
         Whose peaks.
 
@@ -98,8 +98,8 @@ def axis_peaks(comparison: Comparison, contender: Contender) -> dict[str, Record
         By axis: `velocity`, `acceleration`, `jerk`, the last one None where the acceleration
         steps. [mm/s], [mm/s^2], [mm/s^3] or of degrees
     """
-    laws = contender.laws
-    peaks = (laws.peak_velocity, laws.peak_acceleration, laws.peak_jerk)
+    profiles = contender.profiles
+    peaks = (profiles.peak_velocity, profiles.peak_acceleration, profiles.peak_jerk)
     out = {}
     for k, share in enumerate(comparison.share):
         for axis in np.flatnonzero(share):
@@ -112,25 +112,27 @@ def axis_peaks(comparison: Comparison, contender: Contender) -> dict[str, Record
 
 
 def _segments(comparison: Comparison, contender: Contender) -> list[Record] | Record | None:
-    """Segments of constant jerk, of the common law or of each axis's."""
-    laws = contender.laws
-    stepped = bool(np.isinf(laws.peak_jerk).any())
-    if contender.name == AVERAGE or stepped or len(laws.begin) > MOST_SEGMENTS * len(laws):
+    """Segments of constant jerk, of the common profile or of each axis's."""
+    profiles = contender.profiles
+    stepped = bool(np.isinf(profiles.peak_jerk).any())
+    if contender.name == AVERAGE or stepped or len(profiles.begin) > MOST_SEGMENTS * len(profiles):
         return None
     if comparison.machine.positioning == "linear":
         lengths = np.abs(comparison.share[0])
         linear = [not comparison.machine.axis(AXES[k]).rotary for k in np.flatnonzero(lengths)]
         moving = lengths[lengths > 0.0]
         path = moving[linear] if any(linear) else moving
-        return _scaled(laws.segments(0), float(np.sqrt((path**2).sum())))
+        return _scaled(profiles.segments(0), float(np.sqrt((path**2).sum())))
     return {
-        AXES[int(np.argmax(share != 0.0))]: _scaled(laws.segments(k), float(np.abs(share).sum()))
+        AXES[int(np.argmax(share != 0.0))]: _scaled(
+            profiles.segments(k), float(np.abs(share).sum())
+        )
         for k, share in enumerate(comparison.share)
     }
 
 
 def _scaled(segments: list[tuple[float, float]], length: float) -> list[Record]:
-    """Segments of a unit law, scaled to a length."""
+    """Segments of a unit profile, scaled to a length."""
     return [{"duration": number(d), "jerk": number(j * length)} for d, j in segments]
 
 

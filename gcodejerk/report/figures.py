@@ -12,8 +12,8 @@ import numpy as np
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
-from gcodejerk.motion import sample_laws
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion import sample_profiles
+from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.planning.move import Plan
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
     """
     figure = new_figure(suffix, (7.2, 7.2))
     shown = [_Curve("controller's own G0", TODAY, plan.plans.conventional, plan)]
-    shown.append(_Curve(f"{plan.profile}, as written", PLANNED, plan.laws, plan))
+    shown.append(_Curve(f"{plan.profile}, as written", PLANNED, plan.profiles, plan))
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
     for curve in shown:
         curve.draw(upper, middle, lower)
@@ -105,9 +105,9 @@ def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
 
 
 class _Curve:
-    """One law of the longest-moving axis, and the sum of what it does to the modes."""
+    """One profile of the longest-moving axis, and the sum of what it does to the modes."""
 
-    def __init__(self, label: str, colour: str, laws: Laws, plan: Plan) -> None:
+    def __init__(self, label: str, colour: str, profiles: Profiles, plan: Plan) -> None:
         self.label, self.colour = label, colour
         modes, share = plan.plans.modes, plan.plans.share
         slowest = min((mode.frequency for mode in modes.modes), default=1.0 / plan.time)
@@ -117,14 +117,14 @@ class _Curve:
         self.velocity, self.vibration = np.zeros_like(self.t), np.zeros_like(self.t)
         step = self.t[1]
         moments = np.arange(len(self.t), dtype=np.int64)[np.newaxis, :]
-        for k in range(len(laws)):
-            _, v = sample_laws(laws.take(slice(k, k + 1)), moments, step)
+        for k in range(len(profiles)):
+            _, v = sample_profiles(profiles.take(slice(k, k + 1)), moments, step)
             self.velocity += v[0] * share[k, axis]
             weights = modes.participation @ share[k]
             for pole, weight in zip(modes.poles, weights, strict=True):
                 self.vibration += weight * _response(v[0], step, complex(pole))
             if share[k, axis]:
-                t, a = acceleration_curve(laws.take(slice(k, k + 1)))
+                t, a = acceleration_curve(profiles.take(slice(k, k + 1)))
                 self.corners, self.acceleration = t, a * share[k, axis]
 
     def draw(self, upper: Axes, middle: Axes, lower: Axes) -> None:
@@ -138,21 +138,21 @@ class _Curve:
         lower.plot(ms, self.vibration * 1e3, **style)
 
 
-def acceleration_curve(laws: Laws) -> tuple[Array, Array]:
-    """Corners of the acceleration of one unit law; steps are vertical lines.
+def acceleration_curve(profiles: Profiles) -> tuple[Array, Array]:
+    """Corners of the acceleration of one unit profile; steps are vertical lines.
 
     Parameters
     ----------
-    laws : Laws
-        One law of s segments.
+    profiles : Profiles
+        One profile of s segments.
 
     Returns
     -------
     t, a : ndarray, shape (2 s + 2,)
         [s], [1/s^2]
     """
-    t = np.stack([laws.begin, laws.begin + laws.duration], axis=1).ravel()
-    a = np.stack([laws.acceleration, laws.end_acceleration], axis=1).ravel()
+    t = np.stack([profiles.begin, profiles.begin + profiles.duration], axis=1).ravel()
+    a = np.stack([profiles.acceleration, profiles.end_acceleration], axis=1).ravel()
     return np.concatenate([[0.0], t, t[-1:]]), np.concatenate([[0.0], a, [0.0]])
 
 

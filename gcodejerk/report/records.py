@@ -18,7 +18,7 @@ from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion import whole_intervals
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.designs import known_limits
 from gcodejerk.planning.independent_axes import arrivals, dogleg_notes, path_deviation
@@ -58,10 +58,14 @@ class Records:
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
         self.extension = extra * interval
         written = kept[plans.move] if len(plans) else np.zeros(0, dtype=bool)
-        self.laws = plans.laws.replaced(written, plans.conventional.take(written))
+        self.profiles = plans.profiles.replaced(written, plans.conventional.take(written))
         self.rest = rest
         self.oscillators = (residual, conventional)
-        self.peaks = (self.laws.peak_velocity, self.laws.peak_acceleration, self.laws.peak_jerk)
+        self.peaks = (
+            self.profiles.peak_velocity,
+            self.profiles.peak_acceleration,
+            self.profiles.peak_jerk,
+        )
 
     def summary(self) -> Record:
         """The counts and totals of all moves."""
@@ -124,7 +128,7 @@ class Records:
             "limit": None,
         }
         if planned:
-            of_move = plans.laws_of(row)
+            of_move = plans.profiles_of(row)
             kept = bool(self.kept[row])
             record |= {
                 "time": number(float(plans.counts[row]) * plans.machine.interval),
@@ -143,21 +147,24 @@ class Records:
         return record
 
     def _limit(self, row: int) -> float | None:
-        """What the best law would leave; never more than what this one leaves."""
+        """What the best profile would leave; never more than what this one leaves."""
         return number(float(np.minimum(self.limit[row], self.residual[row].max(initial=0.0))))
 
     def _segments(self, row: int, of_move: range) -> Any:
-        """Segments of the common law, or of each axis's."""
+        """Segments of the common profile, or of each axis's."""
         plans = self.plans
         interval = plans.machine.interval
         if plans.machine.positioning == "linear":
             total = float(plans.counts[row]) * interval
-            return _scaled(self.laws.segments(of_move.start), float(plans.length[row]), total)
+            return _scaled(self.profiles.segments(of_move.start), float(plans.length[row]), total)
         out: Record = {}
         for k in of_move:
             axis = int(np.argmax(plans.share[k] != 0.0))
-            length, total = abs(float(plans.share[k, axis])), float(plans.law_counts[k]) * interval
-            out[AXES[axis]] = _scaled(self.laws.segments(k), length, total)
+            length, total = (
+                abs(float(plans.share[k, axis])),
+                float(plans.profile_counts[k]) * interval,
+            )
+            out[AXES[axis]] = _scaled(self.profiles.segments(k), length, total)
         return out
 
     def _peak(self, of_move: range) -> Record:
@@ -293,13 +300,13 @@ def move_record(plan: Plan) -> Record:
 def conventional_motion(plan: Plan) -> Record:
     """Time, segments and peaks of the controller's own G0, as the `motion` of a record has them."""
     plans = plan.plans
-    usual = replace(plans, laws=plans.conventional, kept=np.ones_like(plans.kept))
+    usual = replace(plans, profiles=plans.conventional, kept=np.ones_like(plans.kept))
     records = Records(usual, np.ones(1, dtype=bool), plan.residual, plan.conventional_residual)
     motion = records.motion(0) | {"time": number(plan.conventional_time)}
     if isinstance(motion["segments"], list):
         motion["segments"] = _scaled(plans.conventional.segments(0), plan.length, 0.0)
     else:
-        for k in plans.laws_of(0):
+        for k in plans.profiles_of(0):
             axis = AXES[int(np.argmax(plans.share[k] != 0.0))]
             motion["segments"][axis] = _scaled(plans.conventional.segments(k), 1.0, 0.0)
     return motion
@@ -342,7 +349,7 @@ def dump(record: Record) -> bytes:
 
 
 def _scaled(segments: list[tuple[float, float]], length: float, time: float) -> list[Record]:
-    """Segments scaled to a length; a rest fills up the time of a law that is shorter."""
+    """Segments scaled to a length; a rest fills up the time of a profile that is shorter."""
     out = [{"duration": number(d), "jerk": number(j * length)} for d, j in segments]
     rest = time - sum(d for d, _ in segments)
     if rest > 1e-9:

@@ -23,7 +23,7 @@ from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.plan import plan_rapids
@@ -77,7 +77,7 @@ class Result:
     residual, conventional_residual : ndarray, shape (n, m)
         Displacement envelopes of every rapid and mode, NaN where not planned. [mm]
     kept : ndarray of bool, shape (n,)
-        The stream is the conventional law: nothing better was found.
+        The stream is the conventional profile: nothing better was found.
     deviation : ndarray, shape (n,)
         Under independent positioning, how far the path leaves the control's own, at most. [mm]
     rest : Left

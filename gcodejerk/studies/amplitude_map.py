@@ -16,9 +16,9 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Axis, Machine, Mode
 from gcodejerk.motion import (
-    Laws,
-    laws_response,
+    Profiles,
     mode_poles,
+    profiles_response,
     residual_displacement,
     whole_intervals,
 )
@@ -31,7 +31,7 @@ from gcodejerk.motion.profiles.conditions import (
     feasible,
     limit_use,
 )
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.planning.designs import Task
 from gcodejerk.planning.plans import Modes
 
@@ -160,11 +160,11 @@ class Survey:
     @property
     def conventional_peaks(self) -> Peaks:
         """What the controller's own G0 reaches; the jerk of a trapezoid is infinite."""
-        law = self._conventional()
+        profile = self._conventional()
         return Peaks(
             *(
                 self.length * peak[0]
-                for peak in (law.peak_velocity, law.peak_acceleration, law.peak_jerk)
+                for peak in (profile.peak_velocity, profile.peak_acceleration, profile.peak_jerk)
             )
         )
 
@@ -209,7 +209,7 @@ class Survey:
     def conventional_amplitude(self, mode: Mode) -> float:
         """What one mode keeps of the controller's own G0, for participation 1 [mm/s^2]."""
         poles = mode_poles([mode.frequency], [mode.damping])
-        unit = residual_displacement(laws_response(self._conventional(), poles), poles)
+        unit = residual_displacement(profiles_response(self._conventional(), poles), poles)
         return float(unit[0, 0] * self.length * (2.0 * np.pi * mode.frequency) ** 2)
 
     @property
@@ -260,8 +260,8 @@ class Survey:
             low, high = T1[max(best - 1, 0)], T1[min(best + 1, len(T1) - 1)]
         return Chosen(float(T1[best]), T, float(value[best]))
 
-    def _conventional(self) -> Laws:
-        """The unit law of the controller's own G0."""
+    def _conventional(self) -> Profiles:
+        """The unit profile of the controller's own G0."""
         share = np.zeros((1, len(AXES)))
         share[0, AXES.index(self.axis.name)] = self.length
         return Task.of(self.machine, Modes.of(self.machine), share).conventional

@@ -5,11 +5,11 @@ time, their peaks, what every mode keeps at its own frequency and within a band 
 the machine has come to rest. It knows no file and draws nothing; `report.compare_record`,
 `report.compare_table` and `report.compare_figure` do.
 
-Rule 1: laws are judged, not streams. What a mode keeps is exact for the profile itself, before it
-is sampled and rounded; so a shaper's delays need no grid, and nothing is lost for anyone.
+Rule 1: profiles are judged, not streams. What a mode keeps is exact for the profile itself, before
+it is sampled and rounded; so a shaper's delays need no grid, and nothing is lost for anyone.
 
 Rule 2: Conditions I and II compete at their best T1 whatever the limits say, as the paper has them;
-shapers act on the controller's own law, made for the mode that it shakes most. Everyone else
+shapers act on the controller's own profile, made for the mode that it shakes most. Everyone else
 keeps the limits, as the planner sees to. Who breaks a limit says so.
 """
 
@@ -23,10 +23,10 @@ import numpy as np
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
-from gcodejerk.motion import Laws, joined, whole_intervals
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion import Profiles, joined, whole_intervals
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.socp import require_solver
-from gcodejerk.motion.shapers import SHAPERS, shaped_law
+from gcodejerk.motion.shapers import SHAPERS, shaped_profile
 from gcodejerk.planning.arrival import arrival_response, worst_in_bands
 from gcodejerk.planning.designs import Task, condition1, condition2, known_limits
 from gcodejerk.planning.move import check_time, displacement_row
@@ -55,8 +55,8 @@ class Contender:
     ----------
     name : str
         One of `CONTENDERS`.
-    laws : Laws
-        The unit law, or one for each moving axis under independent positioning.
+    profiles : Profiles
+        The unit profile, or one for each moving axis under independent positioning.
     displacement, acceleration : ndarray, shape (g,)
         What each entry of the machine's `Modes` keeps when the last axis has arrived. [mm],
         [mm/s^2]
@@ -66,7 +66,7 @@ class Contender:
     settling : float or None
         Time from the start until no mode's envelope is above the tolerance; None: never. [s]
     limit : float or None
-        The least residual displacement of any law that takes as many intervals and keeps the
+        The least residual displacement of any profile that takes as many intervals and keeps the
         limits; None where it is not known. [mm]
     broken : tuple of (str, float)
         The limits that are broken, and how many times over. [-]
@@ -75,7 +75,7 @@ class Contender:
     """
 
     name: str
-    laws: Laws
+    profiles: Profiles
     displacement: Array
     acceleration: Array
     worst_band: tuple[float, ...]
@@ -88,7 +88,7 @@ class Contender:
     @property
     def time(self) -> float:
         """When the last axis arrives [s]; of a shaper or today's G0 no whole intervals."""
-        return float(self.laws.total.max())
+        return float(self.profiles.total.max())
 
     @property
     def worst(self) -> float:
@@ -114,7 +114,7 @@ class Comparison:
     modes : Modes
         The machine's modes.
     share : ndarray, shape (l, 9)
-        Displacement of each axis that each law carries. [mm] or [deg]
+        Displacement of each axis that each profile carries. [mm] or [deg]
     contenders : tuple of Contender
         Those that exist, in the order of `CONTENDERS`.
     absent : dict of str to str
@@ -122,7 +122,7 @@ class Comparison:
     time : float
         T_SUM of the profiles that keep it. [s]
     shaped : tuple of (float, float)
-        Frequency [Hz] and damping ratio that shapers were made for, one for each law that has a
+        Frequency [Hz] and damping ratio that shapers were made for, one for each profile that has a
         shaper.
     """
 
@@ -241,30 +241,30 @@ class _Field:
         self.task = task.after(counts)
         self.conventional = task.conventional
         self.weights = self.share @ self.modes.participation.T
-        self.laws: dict[str, Laws] = {}
+        self.profiles: dict[str, Profiles] = {}
         self.notes: dict[str, str] = {}
         self.absent: dict[str, str] = {}
         self.shaped: list[tuple[float, float]] = []
 
     def enter(self) -> None:
-        """Find the laws of everyone."""
-        self.laws["conventional"] = self.conventional
+        """Find the profiles of everyone."""
+        self.profiles["conventional"] = self.conventional
         free = np.full(len(self.share), np.inf)
         unlimited = replace(self.task, limits=(free, free, free))
         for name, design in (("condition1", condition1), ("condition2", condition2)):
             found, worst = design(unlimited)
             if np.isfinite(worst).all():
-                self.laws[name] = found
+                self.profiles[name] = found
             else:
                 self.absent[name] = "four segments are shorter than the interval"
         self._enter_designs()
         targets = self._targets()
         for name in SHAPERS:
-            self.laws[name] = joined(
+            self.profiles[name] = joined(
                 [
                     self.conventional.take(slice(k, k + 1))
                     if target is None
-                    else shaped_law(self.conventional.take(slice(k, k + 1)), name, *target)
+                    else shaped_profile(self.conventional.take(slice(k, k + 1)), name, *target)
                     for k, target in enumerate(targets)
                 ]
             )
@@ -292,10 +292,12 @@ class _Field:
             if plans.reason[0] != CERTAIN:
                 self.absent[name] = str(REASONS[plans.reason[0]])
                 continue
-            self.laws[name] = plans.laws
+            self.profiles[name] = plans.profiles
             self.notes[name] = self._note(plans, name)
         # With a time of the user's choice: if nobody makes it, the time is what is wrong.
-        if refused and not any(name in self.laws for name in ("condition3", "cascade", "optimal")):
+        if refused and not any(
+            name in self.profiles for name in ("condition3", "cascade", "optimal")
+        ):
             raise refused[0]
 
     def _note(self, plans: Plans, name: str) -> str:
@@ -308,7 +310,7 @@ class _Field:
         return ""
 
     def _targets(self) -> list[tuple[float, float] | None]:
-        """Frequency [Hz] and damping that the shaper of each law is made for."""
+        """Frequency [Hz] and damping that the shaper of each profile is made for."""
         dominant = self.task.objective.dominant(self.conventional)
         out: list[tuple[float, float] | None] = []
         for k, mode in enumerate(dominant):
@@ -322,7 +324,7 @@ class _Field:
 
     def judged(self, displacement: dict[str, float]) -> Comparison:
         """Everyone's figures."""
-        names = [name for name in CONTENDERS if name in self.laws]
+        names = [name for name in CONTENDERS if name in self.profiles]
         limits = known_limits(self._plans(names), self.progress)
         contenders = tuple(
             self._contender(name, np.nan if limits is None else float(limits[k]))
@@ -337,8 +339,8 @@ class _Field:
     def _plans(self, names: list[str]) -> Plans:
         """The contenders as moves, side by side."""
         n, each = len(names), len(self.share)
-        laws = joined([self.laws[name] for name in names])
-        counts = np.maximum(whole_intervals(laws.total, self.machine.interval), 1)
+        profiles = joined([self.profiles[name] for name in names])
+        counts = np.maximum(whole_intervals(profiles.total, self.machine.interval), 1)
         displacement = np.tile(self.row, (n, 1))
         return Plans(
             machine=self.machine,
@@ -350,40 +352,40 @@ class _Field:
             counts=counts.reshape(n, each).max(axis=1),
             move=np.repeat(np.arange(n, dtype=np.int64), each),
             share=np.tile(self.share, (n, 1)),
-            laws=laws,
+            profiles=profiles,
             conventional=joined([self.conventional] * n),
-            law_counts=counts,
+            profile_counts=counts,
             kept=np.zeros(n * each, dtype=bool),
             designed=self.machine.design.profile,
         )
 
     def _contender(self, name: str, limit: float) -> Contender:
         """One contender's figures."""
-        laws, modes = self.laws[name], self.modes
-        response = np.abs(arrival_response(laws, self.weights, modes.poles))
+        profiles, modes = self.profiles[name], self.modes
+        response = np.abs(arrival_response(profiles, self.weights, modes.poles))
         each = response / modes.poles.imag
         displacement = modes.grouped(each)
-        broken = self._broken(laws)
+        broken = self._broken(profiles)
         if not broken:
             # Segments that end between intervals may be a little better than the bound on these.
             limit = min(limit, float(displacement.max()))
-        bands = worst_in_bands(laws, self.weights, modes)
+        bands = worst_in_bands(profiles, self.weights, modes)
         return Contender(
             name=name,
-            laws=laws,
+            profiles=profiles,
             displacement=displacement,
             acceleration=modes.accelerations(each),
             worst_band=bands[0],
             worst_band_acceleration=bands[1],
-            settling=self._settling(float(laws.total.max()), displacement),
+            settling=self._settling(float(profiles.total.max()), displacement),
             limit=limit if np.isfinite(limit) else None,
             broken=broken,
             note=self.notes.get(name, ""),
         )
 
-    def _broken(self, laws: Laws) -> tuple[tuple[str, float], ...]:
-        """Limits that laws break, with the largest share of any axis."""
-        peaks = (laws.peak_velocity, laws.peak_acceleration, laws.peak_jerk)
+    def _broken(self, profiles: Profiles) -> tuple[tuple[str, float], ...]:
+        """Limits that profiles break, with the largest share of any axis."""
+        peaks = (profiles.peak_velocity, profiles.peak_acceleration, profiles.peak_jerk)
         out = []
         for quantity, peak, limit in zip(QUANTITIES, peaks, self.task.limits, strict=True):
             with np.errstate(invalid="ignore"):

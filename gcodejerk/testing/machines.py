@@ -40,8 +40,8 @@ def machines(
     interval : float, optional
         Control command interval. Drawn between 0.0005 and 0.004. [s]
     planner : str, optional
-        The law of the control's own rapids, one of `gcodejerk.machine.PLANNERS`; the limits alone
-        say it where left out. It decides `jerk_limited`.
+        The profile of the control's own rapids, one of `gcodejerk.machine.PLANNERS`; the limits
+        alone say it where left out. It decides `jerk_limited`.
 
     Returns
     -------

@@ -245,6 +245,6 @@ def _judge(paths: Paths, program: Program, machine: Machine, stride: int, found:
     """All checks on points."""
     check_rapids(paths, program.rapids, machine, found)
     check_line(paths, machine, found)
-    # A rapid without length has no time law.
+    # A rapid without length has no time profile.
     if (paths.displacement != 0.0).any(axis=1).all():
         check_dynamics(paths, machine, stride, found)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.motion import sample_laws
+from gcodejerk.motion import sample_profiles
 from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
@@ -93,8 +93,10 @@ def judge(program, row, recorded, first, last):
     axes = moved != 0.0
     progress = (recorded[window, 1:4] - start)[:, axes] @ moved[axes] / length
     count = int(plans.counts[row])
-    law = plans.laws.take(slice(plans.laws_of(row).start, plans.laws_of(row).start + 1))
-    planned = sample_laws(law, np.arange(count + 1)[np.newaxis, :], INTERVAL)[0][0] * length
+    profile = plans.profiles.take(
+        slice(plans.profiles_of(row).start, plans.profiles_of(row).start + 1)
+    )
+    planned = sample_profiles(profile, np.arange(count + 1)[np.newaxis, :], INTERVAL)[0][0] * length
     moving = np.nonzero((progress > 1e-6) & (progress < length - 1e-6))[0]
     duration = moving[-1] - moving[0] + 2
     deviation = np.inf

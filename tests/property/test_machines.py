@@ -1,4 +1,4 @@
-"""Laws that hold on every machine that can be drawn."""
+"""Profiles that hold on every machine that can be drawn."""
 
 import contextlib
 import math

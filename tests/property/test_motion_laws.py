@@ -1,4 +1,4 @@
-"""Laws of motion, over drawn laws, limits and modes."""
+"""Profiles of motion, over drawn profiles, limits and modes."""
 
 import numpy as np
 from hypothesis import Phase, assume, given, settings
@@ -7,16 +7,16 @@ from scipy.linalg import expm
 
 from gcodejerk.motion import (
     Grid,
-    SymmetricLaws,
-    conventional_laws,
+    SymmetricProfiles,
+    conventional_profiles,
     knots_response,
-    laws_response,
     mode_poles,
     polyline_response,
+    profiles_response,
     residual_acceleration,
     residual_displacement,
     round_positions,
-    sample_laws,
+    sample_profiles,
     sampled_response,
 )
 
@@ -32,15 +32,15 @@ damping = st.one_of(st.just(0.0), st.floats(0.0, 0.6))
 
 @st.composite
 def durations(draw):
-    """T1, Ta, T2, Tv of a law, trapezoids and cubics included."""
+    """T1, Ta, T2, Tv of a profile, trapezoids and cubics included."""
     T1, Ta, T2, Tv = (draw(absent) for _ in range(4))
     assume(T1 + Ta + T2 > 0.0)
     return T1, Ta, T2, Tv
 
 
 def law_of(times):
-    """One law."""
-    return SymmetricLaws(*(np.array([t]) for t in times)).general()
+    """One profile."""
+    return SymmetricProfiles(*(np.array([t]) for t in times)).general()
 
 
 def phases(times):
@@ -51,7 +51,7 @@ def phases(times):
 
 
 def simulate(times, omega, zeta):
-    """Envelope after a unit law, by the transition matrices of the mode and its input.
+    """Envelope after a unit profile, by the transition matrices of the mode and its input.
 
     The matrix of a phase takes the mode's state, position and speed of the axis, and the
     acceleration with its rate from the phase's begin to its end.
@@ -72,7 +72,7 @@ def simulate(times, omega, zeta):
 @drawn
 def test_residual_of_a_law_is_that_of_a_simulated_mode(times, f, zeta):
     omega, pole = 2.0 * np.pi * f, mode_poles([f], [zeta])
-    D = float(residual_displacement(laws_response(law_of(times), pole), pole)[0, 0])
+    D = float(residual_displacement(profiles_response(law_of(times), pole), pole)[0, 0])
     # Of the size of the static deflection, a/omega^2: what is far below it is rounding.
     scale = float(law_of(times).peak_acceleration[0]) / omega**2
     np.testing.assert_allclose(D, simulate(times, omega, zeta), rtol=1e-6, atol=1e-9 * scale)
@@ -81,34 +81,34 @@ def test_residual_of_a_law_is_that_of_a_simulated_mode(times, f, zeta):
 @given(segment, absent, segment, absent, frequency, damping)
 @drawn
 def test_residual_of_a_law_is_that_of_its_jerk_steps(T1, Ta, T2, Tv, f, zeta):
-    law, pole = law_of((T1, Ta, T2, Tv)), mode_poles([f], [zeta])
+    profile, pole = law_of((T1, Ta, T2, Tv)), mode_poles([f], [zeta])
     every = [(d, (end - begin) / d) for d, begin, end in phases((T1, Ta, T2, Tv)) if d > 0.0]
     times = np.cumsum([0.0, *(d for d, _ in every)])
     # The cube of the time left, a sixth of it for each step of the jerk, is the length.
     steps = np.diff([j for _, j in every], prepend=0.0, append=0.0)
     steps = steps / ((times[-1] - times) ** 3 @ steps / 6.0)
     A = float(residual_acceleration(times, steps, f, zeta))
-    D = float(residual_displacement(laws_response(law, pole), pole)[0, 0])
-    scale = float(law.peak_acceleration[0])
+    D = float(residual_displacement(profiles_response(profile, pole), pole)[0, 0])
+    scale = float(profile.peak_acceleration[0])
     np.testing.assert_allclose(D * (2 * np.pi * f) ** 2, A, rtol=1e-6, atol=1e-8 * scale)
 
 
 @given(durations(), st.sampled_from([0.0005, 0.001, 0.0037]))
 @drawn
 def test_samples_go_from_0_to_1_and_their_speed_is_their_slope(times, interval):
-    law = law_of(times)
-    count = int(np.ceil(law.total[0] / interval))
+    profile = law_of(times)
+    count = int(np.ceil(profile.total[0] / interval))
     fine = 16
-    q, v = sample_laws(law, np.arange(count * fine + 1)[np.newaxis], interval / fine)
+    q, v = sample_profiles(profile, np.arange(count * fine + 1)[np.newaxis], interval / fine)
     assert q[0, 0] == 0.0
     assert q[0, -1] == 1.0
     assert np.diff(q[0]).min() >= -1e-14
     # Within a step the speed changes by no more than the acceleration allows.
     slope = np.diff(q[0]) / (interval / fine)
     mean = 0.5 * (v[0, 1:] + v[0, :-1])
-    steps = float(law.peak_acceleration[0]) * interval / fine
+    steps = float(profile.peak_acceleration[0]) * interval / fine
     assert np.abs(slope - mean).max() <= steps * (1 + 1e-9) + 1e-9
-    assert v.max() <= float(law.peak_velocity[0]) * (1 + 1e-12)
+    assert v.max() <= float(profile.peak_velocity[0]) * (1 + 1e-12)
 
 
 @given(
@@ -117,16 +117,17 @@ def test_samples_go_from_0_to_1_and_their_speed_is_their_slope(times, interval):
 )  # fmt: skip
 @drawn
 def test_conventional_laws_scale_with_the_length(V, A, J, factor):
-    """A longer move has smaller limits of its unit law, takes longer, and keeps the real ones."""
-    short = conventional_laws([V], [A], [J])
-    long = conventional_laws([V / factor], [A / factor], [J / factor])
+    """A longer move has smaller limits of its unit profile, takes longer, keeps the real ones."""
+    short = conventional_profiles([V], [A], [J])
+    long = conventional_profiles([V / factor], [A / factor], [J / factor])
     assert float(long.total[0]) >= float(short.total[0]) * (1 - 1e-12)
-    for law, scale in ((short, 1.0), (long, factor)):
-        assert float(law.velocity[0]) * scale <= V * (1 + 1e-9)
-        assert float(law.acceleration[0]) * scale <= A * (1 + 1e-9)
-        assert float(law.jerk[0]) * scale <= J * (1 + 1e-9) or np.isinf(J)
-    # In a time unit of its own every law is the same law: all three limits scale by powers of it.
-    slow = conventional_laws([V / 3.0], [A / 9.0], [J / 27.0])
+    for profile, scale in ((short, 1.0), (long, factor)):
+        assert float(profile.velocity[0]) * scale <= V * (1 + 1e-9)
+        assert float(profile.acceleration[0]) * scale <= A * (1 + 1e-9)
+        assert float(profile.jerk[0]) * scale <= J * (1 + 1e-9) or np.isinf(J)
+    # In a time unit of its own every profile is the same profile: all three limits scale by powers
+    # of it.
+    slow = conventional_profiles([V / 3.0], [A / 9.0], [J / 27.0])
     np.testing.assert_allclose(slow.total, 3.0 * short.total, rtol=1e-9)
 
 
@@ -162,11 +163,11 @@ def test_rounded_moves_stay_between_their_ends_and_within_a_step(
     times, length, start, step, stride, modes
 ):
     assume(abs(length) > 8 * step)
-    law, interval = law_of(times), 0.001
-    count = int(np.ceil(law.total[0] / interval))
+    profile, interval = law_of(times), 0.001
+    count = int(np.ceil(profile.total[0] / interval))
     grid = Grid.every(np.array([count]), stride, interval)
     poles = mode_poles([f for f, _ in modes], [z for _, z in modes])
-    exact = start + length * sample_laws(law, grid.knots, interval)[0]
+    exact = start + length * sample_profiles(profile, grid.knots, interval)[0]
     whole = round_positions(exact, grid, np.array([step]), np.zeros(1), poles, np.ones(len(modes)))
     written = whole * step
     inner = (grid.knots > 0) & (grid.knots < count)

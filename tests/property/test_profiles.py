@@ -1,6 +1,6 @@
-"""Laws of every profile, over drawn machines and moves: 2,000 moves, or 200,000 with `--long`.
+"""Profiles of every profile, over drawn machines and moves: 2,000 moves, or 200,000 with `--long`.
 
-What a law does is worked out here from its jerks alone, by sums that share no code with the
+What a profile does is worked out here from its jerks alone, by sums that share no code with the
 package.
 """
 
@@ -26,15 +26,15 @@ cases = settings(
 
 
 class Motion:
-    """One law, integrated from its segments."""
+    """One profile, integrated from its segments."""
 
-    def __init__(self, laws, k):
-        part = slice(laws.first[k], laws.first[k + 1])
-        d, j = laws.duration[part], laws.jerk[part]
+    def __init__(self, profiles, k):
+        part = slice(profiles.first[k], profiles.first[k + 1])
+        d, j = profiles.duration[part], profiles.jerk[part]
         self.t = np.concatenate([[0.0], np.cumsum(d)])
-        self.steps = np.diff(laws.acceleration[part], append=0.0)
-        # A trapezoid's acceleration steps; all other laws begin and end each segment alike.
-        begin = laws.acceleration[part]
+        self.steps = np.diff(profiles.acceleration[part], append=0.0)
+        # A trapezoid's acceleration steps; all other profiles begin and end each segment alike.
+        begin = profiles.acceleration[part]
         end = begin + j * d
         self.jumps = np.concatenate([begin, [0.0]]) - np.concatenate([[0.0], end])
         self.kinks = np.diff(j, prepend=0.0, append=0.0)
@@ -77,7 +77,7 @@ def frequencies(mode, band):
 
 
 def worst(machine, share, motion, band):
-    """Largest residual displacement of one law over all modes and their band."""
+    """Largest residual displacement of one profile over all modes and their band."""
     largest = 0.0
     for _, mode in machine.all_modes():
         weight = sum(share[AXES.index(a)] * p for a, p in mode.participation)
@@ -93,7 +93,7 @@ def worst(machine, share, motion, band):
 def check_law(plans, k, motion, profile):
     """Arrival, limits, no way back."""
     machine, share = plans.machine, plans.share[k]
-    total = plans.law_counts[k] * machine.interval
+    total = plans.profile_counts[k] * machine.interval
     assert abs(motion.length - 1.0) < 1e-8
     assert abs(motion.v[-1]) < 1e-8 * motion.v.max()
     assert motion.t[-1] <= total * (1.0 + 1e-9)
@@ -121,8 +121,8 @@ def test_every_profile_keeps_what_it_promises(machine, seed):
         fits = conventional.planned
         assert (own.counts[fits] == usual[fits]).all(), name
         assert own.planned[fits].all(), name
-        for k in range(len(own.laws)):
-            motion = Motion(own.laws, k)
+        for k in range(len(own.profiles)):
+            motion = Motion(own.profiles, k)
             check_law(own, k, motion, name)
             share, key = own.share[k], (own.move[k], tuple(np.nonzero(own.share[k])[0]))
             judged = band if name == "optimal" else 0.0
@@ -132,7 +132,7 @@ def test_every_profile_keeps_what_it_promises(machine, seed):
                 assert left <= today * (1.0 + 1e-3) + 1e-6, name
             in_band = worst(machine, share, motion, band)
             if name == "optimal":
-                best[key] = in_band, own.law_counts[k]
-            elif key in best and best[key][1] == own.law_counts[k]:
+                best[key] = in_band, own.profile_counts[k]
+            elif key in best and best[key][1] == own.profile_counts[k]:
                 # Points beside those that the optimum was judged on may be worse by a little.
                 assert best[key][0] <= in_band * 1.02 + 2e-7, name

@@ -1,4 +1,4 @@
-"""Laws of reading, over drawn programs and over drawn bytes."""
+"""Profiles of reading, over drawn programs and over drawn bytes."""
 
 import io
 import math

@@ -1,4 +1,4 @@
-"""Laws of planned streams, over drawn machines and moves."""
+"""Profiles of planned streams, over drawn machines and moves."""
 
 import numpy as np
 import pytest
@@ -100,7 +100,7 @@ def test_segments_add_up_to_the_time_and_to_the_length(case):
     plan = plan_or_skip(case)
     position = velocity = acceleration = 0.0
     total = 0.0
-    for d, j in plan.laws.segments(0):
+    for d, j in plan.profiles.segments(0):
         position += velocity * d + acceleration * d**2 / 2 + j * d**3 / 6
         velocity += acceleration * d + j * d**2 / 2
         acceleration += j * d

@@ -74,7 +74,7 @@ def test_every_output_is_accepted_whatever_law_todays_rapids_follow(planner, dat
     found = verify(program, result.output, replace(machine, design=design))
     assert found.violations == ()
     assert found.rewritten == result.planned
-    # No rapid is longer than the law of its control allows.
+    # No rapid is longer than the profile of its control allows.
     planned = result.plans.planned
     today = result.plans.conventional_time[planned]
     most = np.maximum(

@@ -3,8 +3,8 @@
 A motion of bounded jerk through rounded points is free within bounds: over a block of h it can
 have another mean speed by J h^2/12. Where a machine's limit of jerk is high against its F words,
 one F changed by 1 % is another motion that the machine could make, and nobody can tell. What tells
-nevertheless: laws of few segments are smooth, symmetric ones are their own mirror image, and in
-laws with a jerk per interval the trapezoids add up to the way exactly where blocks have two
+nevertheless: profiles of few segments are smooth, symmetric ones are their own mirror image, and in
+profiles with a jerk per interval the trapezoids add up to the way exactly where blocks have two
 intervals. Measured on six blocks of each stream of drawn programs, single F words changed by 1 %
 are noticed in:
 
@@ -131,7 +131,8 @@ def test_outputs_on_drawn_machines_are_accepted(profile, machine, data):
     assert judged(program, ready(machine, profile), controller).violations == ()
 
 
-# On every shipped machine: one rapid that a law of its own is found for, and one for increments.
+# On every shipped machine: one rapid that a profile of its own is found for, and one for
+# increments.
 PROGRAM = b"G21 G90 G94 G64 P0.02\nF60\nG0 Z1.3\nM9\nG91 G0 Z-3.7\nM9\nM2\n"
 POINT = re.compile(rb"(?m)^G1 Z-?[0-9.]+ F[0-9.]+\n")
 

@@ -101,7 +101,7 @@ def test_a_machine_without_modes_gains_nothing_and_says_so():
     assert result.planned == 0
     assert REASONS[result.plans.reason[1]] is Reason.NO_MODE
     assert NO_MODES in result.notes
-    # Time can be gained without modes, and the control's own law is a wish.
+    # Time can be gained without modes, and the control's own profile is a wish.
     assert process(PROGRAM, bare, profile="conventional").planned == 1
     assert process(PROGRAM, bare, profile="shortest").planned == 1
 

@@ -51,11 +51,13 @@ def independent():
     )  # fmt: skip
 
 
-def acceleration(laws, k, t):
-    """Acceleration of law k at moments [s], by interpolation; its corners are no steps here."""
-    law = laws.take(np.array([k]))
-    corners = np.append(law.begin, law.begin[-1] + law.duration[-1])
-    return np.interp(t, corners, np.append(law.acceleration, law.end_acceleration[-1]), 0.0, 0.0)
+def acceleration(profiles, k, t):
+    """Acceleration of profile k at moments [s], by interpolation; its corners are no steps here."""
+    profile = profiles.take(np.array([k]))
+    corners = np.append(profile.begin, profile.begin[-1] + profile.duration[-1])
+    return np.interp(
+        t, corners, np.append(profile.acceleration, profile.end_acceleration[-1]), 0.0, 0.0
+    )
 
 
 def integral(comparison, name, frequency, damping, participation, points=40001):
@@ -65,7 +67,7 @@ def integral(comparison, name, frequency, damping, participation, points=40001):
     t = np.linspace(0.0, T, points)
     a = np.zeros_like(t)
     for k, share in enumerate(comparison.share):
-        a += share @ participation * acceleration(contender.laws, k, t)
+        a += share @ participation * acceleration(contender.profiles, k, t)
     weight = np.full(len(t), 2.0)
     weight[1::2] = 4.0
     weight[[0, -1]] = 1.0
@@ -143,7 +145,7 @@ def test_settling_is_where_a_simulated_envelope_stays_below_the_tolerance(case, 
         count = 4000
         step = contender.time / count
         middle = (np.arange(count) + 0.5) * step
-        drive = sum(w * acceleration(contender.laws, k, middle) for k, w in enumerate(weights))
+        drive = sum(w * acceleration(contender.profiles, k, middle) for k, w in enumerate(weights))
         state = np.zeros(2)
         matrix = expm(system * step)
         for a in drive:
@@ -346,8 +348,8 @@ def test_without_the_solver_all_else_is_compared(monkeypatch):
 def test_axes_on_their_own_ring_on_until_the_last_has_arrived():
     found = independent()
     both = found["conventional"]
-    assert both.laws.total[0] != pytest.approx(both.laws.total[1])
-    late, early = float(both.laws.total.max()), float(both.laws.total.min())
+    assert both.profiles.total[0] != pytest.approx(both.profiles.total[1])
+    late, early = float(both.profiles.total.max()), float(both.profiles.total.min())
     alone = compared(
         "centre", ("Z", 1.0), change=(("positioning: linear", "positioning: independent"),)
     )["conventional"]

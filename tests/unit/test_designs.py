@@ -9,7 +9,7 @@ import pytest
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.motion import laws_response, mode_poles
+from gcodejerk.motion import mode_poles, profiles_response
 from gcodejerk.motion.search.optimal import Move, least_residual
 from gcodejerk.planning.designs import Task, bounds, known_limits, least_residuals, worst_in_band
 from gcodejerk.planning.move import plan_move
@@ -45,7 +45,7 @@ def test_the_shortest_time_is_the_first_in_which_the_tolerance_can_be_kept(lengt
     plans = plan_moves(moves({"Z": length}), PAPER, "shortest")
     count, tolerance = int(plans.counts[0]), PAPER.design.tolerance
     task = task_of(PAPER, moves({"Z": length}))
-    left = float(worst_in_band(task, plans.laws)[0])
+    left = float(worst_in_band(task, plans.profiles)[0])
     assert left <= tolerance
     limits = (600 / length, 5000 / length, 5e6 / length)
     poles, weight = mode_poles([30.0], [0.0]), np.array([length])
@@ -53,7 +53,7 @@ def test_the_shortest_time_is_the_first_in_which_the_tolerance_can_be_kept(lengt
         Move(count - 1, *limits, poles, weight, np.arange(1), PAPER.design.band, 0.001), length
     )
     assert before is None or before.worst > 0.96 * tolerance
-    assert float(plans.laws.total[0]) == pytest.approx(count * 0.001)
+    assert float(plans.profiles.total[0]) == pytest.approx(count * 0.001)
 
 
 def test_the_shortest_profile_is_settled_long_before_the_controllers_own_move():
@@ -79,9 +79,9 @@ def test_no_profile_of_the_same_time_leaves_less_than_the_bound():
     for profile in SAME_TIME:
         plans = plan_moves(displacement, VMC, profile)
         least = least_residuals(plans)
-        task = task_of(VMC, plans.share).after(plans.law_counts)
-        left = task.objective.of(plans.laws)
-        # A law with segments off the grid may gain a little over the best on it.
+        task = task_of(VMC, plans.share).after(plans.profile_counts)
+        left = task.objective.of(plans.profiles)
+        # A profile with segments off the grid may gain a little over the best on it.
         assert (left >= least * 0.97 - 1e-6).all(), profile
     assert np.median(least / task.objective.of(task.conventional)) < 0.01
 
@@ -98,7 +98,7 @@ def test_an_optimum_is_taken_even_where_it_gains_less_than_rounding_may_add():
     displacement = moves({"Z": 0.0361472})
     task = task_of(machine, displacement)
     left = {
-        profile: worst_in_band(task, plan_moves(displacement, machine, profile).laws)[0]
+        profile: worst_in_band(task, plan_moves(displacement, machine, profile).profiles)[0]
         for profile in ("conventional", *SAME_TIME)
     }
     assert left["optimal"] < 0.98 * left["conventional"]
@@ -107,7 +107,7 @@ def test_an_optimum_is_taken_even_where_it_gains_less_than_rounding_may_add():
 
 def test_the_bound_is_null_where_an_exact_null_exists():
     assert bounds(task_of(PAPER, moves({"Z": 1.0})))[0] < 1e-12
-    # With the conventional jerk as limit only the conventional law remains.
+    # With the conventional jerk as limit only the conventional profile remains.
     tight = machine_of(
         ["rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}",
          "limit: {acceleration: 5000.01, jerk: 5.00001e+5}",
@@ -131,13 +131,13 @@ def test_axes_that_move_alone_have_the_bound_of_the_worst_of_them():
 
 def test_a_band_is_judged_where_it_is_worst():
     plans = plan_moves(moves({"Z": 1.0}, {"Z": 40.0}), VMC, "condition3")
-    found = worst_in_band(task_of(VMC, plans.share).after(plans.counts), plans.laws)
+    found = worst_in_band(task_of(VMC, plans.share).after(plans.counts), plans.profiles)
     relative = np.linspace(0.95, 1.05, 801)
     for k, length in enumerate((1.0, 40.0)):
         worst = 0.0
         for mode in VMC.axis("Z").modes:
             poles = mode_poles(mode.frequency * relative, np.full(801, mode.damping))
-            D = np.abs(laws_response(plans.laws.take(np.array([k])), poles))[0] / poles.imag
+            D = np.abs(profiles_response(plans.profiles.take(np.array([k])), poles))[0] / poles.imag
             worst = max(worst, float(D.max()) * length * mode.participation_of("Z"))
         assert found[k] == pytest.approx(worst, rel=2e-3)
 
@@ -212,7 +212,7 @@ def test_a_measured_spectrum_takes_the_place_of_modes(tmp_path):
         assert share.sum() == pytest.approx(1.0)
         assert share @ f == pytest.approx(np.dot(spectrum.weight, spectrum.frequency), rel=0.02)
         poles = mode_poles(f, damping)
-        D = np.abs(laws_response(plan.laws, poles))[0] / poles.imag * 20.0
+        D = np.abs(profiles_response(plan.profiles, poles))[0] / poles.imag * 20.0
         A = D * (2 * np.pi * f) ** 2
         mean = np.sqrt(np.sum(share * A**2)) / (2 * np.pi * spectrum.peak) ** 2
         assert entry["displacement"] == pytest.approx(mean, rel=0.02, abs=3e-4)
@@ -233,7 +233,7 @@ def test_no_law_hides_between_the_lines_of_a_spectrum(tmp_path):
     task = task_of(machine, displacement)
     for off in (0.99, 1.005, 1.02):
         moved = replace(task.objective, poles=task.objective.poles * off)
-        assert moved.of(best.laws)[0] < 0.85 * moved.of(usual.laws)[0]
+        assert moved.of(best.profiles)[0] < 0.85 * moved.of(usual.profiles)[0]
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured spectra lie beside the project")
@@ -245,11 +245,11 @@ def test_measured_spectra_go_through_every_design(name, tmp_path):
     displacement = moves({"X": 3.0}, {"X": 20.0}, {"X": 60.0})
     usual = plan_moves(displacement, machine, "conventional")
     task = task_of(machine, usual.share)
-    today = task.objective.of(usual.laws)
-    best = task.objective.of(plan_moves(displacement, machine, "optimal").laws)
+    today = task.objective.of(usual.profiles)
+    best = task.objective.of(plan_moves(displacement, machine, "optimal").profiles)
     for profile in ("condition3", "cascade"):
         plans = plan_moves(displacement, machine, profile)
-        left = task.objective.of(plans.laws)
+        left = task.objective.of(plans.profiles)
         assert (left <= today * (1 + 1e-6)).all()
         assert (best <= left * (1 + 1e-3)).all()
     assert (best < 0.7 * today).all()

@@ -261,7 +261,7 @@ def test_feed_is_the_larger_speed_of_the_profile_at_a_block_s_ends(row, axes):
     length = sum(row[a] ** 2 for a in axes) ** 0.5
     # The speed of a piecewise polynomial of the segments, not that of the samples.
     speed, v, a, t0 = [0.0], 0.0, 0.0, 0.0
-    segments = plan.laws.segments(0)
+    segments = plan.profiles.segments(0)
     for t in plan.t[1:]:
         while segments and t0 + segments[0][0] <= t + 1e-12:
             d, j = segments.pop(0)

@@ -39,10 +39,10 @@ def test_a_saved_input_can_be_replayed(name, tmp_path):
 
 
 def test_a_broken_law_is_saved_and_told(tmp_path, capsys):
-    def law(data):
+    def profile(data):
         assert b"G0" not in data
 
-    assert load("engine").blind(law, 0.001, 1, tmp_path)
+    assert load("engine").blind(profile, 0.001, 1, tmp_path)
     (saved,) = tmp_path.iterdir()
     assert b"G0" in saved.read_bytes()
     assert "laws broken" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""Which law today's rapids follow, and what is said where the file contradicts its control."""
+"""Which profile today's rapids follow, and what is said where the file contradicts its control."""
 
 import dataclasses
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcodejerk.machine import BELL, LINUXCNC, Machine, MachineFileError, machine_yaml
-from gcodejerk.motion import laws_response, mode_poles
+from gcodejerk.motion import mode_poles, profiles_response
 from gcodejerk.planning.designs import Task
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plans import Modes
@@ -118,7 +118,7 @@ def test_a_bell_is_a_trapezoid_behind_a_moving_average(length):
     made = machine("{velocity: 200, acceleration: 4000, jerk: 1.6e+5, planner: bell}")
     share = np.zeros((1, 9))
     share[0, 2] = length
-    law = Task.of(made, Modes.of(made), share).conventional
+    profile = Task.of(made, Modes.of(made), share).conventional
     dt, width = 2.5e-6, 0.025
     V, A = 200.0, 4000.0
     v = min(V, np.sqrt(length * A))
@@ -128,12 +128,12 @@ def test_a_bell_is_a_trapezoid_behind_a_moving_average(length):
     boxes = round(width / dt)
     velocity = np.convolve(trapezoid, np.ones(boxes) / boxes)[: len(t)]
     assert rise > 0
-    assert float(law.total[0]) == pytest.approx(end + width, abs=1e-9)
-    assert float(law.peak_velocity[0]) * length == pytest.approx(velocity.max(), rel=1e-3)
-    left = np.abs(laws_response(law, mode_poles([30.0], [0.02])))[0, 0] * length
+    assert float(profile.total[0]) == pytest.approx(end + width, abs=1e-9)
+    assert float(profile.peak_velocity[0]) * length == pytest.approx(velocity.max(), rel=1e-3)
+    left = np.abs(profiles_response(profile, mode_poles([30.0], [0.02])))[0, 0] * length
     pole = mode_poles(30.0, 0.02)
     expected = simulated(np.diff(velocity, prepend=0.0) / dt, dt, 30.0, 0.02)
-    decay = np.exp(pole.real * (float(law.total[0]) - t[-1] - 0.5 * dt))
+    decay = np.exp(pole.real * (float(profile.total[0]) - t[-1] - 0.5 * dt))
     assert left / pole.imag == pytest.approx(expected * decay, rel=5e-3, abs=1e-4 * length)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcodejerk.motion import Objective, laws_response, mode_poles
+from gcodejerk.motion import Objective, mode_poles, profiles_response
 from gcodejerk.motion.search.cascade import box_response, design_cascade
 
 MS = 0.001
@@ -16,12 +16,12 @@ def objective_of(frequencies, damping=0.0, weights=None):
     return Objective.of_modes(poles, np.ones((1, n)) if weights is None else np.array([weights]))
 
 
-def widths(laws):
+def widths(profiles):
     """The three boxes of a cascade, from the moments of its jerk steps."""
-    times = laws.step_times()
+    times = profiles.step_times()
     w3 = times[1]
-    area = 1.0 / laws.jerk[0]  # w1 w2 w3
-    total = float(laws.total[0])
+    area = 1.0 / profiles.jerk[0]  # w1 w2 w3
+    total = float(profiles.total[0])
     both = total - w3
     root = np.sqrt(both**2 / 4 - area / w3)
     return both / 2 + root, both / 2 - root, w3
@@ -31,24 +31,26 @@ def widths(laws):
 def test_what_a_cascade_leaves_is_the_product_of_its_boxes(damping):
     f = [17.0, 41.0, 90.0]
     objective = objective_of(f, damping)
-    laws, worst = design_cascade(np.array([0.083]), FREE, FREE, FREE, objective, MS)
-    D = np.abs(laws_response(laws, objective.poles))[0] / objective.poles.imag
+    profiles, worst = design_cascade(np.array([0.083]), FREE, FREE, FREE, objective, MS)
+    D = np.abs(profiles_response(profiles, objective.poles))[0] / objective.poles.imag
     assert float(worst[0]) == pytest.approx(D.max(), rel=1e-9)
     product = objective.poles.copy()
-    for width in widths(laws):
+    for width in widths(profiles):
         product = product * box_response(np.array(width), objective.poles)
     np.testing.assert_allclose(np.abs(product) / objective.poles.imag, D, rtol=1e-6, atol=1e-12)
     if damping == 0.0:
-        x = np.pi * np.outer(f, widths(laws))
+        x = np.pi * np.outer(f, widths(profiles))
         np.testing.assert_allclose(np.abs(np.sinc(x / np.pi).prod(axis=1)), D, rtol=1e-6, atol=1e-9)
 
 
 def test_three_modes_are_silenced_at_once_where_their_periods_fill_the_time():
     f = [30.0, 50.0, 90.0]
     periods = 1.0 / np.array(f)
-    laws, worst = design_cascade(np.array([periods.sum()]), FREE, FREE, FREE, objective_of(f), MS)
+    profiles, worst = design_cascade(
+        np.array([periods.sum()]), FREE, FREE, FREE, objective_of(f), MS
+    )
     assert float(worst[0]) < 1e-12
-    np.testing.assert_allclose(sorted(widths(laws)), sorted(periods), rtol=1e-6)
+    np.testing.assert_allclose(sorted(widths(profiles)), sorted(periods), rtol=1e-6)
 
 
 @pytest.mark.parametrize("total", [0.055, 0.08, 0.131])
@@ -64,11 +66,11 @@ def test_one_law_for_each_move_within_its_limits():
     V, A, J = 1.5 / total, 6.5 / total**2, 300.0 / total**3
     poles = mode_poles([23.0, 61.0], [0.02, 0.0])
     objective = Objective.of_modes(poles, rng.uniform(0.1, 1.0, (n, 2)))
-    laws, worst = design_cascade(total, V, A, J, objective, MS)
+    profiles, worst = design_cascade(total, V, A, J, objective, MS)
     feasible = np.isfinite(worst)
     assert feasible.sum() > 40
     tolerance = 1 + 1e-6
-    kept = laws.take(feasible)
+    kept = profiles.take(feasible)
     np.testing.assert_allclose(kept.total, total[feasible])
     assert (kept.peak_velocity <= V[feasible] * tolerance).all()
     assert (kept.peak_acceleration <= A[feasible] * tolerance).all()

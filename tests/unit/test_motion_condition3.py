@@ -8,8 +8,8 @@ from scipy.optimize import differential_evolution
 
 from gcodejerk.motion import (
     Objective,
-    SymmetricLaws,
-    conventional_laws,
+    SymmetricProfiles,
+    conventional_profiles,
     design_condition3,
     design_four_segments,
     four_segment_range,
@@ -23,7 +23,7 @@ INTERVAL = 0.001
 RNG = "rng" if "rng" in inspect.signature(differential_evolution).parameters else "seed"
 """What scipy calls its seed, before 1.15 and since."""
 NOWHERE = 1e3
-"""Cost of a law that is not legal, in the search by scipy."""
+"""Cost of a profile that is not legal, in the search by scipy."""
 
 
 def column(*values):
@@ -45,7 +45,7 @@ def four_segment_peaks(T1, T):
 
 
 def displacement(T1, Ta, T2, Tv, poles, weights):
-    """Largest residual of unit laws, and their peak acceleration, by sums over their jerk steps."""
+    """Largest residual of unit profiles, and their peak acceleration, by sums over jerk steps."""
     ends = np.cumsum(np.broadcast_arrays(np.zeros_like(T1), T1, Ta, T2, Tv, T2, Ta, T1), axis=0)
     left = ends[-1] - ends
     rise, fall = 1.0 / T1, 1.0 / T2
@@ -60,13 +60,13 @@ def displacement(T1, Ta, T2, Tv, poles, weights):
 
 def test_the_second_way_to_a_residual_is_right_itself():
     T1, Ta, T2, Tv = 0.0031, 0.0057, 0.0113, 0.0211
-    law = SymmetricLaws(*columns(T1, Ta, T2, Tv))
+    profile = SymmetricProfiles(*columns(T1, Ta, T2, Tv))
     poles = mode_poles([30.0, 71.0], [0.02, 0.0])
     weights = np.array([1.0, 0.3])
     worst, A = displacement(*columns(T1, Ta, T2, Tv), poles, weights)
-    by_law = (np.abs(symmetric_response(law, poles)) / poles.imag * weights).max()
-    assert float(worst[0]) == pytest.approx(by_law, rel=1e-9)
-    assert float(A[0]) == pytest.approx(float(law.acceleration[0]), rel=1e-12)
+    by_profile = (np.abs(symmetric_response(profile, poles)) / poles.imag * weights).max()
+    assert float(worst[0]) == pytest.approx(by_profile, rel=1e-9)
+    assert float(A[0]) == pytest.approx(float(profile.acceleration[0]), rel=1e-12)
 
 
 def test_the_interval_or_the_jerk_is_the_least_T1():
@@ -85,7 +85,7 @@ def test_each_end_of_the_range_is_where_one_limit_binds():
     low, high = four_segment_range(T, V, A, J, INTERVAL)
 
     def bound(T1, i):
-        """How far a law is beyond each of its limits: below 1 it keeps them all."""
+        """How far a profile is beyond each of its limits: below 1 it keeps them all."""
         v, a, j = four_segment_peaks(T1, T[i])
         dt = INTERVAL / T1, INTERVAL / (T[i] / 2 - T1)
         return {"V": v / V[i], "A": a / A[i], "J": j / J[i], "T1": dt[0], "T2": dt[1]}
@@ -111,7 +111,7 @@ def test_each_end_of_the_range_is_where_one_limit_binds():
 
 
 def test_a_range_of_a_single_law_survives_rounding():
-    # At the conventional limits and time there is one law, T1 = T_SUM/4.
+    # At the conventional limits and time there is one profile, T1 = T_SUM/4.
     J = 5e5
     T = 4.0 * np.cbrt(0.5 / J)
     low, high = four_segment_range(*columns(T, 1e9, 2.0 / np.cbrt(0.5 / J) ** 2 / 4, J), 1e-3)
@@ -124,21 +124,21 @@ def test_a_range_of_a_single_law_survives_rounding():
 )
 def test_the_design_finds_the_nulls_of_the_map(total, nulls):
     pole = mode_poles([30.0], [0.0])
-    laws, worst = design_four_segments(
+    profiles, worst = design_four_segments(
         *columns(total, INTERVAL, total / 2 - INTERVAL), Objective.of_modes(pole, np.ones((1, 1)))
     )
     assert float(worst[0]) < TIE
-    assert any(float(laws.T1[0]) == pytest.approx(null * 1e-3, abs=1e-6) for null in nulls)
-    assert float(laws.total[0]) == pytest.approx(total)
+    assert any(float(profiles.T1[0]) == pytest.approx(null * 1e-3, abs=1e-6) for null in nulls)
+    assert float(profiles.total[0]) == pytest.approx(total)
 
 
 def test_the_design_of_the_paper_s_case_is_the_least_T1():
     pole = mode_poles([30.0], [0.0])
     low, high = four_segment_range(*columns(0.04, 600, 5000, 5e6), INTERVAL)
-    laws, worst = design_four_segments(
+    profiles, worst = design_four_segments(
         columns(0.04)[0], low, high, Objective.of_modes(pole, np.ones((1, 1)))
     )
-    assert float(laws.T1[0]) == 0.001
+    assert float(profiles.T1[0]) == 0.001
     assert float(worst[0]) * (60 * np.pi) ** 2 == pytest.approx(5696.8, abs=0.05)
 
 
@@ -152,10 +152,10 @@ def test_no_law_of_a_dense_scan_leaves_much_less_than_the_design():
         if T < 0.005:
             continue
         low, high = np.sort(rng.uniform(INTERVAL, T / 2 - INTERVAL, 2))
-        laws, worst = design_four_segments(
+        profiles, worst = design_four_segments(
             *columns(T, low, high), Objective.of_modes(poles, weights[np.newaxis])
         )
-        assert low <= float(laws.T1[0]) <= high
+        assert low <= float(profiles.T1[0]) <= high
         T1 = np.linspace(low, high, 4001)
         zero = np.zeros_like(T1)
         every, _ = displacement(T1, zero, T / 2 - T1, zero, poles, weights)
@@ -170,12 +170,12 @@ def test_the_reported_worst_is_that_of_the_reported_law():
     poles = mode_poles([30.0, 90.0], [0.02, 0.0])
     weights = np.array([[1.0, 0.3], [0.0, 2.0], [5.0, 5.0]])
     T = column(0.04, 0.053, 0.2)
-    laws, worst = design_four_segments(
+    profiles, worst = design_four_segments(
         T, T * 0 + INTERVAL, T / 2 - INTERVAL, Objective.of_modes(poles, weights)
     )
     for i in range(3):
         amplitudes = []
-        T1, T2 = float(laws.T1[i]), float(laws.T2[i])
+        T1, T2 = float(profiles.T1[i]), float(profiles.T2[i])
         J1 = 6.0 / (T1**2 * T[i] * (2 * T2 / T1 + 1))  # noqa: N806
         times = [0, T1, T1 + T2, T1 + 2 * T2, 2 * T1 + 2 * T2]
         K = J1 * T1 / T2  # noqa: N806
@@ -189,43 +189,43 @@ def test_the_reported_worst_is_that_of_the_reported_law():
 def test_without_modes_four_segments_stay_symmetric():
     none = mode_poles([], [])
     T = column(0.04, 0.08)
-    laws, worst = design_four_segments(
+    profiles, worst = design_four_segments(
         T, T * 0 + INTERVAL, T / 2 - INTERVAL, Objective.of_modes(none, np.ones((2, 0)))
     )
-    np.testing.assert_allclose(laws.T1, T / 4)
+    np.testing.assert_allclose(profiles.T1, T / 4)
     assert worst.tolist() == [0.0, 0.0]
 
 
 def test_modes_that_do_not_count_leave_the_lowest_jerk():
     pole = mode_poles([30.0], [0.0])
-    laws, _ = design_four_segments(
+    profiles, _ = design_four_segments(
         *columns(0.04, 0.001, 0.019), Objective.of_modes(pole, np.zeros((1, 1)))
     )
-    assert float(laws.T1[0]) == pytest.approx(0.01)
+    assert float(profiles.T1[0]) == pytest.approx(0.01)
     # Symmetry out of reach: the nearest end of the range.
-    laws, _ = design_four_segments(
+    profiles, _ = design_four_segments(
         *columns(0.04, 0.001, 0.007), Objective.of_modes(pole, np.zeros((1, 1)))
     )
-    assert float(laws.T1[0]) == pytest.approx(0.007)
+    assert float(profiles.T1[0]) == pytest.approx(0.007)
 
 
 def test_residuals_too_small_to_matter_are_ties_and_leave_the_lowest_jerk():
     pole = mode_poles([30.0], [0.0])
     # All residuals of the map are below 0.1 nm, though some are ten times others.
-    laws, worst = design_four_segments(
+    profiles, worst = design_four_segments(
         *columns(0.04, 0.001, 0.019), Objective.of_modes(pole, np.full((1, 1), 0.9 * TIE))
     )
-    assert float(laws.T1[0]) == pytest.approx(0.01)
+    assert float(profiles.T1[0]) == pytest.approx(0.01)
     assert 0.0 < float(worst[0]) < TIE
 
 
 def drawn_long_moves(seed, count):
-    """Limits and modes of moves whose conventional law has more than four segments."""
+    """Limits and modes of moves whose conventional profile has more than four segments."""
     rng = np.random.default_rng(seed)
     while count:
         A = 10 ** rng.uniform(0.5, 4)
         V, J = np.sqrt(A) * 10 ** rng.uniform(-1.3, 0.3), A / 10 ** rng.uniform(-2.3, -1)
-        conventional = conventional_laws([V], [A], [J])
+        conventional = conventional_profiles([V], [A], [J])
         if conventional.Ta[0] == 0.0 and conventional.Tv[0] == 0.0:
             continue
         m = rng.integers(1, 4)
@@ -236,7 +236,7 @@ def drawn_long_moves(seed, count):
 
 
 def design(total, V, A, J, poles, weights, conventional):
-    """One law of the general design."""
+    """One profile of the general design."""
     return design_condition3(
         *columns(total, V, A, J),
         Objective.of_modes(poles, weights[np.newaxis]),
@@ -249,9 +249,9 @@ def test_general_designs_are_legal_and_never_worse_than_the_stretched_convention
     better = 0
     for case in drawn_long_moves(3, 150):
         total, V, A, J, poles, weights, conventional = case
-        laws, worst, feasible = design(*case)
+        profiles, worst, feasible = design(*case)
         assert feasible[0]
-        T1, Ta, T2, Tv = (float(c[0]) for c in laws.columns())
+        T1, Ta, T2, Tv = (float(c[0]) for c in profiles.columns())
         least = INTERVAL * (1 - 1e-8)
         assert min(T1, T2) >= least
         assert all(x == 0.0 or x >= least for x in (Ta, Tv))
@@ -306,7 +306,7 @@ def test_rows_do_not_know_each_other():
     rng = np.random.default_rng(9)
     weights = rng.uniform(0, 1, (7, 2))
     numbers = [np.array(c) for c in zip(*((t, V, A, J) for t, V, A, J, *_ in cases), strict=True)]
-    conventional = SymmetricLaws(
+    conventional = SymmetricProfiles(
         *(np.concatenate(c) for c in zip(*(case[-1].columns() for case in cases), strict=True))
     )
     together, worst, _ = design_condition3(
@@ -327,7 +327,7 @@ def test_rows_do_not_know_each_other():
 
 def test_a_time_that_the_limits_do_not_allow_is_not_feasible():
     V, A, J = 10.0, 400.0, 8000.0
-    fastest = conventional_laws([V], [A], [J])
+    fastest = conventional_profiles([V], [A], [J])
     pole = mode_poles([30.0], [0.0])
     total = 0.97 * float(fastest.total[0])
     _, worst, feasible = design(total, V, A, J, pole, np.ones(1), fastest)
@@ -337,24 +337,24 @@ def test_a_time_that_the_limits_do_not_allow_is_not_feasible():
 
 def test_a_trapezoid_without_reserve_has_no_design_and_with_it_has():
     V, A, infinite = 10.0, 400.0, np.inf
-    conventional = conventional_laws([V], [A], [infinite])
+    conventional = conventional_profiles([V], [A], [infinite])
     pole = mode_poles([30.0], [0.0])
     total = float(conventional.total[0])
     _, _, feasible = design(total, V, A, infinite, pole, np.ones(1), conventional)
     assert not feasible[0]
-    laws, _, feasible = design(total, V, 2 * A, infinite, pole, np.ones(1), conventional)
+    profiles, _, feasible = design(total, V, 2 * A, infinite, pole, np.ones(1), conventional)
     assert feasible[0]
-    assert min(float(laws.T1[0]), float(laws.T2[0])) >= INTERVAL * (1 - 1e-8)
-    assert float(laws.velocity[0]) <= V * (1 + 1e-8)
+    assert min(float(profiles.T1[0]), float(profiles.T2[0])) >= INTERVAL * (1 - 1e-8)
+    assert float(profiles.velocity[0]) <= V * (1 + 1e-8)
 
 
 def test_without_modes_general_designs_have_low_jerk():
     V, A, J = 10.0, 400.0, 1e6
-    conventional = conventional_laws([V], [A], [J / 10])
+    conventional = conventional_profiles([V], [A], [J / 10])
     none = mode_poles([], [])
     total = float(np.ceil(conventional.total[0] / INTERVAL)) * INTERVAL
-    laws, worst, feasible = design(total, V, A, J, none, np.ones(0), conventional)
+    profiles, worst, feasible = design(total, V, A, J, none, np.ones(0), conventional)
     assert feasible[0]
     assert worst.tolist() == [0.0]
     stretch = total / float(conventional.total[0])
-    assert float(laws.jerk[0]) <= J / 10 / stretch**3 * (1 + 1e-6)
+    assert float(profiles.jerk[0]) <= J / 10 / stretch**3 * (1 + 1e-6)

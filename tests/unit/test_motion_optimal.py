@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from gcodejerk.motion import conventional_laws, laws_response, mode_poles
-from gcodejerk.motion.search.optimal import Move, least_residual, optimum_laws, smoothest_within
+from gcodejerk.motion import conventional_profiles, mode_poles, profiles_response
+from gcodejerk.motion.search.optimal import Move, least_residual, optimum_profiles, smoothest_within
 
 MS = 0.001
 FACETS = 64
@@ -108,15 +108,15 @@ def test_the_least_worst_amplitudes_within_a_tenth(J, least):
 
 
 def drawn_cases(count):
-    """Moves whose conventional law fits, with modes of all kinds."""
+    """Moves whose conventional profile fits, with modes of all kinds."""
     rng = np.random.default_rng(7)
     while count:
         A = 10 ** rng.uniform(2.5, 4.5)
         T = rng.uniform(0.015, 0.07)
         V = A * T * rng.uniform(0.15, 0.6)
         J = A / (T * rng.uniform(0.02, 0.25))
-        law = conventional_laws([V], [A], [J / rng.uniform(1.5, 10)])
-        n = int(np.ceil(law.total[0] / MS - 1e-6))
+        profile = conventional_profiles([V], [A], [J / rng.uniform(1.5, 10)])
+        n = int(np.ceil(profile.total[0] / MS - 1e-6))
         if not 14 <= n <= 72:
             continue
         m = rng.integers(1, 4)
@@ -132,9 +132,9 @@ def test_no_linear_programme_finds_less_and_none_finds_much_more():
     for n, V, A, J, f, zeta, w in drawn_cases(25):
         rows = rows_of(n, f, zeta, w)
         least = by_linear_programme(n, V, A, J, rows)
-        law = conventional_laws([V], [A], [J])
+        profile = conventional_profiles([V], [A], [J])
         optimum = least_residual(move_of(n, V, A, J, f, zeta, w), 1.0)
-        assert (optimum is None) == (least is None) or law.total[0] > n * MS * (1 - 1e-4)
+        assert (optimum is None) == (least is None) or profile.total[0] > n * MS * (1 - 1e-4)
         if optimum is None:
             continue
         jerk = np.repeat(optimum.jerk, np.diff(optimum.knots)) / MS**3
@@ -181,9 +181,9 @@ def test_an_optimal_law_arrives_at_rest_and_keeps_its_limits():
         assert np.abs(a @ jerk).max() <= A
         assert (v @ jerk).max() <= V
         # Between two knots the velocity is a parabola; its control point bounds it.
-        law = optimum_laws([optimum], MS)
-        assert law.least_velocity[0] >= -1e-6 * law.peak_velocity[0]
-        assert law.peak_velocity[0] <= V * (1 + 1e-6)
+        profile = optimum_profiles([optimum], MS)
+        assert profile.least_velocity[0] >= -1e-6 * profile.peak_velocity[0]
+        assert profile.peak_velocity[0] <= V * (1 + 1e-6)
 
 
 def test_a_longer_move_is_still_close_to_the_programme_of_all_its_jerks():
@@ -211,8 +211,8 @@ def test_among_equal_optima_the_least_jerk_is_taken():
 
 
 def test_a_time_that_the_limits_do_not_allow_has_no_optimum():
-    law = conventional_laws([50.0], [5000.0], [5e6])
-    least = int(np.ceil(law.total[0] / MS))
+    profile = conventional_profiles([50.0], [5000.0], [5e6])
+    least = int(np.ceil(profile.total[0] / MS))
     assert least_residual(move_of(least - 1, 50, 5000, 5e6, [30.0]), 0.37) is None
     assert least_residual(move_of(least + 1, 50, 5000, 5e6, [30.0]), 0.37) is not None
 
@@ -243,11 +243,11 @@ def test_within_a_tolerance_the_smoothest_law_is_taken():
 def test_a_group_is_judged_by_the_root_of_its_squares():
     f, w = np.array([26.0, 29.0, 33.0, 38.0]), np.array([0.3, 0.6, 0.5, 0.2])
     together = least_residual(move_of(40, 50, 5000, 1e6, f, 0.0, w, 0.05, [0, 0, 0, 0]), 0.37)
-    law = optimum_laws([together], MS)
+    profile = optimum_profiles([together], MS)
     poles = mode_poles(f, np.zeros(4))
-    D = np.abs(laws_response(law, poles))[0] / poles.imag * w
+    D = np.abs(profiles_response(profile, poles))[0] / poles.imag * w
     assert together.worst == pytest.approx(np.sqrt((D**2).sum()), rel=1e-9)
     apart = least_residual(move_of(40, 50, 5000, 1e6, f, 0.0, w), 0.37)
-    other = np.abs(laws_response(optimum_laws([apart], MS), poles))[0] / poles.imag * w
+    other = np.abs(profiles_response(optimum_profiles([apart], MS), poles))[0] / poles.imag * w
     assert np.sqrt((other**2).sum()) >= together.worst * (1 - 1e-3)
     assert D.max() >= apart.worst * (1 - 1e-3)

@@ -13,14 +13,14 @@ from scipy.optimize import brentq
 from gcodejerk.errors import PlanError
 from gcodejerk.motion import (
     Grid,
-    SymmetricLaws,
+    SymmetricProfiles,
     knots_response,
-    laws_response,
     mode_poles,
     polyline_response,
+    profiles_response,
     residual_acceleration,
     residual_displacement,
-    sample_laws,
+    sample_profiles,
     sampled_response,
 )
 
@@ -31,8 +31,8 @@ MS = 1e-3
 
 
 def one(*durations):
-    """One law of given T1, Ta, T2, Tv."""
-    return SymmetricLaws(*(np.array([float(d)]) for d in durations)).general()
+    """One profile of given T1, Ta, T2, Tv."""
+    return SymmetricProfiles(*(np.array([float(d)]) for d in durations)).general()
 
 
 def condition3(T1, T=TOTAL, L=LENGTH):
@@ -63,7 +63,7 @@ def condition2(T1, T=TOTAL, L=LENGTH):
 
 
 def simulate(durations, omega, zeta):
-    """Envelope after a unit law, the mode and its input stepped by a matrix exponential.
+    """Envelope after a unit profile, the mode and its input stepped by a matrix exponential.
 
     The acceleration is built for a peak of 1 and scaled by the length it then covers.
     """
@@ -95,7 +95,7 @@ def test_profiles_leave_what_the_method_says(T1, damping, printed):
 @pytest.mark.parametrize(("damping", "printed"), [(0.0, 4898.3), (0.02, 4576.0)])
 def test_a_cubic_position_is_the_limit_of_vanishing_T1(damping, printed):
     pole = mode_poles([FREQUENCY], [damping])
-    D = residual_displacement(laws_response(one(0.0, 0.0, TOTAL / 2, 0.0), pole), pole)
+    D = residual_displacement(profiles_response(one(0.0, 0.0, TOTAL / 2, 0.0), pole), pole)
     assert float(D[0, 0]) * OMEGA**2 == pytest.approx(printed, abs=0.05)
     A = residual_acceleration(*condition3(1e-7), FREQUENCY, damping)
     assert float(A) == pytest.approx(printed, abs=0.1)
@@ -127,8 +127,8 @@ def test_the_worst_within_ten_percent_is_what_the_method_says(T1, printed):
 @pytest.mark.parametrize(("T1", "printed"), [(10, 13170), (1, 5680)])
 def test_streams_sampled_at_a_millisecond_leave_what_the_method_says(T1, printed):
     pole = mode_poles([FREQUENCY], [0.0])
-    law = one(T1 * MS, 0.0, TOTAL / 2 - T1 * MS, 0.0)
-    q, _ = sample_laws(law, np.arange(41)[np.newaxis], MS)
+    profile = one(T1 * MS, 0.0, TOTAL / 2 - T1 * MS, 0.0)
+    q, _ = sample_profiles(profile, np.arange(41)[np.newaxis], MS)
     A = OMEGA**2 * residual_displacement(polyline_response(np.arange(41) * MS, q[0], pole), pole)
     assert float(A[0]) == pytest.approx(printed, rel=1e-3)
 
@@ -206,16 +206,16 @@ def test_the_response_to_a_law_is_what_a_differential_equation_solver_finds(dura
     x, v, length, _ = state
     expected = np.hypot(x, (v + damping * omega * x) / (omega * np.sqrt(1 - damping**2))) / length
     pole = mode_poles([f], [damping])
-    D = residual_displacement(laws_response(one(*durations), pole), pole)
+    D = residual_displacement(profiles_response(one(*durations), pole), pole)
     assert float(D[0, 0]) == pytest.approx(expected, rel=1e-6)
     assert simulate(durations, omega, damping) == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_response_has_a_row_a_law_and_a_column_a_mode():
-    symmetric = SymmetricLaws(*np.array([[1.0, 3, 0], [0, 5, 9], [9, 2, 0], [0, 7, 4]]) * MS)
-    laws = symmetric.general()
+    symmetric = SymmetricProfiles(*np.array([[1.0, 3, 0], [0, 5, 9], [9, 2, 0], [0, 7, 4]]) * MS)
+    profiles = symmetric.general()
     poles = mode_poles([17.0, 61.0], [0.01, 0.0])
-    together = residual_displacement(laws_response(laws, poles), poles)
+    together = residual_displacement(profiles_response(profiles, poles), poles)
     assert together.shape == (3, 2)
     for i, m in itertools.product(range(3), range(2)):
         durations = [float(c[i]) for c in symmetric.columns()]

@@ -5,21 +5,21 @@ import pytest
 
 from gcodejerk.motion import (
     Grid,
-    SymmetricLaws,
+    SymmetricProfiles,
     mode_poles,
     polyline_response,
     residual_displacement,
     round_positions,
-    sample_laws,
+    sample_profiles,
 )
 
 INTERVAL = 0.001
-PAPER = SymmetricLaws(*(np.array([d]) for d in (0.001, 0.0, 0.019, 0.0))).general()
+PAPER = SymmetricProfiles(*(np.array([d]) for d in (0.001, 0.0, 0.019, 0.0))).general()
 
 
-def positions_of(law, length, start, count):
-    """Samples of one law from each start, one move a row."""
-    unit, _ = sample_laws(law, np.arange(count + 1)[np.newaxis], INTERVAL)
+def positions_of(profile, length, start, count):
+    """Samples of one profile from each start, one move a row."""
+    unit, _ = sample_profiles(profile, np.arange(count + 1)[np.newaxis], INTERVAL)
     return np.asarray(start)[:, np.newaxis] + length * unit
 
 
@@ -63,8 +63,8 @@ def test_noise_at_the_mode_is_far_below_that_of_plain_rounding():
 @pytest.mark.parametrize("frequencies", [(23.7,), (30.0, 90.0), (17.0, 51.0, 140.0)])
 def test_noise_is_below_that_of_plain_rounding_at_every_mode_that_counts(frequencies):
     rng = np.random.default_rng(len(frequencies))
-    law = SymmetricLaws(*(np.array([d]) for d in (0.0031, 0.0, 0.0269, 0.0))).general()
-    exact = positions_of(law, 3.7, rng.uniform(0, 1, 400), 60)
+    profile = SymmetricProfiles(*(np.array([d]) for d in (0.0031, 0.0, 0.0269, 0.0))).general()
+    exact = positions_of(profile, 3.7, rng.uniform(0, 1, 400), 60)
     damping = [0.01] * len(frequencies)
     written, _, _ = rounded(exact, 1e-3, mode_poles(frequencies, damping))
     plain = np.rint(exact / 1e-3) * 1e-3
@@ -135,8 +135,8 @@ def test_moves_of_different_lengths_are_rounded_together_as_alone():
 
 def test_a_mode_with_more_say_gets_less_noise():
     rng = np.random.default_rng(8)
-    law = SymmetricLaws(*(np.array([d]) for d in (0.005, 0.0, 0.035, 0.0))).general()
-    exact = positions_of(law, 2.0, rng.uniform(0, 1, 400), 80)
+    profile = SymmetricProfiles(*(np.array([d]) for d in (0.005, 0.0, 0.035, 0.0))).general()
+    exact = positions_of(profile, 2.0, rng.uniform(0, 1, 400), 80)
     poles = mode_poles([25.0, 61.0], [0.0, 0.0])
     rms = {}
     for weights in ((1.0, 0.01), (0.01, 1.0)):

@@ -1,10 +1,10 @@
-"""Samples of laws: exact where theory gives them, aligned at their end."""
+"""Samples of profiles: exact where theory gives them, aligned at their end."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from gcodejerk.motion import Grid, SymmetricLaws, sample_laws
+from gcodejerk.motion import Grid, SymmetricProfiles, sample_profiles
 
 INTERVAL = 0.0005
 SHAPES = {
@@ -21,12 +21,12 @@ SHAPES = {
 
 
 def law_of(name):
-    """One law of the table, durations in intervals."""
-    return SymmetricLaws(*(np.array([d * INTERVAL]) for d in SHAPES[name])).general()
+    """One profile of the table, durations in intervals."""
+    return SymmetricProfiles(*(np.array([d * INTERVAL]) for d in SHAPES[name])).general()
 
 
 def integrated(name):
-    """Position and velocity of the same law from its acceleration, scaled to the length 1."""
+    """Position and velocity of the same profile from its acceleration, scaled to the length 1."""
     T1, Ta, T2, Tv = (d * INTERVAL for d in SHAPES[name])
     half = [(T1, 0.0, 1.0), (Ta, 1.0, 1.0), (T2, 1.0, 0.0)]
     pieces = [*half, (Tv, 0.0, 0.0), *((d, -b, -a) for d, a, b in reversed(half))]
@@ -38,28 +38,28 @@ def integrated(name):
     return lambda t: q(t) / length, lambda t: a.antiderivative()(t) / length
 
 
-def every(law):
-    """All whole intervals of a law."""
-    return np.arange(int(np.ceil(law.total[0] / INTERVAL - 1e-6)) + 1)
+def every(profile):
+    """All whole intervals of a profile."""
+    return np.arange(int(np.ceil(profile.total[0] / INTERVAL - 1e-6)) + 1)
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_samples_are_those_of_the_integrated_acceleration(name):
-    law = law_of(name)
-    moments = every(law)
-    position, velocity = sample_laws(law, moments[np.newaxis], INTERVAL)
+    profile = law_of(name)
+    moments = every(profile)
+    position, velocity = sample_profiles(profile, moments[np.newaxis], INTERVAL)
     q, v = integrated(name)
-    t = np.minimum(moments * INTERVAL, law.total[0])
+    t = np.minimum(moments * INTERVAL, profile.total[0])
     np.testing.assert_allclose(position[0], q(t), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(velocity[0], v(t), rtol=1e-9, atol=1e-9 * velocity.max())
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_samples_are_antisymmetric_and_monotone_with_exact_ends(name):
-    law = law_of(name)
-    total = float(law.total[0])
+    profile = law_of(name)
+    total = float(profile.total[0])
     count = round(total / INTERVAL)
-    position, velocity = sample_laws(law, every(law)[np.newaxis], INTERVAL)
+    position, velocity = sample_profiles(profile, every(profile)[np.newaxis], INTERVAL)
     assert position[0, 0] == 0.0
     assert position[0, -1] == 1.0
     assert velocity[0, 0] == 0.0
@@ -71,27 +71,27 @@ def test_samples_are_antisymmetric_and_monotone_with_exact_ends(name):
 
 
 def test_a_law_rests_before_it_begins_and_after_it_has_ended():
-    law = law_of("four segments")
-    position, velocity = sample_laws(law, np.array([[-7, 0, 60, 61, 500]]), INTERVAL)
+    profile = law_of("four segments")
+    position, velocity = sample_profiles(profile, np.array([[-7, 0, 60, 61, 500]]), INTERVAL)
     assert position.tolist() == [[0.0, 0.0, 1.0, 1.0, 1.0]]
     assert velocity.tolist() == [[0.0] * 5]
 
 
 def test_the_paper_s_profile_has_the_paper_s_first_sample():
     # J1 T1^3 / 6 with 3.846e6 mm/s^3 and 1 ms.
-    law = SymmetricLaws(*(np.array([d]) for d in (0.001, 0.0, 0.019, 0.0))).general()
-    position, _ = sample_laws(law, np.array([[1]]), 0.001)
+    profile = SymmetricProfiles(*(np.array([d]) for d in (0.001, 0.0, 0.019, 0.0))).general()
+    position, _ = sample_profiles(profile, np.array([[1]]), 0.001)
     assert float(position[0, 0]) == pytest.approx(3846153.846 * 1e-9 / 6, rel=1e-9)
 
 
 def test_laws_of_different_kinds_are_sampled_together_as_alone():
-    laws = SymmetricLaws(
+    profiles = SymmetricProfiles(
         *(np.array(c) * INTERVAL for c in zip(*SHAPES.values(), strict=True))
     ).general()
     moments = np.tile(np.arange(0, 200, 3), (len(SHAPES), 1))
-    position, velocity = sample_laws(laws, moments, INTERVAL)
+    position, velocity = sample_profiles(profiles, moments, INTERVAL)
     for row, name in enumerate(SHAPES):
-        alone = sample_laws(law_of(name), moments[:1], INTERVAL)
+        alone = sample_profiles(law_of(name), moments[:1], INTERVAL)
         np.testing.assert_allclose(position[row], alone[0][0], atol=1e-14)
         np.testing.assert_allclose(velocity[row], alone[1][0], atol=1e-12)
 

@@ -7,7 +7,7 @@ from gcodejerk.motion import Objective, mode_poles, residual_acceleration
 from gcodejerk.motion.profiles.conditions import (
     condition_accelerations,
     condition_durations,
-    condition_laws,
+    condition_profiles,
 )
 from gcodejerk.motion.search.conditions import design_condition
 
@@ -23,21 +23,21 @@ FREE = np.full(1, np.inf)
 def test_the_best_of_each_condition_leaves_what_the_method_says(condition, damping, amplitude):
     objective = Objective.of_modes(mode_poles([30.0], [damping]), np.ones((1, 1)))
     total = np.array([0.04])
-    laws, worst = design_condition(condition, total, FREE, FREE, FREE, objective, MS)
+    profiles, worst = design_condition(condition, total, FREE, FREE, FREE, objective, MS)
     assert float(worst[0]) * (60 * np.pi) ** 2 == pytest.approx(amplitude, abs=0.06)
-    assert objective.of(laws) == pytest.approx(worst)
+    assert objective.of(profiles) == pytest.approx(worst)
 
 
 @pytest.mark.parametrize("condition", ["I", "II", "III"])
 def test_laws_are_the_closed_forms_segments(condition):
     T1, total = np.array([0.003, 0.012]), np.array([0.05, 0.05])
-    laws = condition_laws(condition, T1, total)
+    profiles = condition_profiles(condition, T1, total)
     for k in range(2):
         durations = condition_durations(condition, T1[k], total[k])
         A1, A2 = condition_accelerations(condition, 1.0, T1[k], total[k])
-        np.testing.assert_allclose([d for d, _ in laws.segments(k)], durations)
+        np.testing.assert_allclose([d for d, _ in profiles.segments(k)], durations)
         jerks = [A1 / durations[0], -A1 / durations[1], A2 / durations[2], -A2 / durations[3]]
-        np.testing.assert_allclose([j for _, j in laws.segments(k)], jerks)
+        np.testing.assert_allclose([j for _, j in profiles.segments(k)], jerks)
 
 
 @pytest.mark.parametrize("condition", ["I", "II"])
@@ -48,7 +48,7 @@ def test_no_T1_of_a_fine_scan_is_better_within_the_limits(condition):  # noqa: N
         A, J = rng.uniform(9, 40) / total**2, 600.0 / total**3
         objective = Objective.of_modes(mode_poles([f], [0.01]), np.ones((1, 1)))
         limits = (FREE, np.array([A]), np.array([J]))
-        laws, worst = design_condition(condition, np.array([total]), *limits, objective, MS)
+        profiles, worst = design_condition(condition, np.array([total]), *limits, objective, MS)
         best = np.inf
         for T1 in np.linspace(MS, total / 2 - MS, 1500):
             d = condition_durations(condition, T1, total)
@@ -64,5 +64,5 @@ def test_no_T1_of_a_fine_scan_is_better_within_the_limits(condition):  # noqa: N
             1 + 1e-3
         ) + 1e-9
         if np.isfinite(worst[0]):
-            assert float(laws.peak_acceleration[0]) <= A * (1 + 1e-6)
-            assert float(laws.peak_jerk[0]) <= J * (1 + 1e-6)
+            assert float(profiles.peak_acceleration[0]) <= A * (1 + 1e-6)
+            assert float(profiles.peak_jerk[0]) <= J * (1 + 1e-6)

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion import SymmetricLaws, conventional_laws, laws_response, mode_poles
-from gcodejerk.motion.shapers import SHAPERS, shaped_law, shaper_impulses
+from gcodejerk.motion import SymmetricProfiles, conventional_profiles, mode_poles, profiles_response
+from gcodejerk.motion.shapers import SHAPERS, shaped_profile, shaper_impulses
 
-CONVENTIONAL = conventional_laws([600.0], [5000.0], [5e5]).general()
+CONVENTIONAL = conventional_profiles([600.0], [5000.0], [5e5]).general()
 
 
 def left(name, f, zeta, design=0.0, at=30.0):
     """Acceleration amplitude of a mode after 1 mm in 40 ms behind a shaper for 30 Hz."""
     pole = mode_poles([f], [zeta])
-    law = shaped_law(CONVENTIONAL, name, at, design)
-    D = np.abs(laws_response(law, pole))[0, 0] / pole[0].imag
+    profile = shaped_profile(CONVENTIONAL, name, at, design)
+    D = np.abs(profiles_response(profile, pole))[0, 0] / pole[0].imag
     return float(D) * (2 * np.pi * f) ** 2
 
 
@@ -23,8 +23,8 @@ def left(name, f, zeta, design=0.0, at=30.0):
     [("zv", 56.67, 373.5, 2059), ("zvd", 73.33, 11.4, 322), ("fir", 73.33, 230.6, 1438)],
 )
 def test_shapers_leave_what_the_method_says(name, time, damped, tenth):
-    law = shaped_law(CONVENTIONAL, name, 30.0)
-    assert float(law.total[0]) * 1e3 == pytest.approx(time, abs=0.01)
+    profile = shaped_profile(CONVENTIONAL, name, 30.0)
+    assert float(profile.total[0]) * 1e3 == pytest.approx(time, abs=0.01)
     assert left(name, 30.0, 0.0) < 1e-6
     assert left(name, 30.0, 0.02) == pytest.approx(damped, rel=1e-3, abs=0.05)
     worst = max(left(name, f, 0.0) for f in np.linspace(27, 33, 25))
@@ -48,7 +48,7 @@ def test_made_for_its_damping_a_shaper_leaves_nothing(name):
 
 def test_ei_leaves_its_tolerance_at_its_frequency():
     pole = mode_poles([30.0], [0.0])
-    plain = np.abs(laws_response(CONVENTIONAL, pole))[0, 0] / pole[0].imag * (60 * np.pi) ** 2
+    plain = np.abs(profiles_response(CONVENTIONAL, pole))[0, 0] / pole[0].imag * (60 * np.pi) ** 2
     assert left("ei", 30.0, 0.0) == pytest.approx(0.05 * plain, rel=1e-9)
 
 
@@ -61,16 +61,19 @@ def test_a_derivative_shaper_is_flat_at_its_frequency():
 
 @pytest.mark.parametrize("name", SHAPERS)
 def test_a_shaped_law_arrives_at_rest_within_the_limits_of_the_plain_one(name):
-    laws = [CONVENTIONAL, SymmetricLaws(*(np.array([x]) for x in (0.0, 0.03, 0.0, 0.05))).general()]
-    for plain in laws:
-        law = shaped_law(plain, name, 23.0, 0.03)
-        d, j = law.duration[-1], law.jerk[-1]
-        a, v, s = law.acceleration[-1], law.velocity[-1], law.position[-1]
+    profiles = [
+        CONVENTIONAL,
+        SymmetricProfiles(*(np.array([x]) for x in (0.0, 0.03, 0.0, 0.05))).general(),
+    ]
+    for plain in profiles:
+        profile = shaped_profile(plain, name, 23.0, 0.03)
+        d, j = profile.duration[-1], profile.jerk[-1]
+        a, v, s = profile.acceleration[-1], profile.velocity[-1], profile.position[-1]
         assert s + v * d + a * d**2 / 2 + j * d**3 / 6 == pytest.approx(1.0)
         assert v + a * d + j * d**2 / 2 == pytest.approx(0.0, abs=1e-9)
-        assert float(law.peak_velocity[0]) <= float(plain.peak_velocity[0]) * (1 + 1e-9)
-        assert float(law.peak_acceleration[0]) <= float(plain.peak_acceleration[0]) * (1 + 1e-9)
-        assert float(law.greatest_jerk[0]) <= float(plain.greatest_jerk[0]) * (1 + 1e-9)
+        assert float(profile.peak_velocity[0]) <= float(plain.peak_velocity[0]) * (1 + 1e-9)
+        assert float(profile.peak_acceleration[0]) <= float(plain.peak_acceleration[0]) * (1 + 1e-9)
+        assert float(profile.greatest_jerk[0]) <= float(plain.greatest_jerk[0]) * (1 + 1e-9)
 
 
 def test_an_unknown_shaper_is_refused_with_those_there_are():

@@ -1,4 +1,4 @@
-"""Laws: their peaks and lengths by plain integration, and the conventional law's time by search."""
+"""Profiles: peaks and lengths by plain integration, the conventional one's time by search."""
 
 # ruff: noqa: N806  (J1 to J4, A1 and A2 are the paper's own symbols)
 
@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from gcodejerk.motion import SymmetricLaws, conventional_laws
+from gcodejerk.motion import SymmetricProfiles, conventional_profiles
 
 RNG = np.random.default_rng(20)
 
 
 def one(*durations):
-    """One law of given T1, Ta, T2, Tv."""
-    return SymmetricLaws(*(np.array([float(d)]) for d in durations))
+    """One profile of given T1, Ta, T2, Tv."""
+    return SymmetricProfiles(*(np.array([float(d)]) for d in durations))
 
 
 def integrated(durations):
-    """Position, velocity and acceleration of a unit law as piecewise polynomials.
+    """Position, velocity and acceleration of a unit profile as piecewise polynomials.
 
     Integrated from an acceleration of peak 1, then scaled to the length 1.
     """
@@ -45,37 +45,37 @@ SHAPES = [
 @pytest.mark.parametrize("durations", SHAPES)
 def test_peaks_of_a_law_are_those_of_its_integrated_acceleration(durations):
     q, v, a = integrated(durations)
-    law, T = one(*durations), 2 * sum(durations[:3]) + durations[3]
+    profile, T = one(*durations), 2 * sum(durations[:3]) + durations[3]
     t = np.linspace(0.0, T, 20001)
-    assert float(law.total[0]) == pytest.approx(T)
+    assert float(profile.total[0]) == pytest.approx(T)
     assert float(q(T)) == pytest.approx(1.0)
     assert float(v(T)) == pytest.approx(0.0, abs=1e-9 / T)
-    assert float(law.velocity[0]) == pytest.approx(v(t).max(), rel=1e-6)
-    assert float(law.acceleration[0]) == pytest.approx(np.abs(a(t)).max(), rel=1e-3)
+    assert float(profile.velocity[0]) == pytest.approx(v(t).max(), rel=1e-6)
+    assert float(profile.acceleration[0]) == pytest.approx(np.abs(a(t)).max(), rel=1e-3)
     ramps = [d for d in (durations[0], durations[2])]
-    jerk = float(law.acceleration[0]) / min(ramps) if min(ramps) else np.inf
-    assert float(law.jerk[0]) == pytest.approx(jerk)
+    jerk = float(profile.acceleration[0]) / min(ramps) if min(ramps) else np.inf
+    assert float(profile.jerk[0]) == pytest.approx(jerk)
 
 
 @pytest.mark.parametrize("durations", SHAPES)
 def test_length_is_velocity_times_what_the_centroids_leave_of_the_time(durations):
     _, v, a = integrated(durations)
-    law, ramp = one(*durations), sum(durations[:3])
+    profile, ramp = one(*durations), sum(durations[:3])
     t = np.linspace(0.0, ramp, 40001)
     trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 numpy 1
     centroid = trapezoid(a(t) * t, t) / trapezoid(a(t), t)
-    assert float(law.centroid[0]) == pytest.approx(centroid, rel=1e-4)
-    assert float(law.area[0]) == pytest.approx(float(v(ramp)) / float(law.acceleration[0]))
-    length = float(law.velocity[0] * (law.total[0] - 2.0 * law.centroid[0]))
+    assert float(profile.centroid[0]) == pytest.approx(centroid, rel=1e-4)
+    assert float(profile.area[0]) == pytest.approx(float(v(ramp)) / float(profile.acceleration[0]))
+    length = float(profile.velocity[0] * (profile.total[0] - 2.0 * profile.centroid[0]))
     assert length == pytest.approx(1.0)
 
 
 def test_segments_are_the_phases_of_finite_jerk_in_order():
-    law = one(0.003, 0.005, 0.011, 0.021)
-    durations, jerks = zip(*law.general().segments(0), strict=True)
+    profile = one(0.003, 0.005, 0.011, 0.021)
+    durations, jerks = zip(*profile.general().segments(0), strict=True)
     assert durations == (0.003, 0.005, 0.011, 0.021, 0.011, 0.005, 0.003)
     J1, zero, J2, *rest = jerks
-    A = float(law.acceleration[0])
+    A = float(profile.acceleration[0])
     np.testing.assert_allclose([J1 * 0.003, J2 * 0.011], [A, -A])
     assert [zero, *rest] == [0.0, 0.0, J2, 0.0, J1]
 
@@ -88,24 +88,24 @@ def test_segments_of_the_paper_have_the_paper_s_jerks():
 
 
 def test_a_trapezoid_has_no_jerk_in_its_segments_and_an_infinite_peak():
-    law = one(0.0, 0.02, 0.0, 0.01)
-    assert law.general().segments(0) == [(0.02, 0.0), (0.01, 0.0), (0.02, 0.0)]
-    assert np.isinf(law.jerk[0])
+    profile = one(0.0, 0.02, 0.0, 0.01)
+    assert profile.general().segments(0) == [(0.02, 0.0), (0.01, 0.0), (0.02, 0.0)]
+    assert np.isinf(profile.jerk[0])
 
 
 def test_taking_and_replacing_laws_keeps_the_others():
-    laws = SymmetricLaws(*(np.arange(4.0) + 10 * k for k in range(4)))
-    few = laws.take(np.array([2, 0]))
+    profiles = SymmetricProfiles(*(np.arange(4.0) + 10 * k for k in range(4)))
+    few = profiles.take(np.array([2, 0]))
     assert [c.tolist() for c in few.columns()] == [[2, 0], [12, 10], [22, 20], [32, 30]]
-    mixed = laws.replaced(np.array([False, True, False, True]), few)
+    mixed = profiles.replaced(np.array([False, True, False, True]), few)
     assert mixed.T1.tolist() == [0, 2, 2, 0]
     assert mixed.Tv.tolist() == [30, 32, 32, 30]
-    assert laws.T1.tolist() == [0, 1, 2, 3]
+    assert profiles.T1.tolist() == [0, 1, 2, 3]
     assert len(mixed) == 4
 
 
 def limits(count):
-    """Drawn limits of unit laws: accelerations after 1 to 100 ms, velocities that bind or not."""
+    """Limits of unit profiles: accelerations after 1 to 100 ms, velocities that bind or not."""
     A = 10 ** RNG.uniform(0.5, 5.0, count)
     V = np.sqrt(A) * 10 ** RNG.uniform(-1.5, 1.0, count)
     J = A / 10 ** RNG.uniform(-3.0, -0.5, count)
@@ -113,7 +113,7 @@ def limits(count):
 
 
 def shortest_by_search(V, A, J):
-    """Least time of a symmetric law within limits: every shape on a grid of its phases."""
+    """Least time of a symmetric profile within limits: every shape on a grid of its phases."""
     size = max(1.0 / V, 2.0 / np.sqrt(A), (32.0 / J) ** (1 / 3))
     grid = np.concatenate([[0.0], np.geomspace(1e-5, 1.0, 700)]) * size
     tj, ta = np.meshgrid(grid[1:], grid, indexing="ij")
@@ -125,32 +125,32 @@ def shortest_by_search(V, A, J):
 
 def test_no_symmetric_law_within_limits_is_faster_than_the_conventional_one():
     V, A, J = limits(40)
-    laws = conventional_laws(V, A, J)
+    profiles = conventional_profiles(V, A, J)
     for i in range(40):
         found = shortest_by_search(V[i], A[i], J[i])
-        assert float(laws.total[i]) <= found * (1 + 1e-9)
-        assert float(laws.total[i]) >= found * 0.97
+        assert float(profiles.total[i]) <= found * (1 + 1e-9)
+        assert float(profiles.total[i]) >= found * 0.97
 
 
 def test_the_conventional_law_keeps_its_limits_and_reaches_one_in_each_phase():
     V, A, J = limits(500)
-    laws = conventional_laws(V, A, J)
-    v, a, j = laws.velocity / V, laws.acceleration / A, laws.jerk / J
+    profiles = conventional_profiles(V, A, J)
+    v, a, j = profiles.velocity / V, profiles.acceleration / A, profiles.jerk / J
     for share in (v, a, j):
         assert share.max() <= 1.0 + 1e-9
-    assert (laws.T1 == laws.T2).all()
+    assert (profiles.T1 == profiles.T2).all()
     np.testing.assert_allclose(j, 1.0, rtol=1e-9)
-    np.testing.assert_allclose(a[laws.Ta > 0.0], 1.0, rtol=1e-9)
-    np.testing.assert_allclose(v[laws.Tv > 0.0], 1.0, rtol=1e-9)
-    four = (laws.Ta == 0.0) & (laws.Tv == 0.0)
+    np.testing.assert_allclose(a[profiles.Ta > 0.0], 1.0, rtol=1e-9)
+    np.testing.assert_allclose(v[profiles.Tv > 0.0], 1.0, rtol=1e-9)
+    four = (profiles.Ta == 0.0) & (profiles.Tv == 0.0)
     assert 10 < four.sum() < 490, "the drawn limits do not cover both kinds"
 
 
 def test_the_conventional_law_covers_the_length_by_its_own_limits():
     V, A, J = limits(50)
-    laws = conventional_laws(V, A, J)
+    profiles = conventional_profiles(V, A, J)
     for i in range(50):
-        tj, ta, _, tv = (float(c[i]) for c in laws.columns())
+        tj, ta, _, tv = (float(c[i]) for c in profiles.columns())
         jerk = PPoly(
             np.array([[J[i], 0.0, -J[i], 0.0, -J[i], 0.0, J[i]]]),
             np.cumsum([0.0, *(d + 1e-15 for d in (tj, ta, tj, tv, tj, ta, tj))]),
@@ -159,15 +159,15 @@ def test_the_conventional_law_covers_the_length_by_its_own_limits():
 
 
 def test_without_a_jerk_limit_the_conventional_law_is_a_trapezoid():
-    laws = conventional_laws([10.0, 1000.0], [400.0, 400.0], np.inf)
-    assert laws.T1.tolist() == laws.T2.tolist() == [0.0, 0.0]
-    np.testing.assert_allclose(laws.Ta, [10.0 / 400.0, 1.0 / np.sqrt(400.0)])
-    np.testing.assert_allclose(laws.Tv, [1 / 10.0 - 10.0 / 400.0, 0.0], atol=1e-12)
+    profiles = conventional_profiles([10.0, 1000.0], [400.0, 400.0], np.inf)
+    assert profiles.T1.tolist() == profiles.T2.tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(profiles.Ta, [10.0 / 400.0, 1.0 / np.sqrt(400.0)])
+    np.testing.assert_allclose(profiles.Tv, [1 / 10.0 - 10.0 / 400.0, 0.0], atol=1e-12)
 
 
 def test_a_shortest_ramp_lengthens_the_law_only_where_the_jerk_would_allow_less():
     V, A, J = limits(300)
-    free, held = conventional_laws(V, A, J), conventional_laws(V, A, J, 0.002)
+    free, held = conventional_profiles(V, A, J), conventional_profiles(V, A, J, 0.002)
     assert held.T1.min() >= 0.002
     short = free.T1 < 0.002
     assert short.any()

@@ -34,7 +34,7 @@ def test_the_paper_s_case_gives_the_paper_s_numbers():
     assert conventional == pytest.approx(13209.3, abs=0.05)
     assert float(plan.residual[0, 0]) * OMEGA**2 == pytest.approx(5680, rel=2e-3)
     assert float(plan.conventional_residual[0, 0]) * OMEGA**2 == pytest.approx(13170, rel=2e-3)
-    assert plan.laws.segments(0)[0] == pytest.approx((0.001, 3846153.8))
+    assert plan.profiles.segments(0)[0] == pytest.approx((0.001, 3846153.8))
 
 
 def test_the_least_T1_is_the_best_for_the_paper_s_case():  # noqa: N802
@@ -76,22 +76,27 @@ def test_unsampled_amplitudes_are_those_of_finely_sampled_laws(machine):
     assert len(amplitudes) == len(felt)
     for k, (designed, conventional) in zip(felt, amplitudes, strict=True):
         pole = modes.poles[k : k + 1]
-        for laws, expected in ((plan.laws, designed), (plan.plans.conventional, conventional)):
-            end = float(laws.total.max())
+        for profiles, expected in (
+            (plan.profiles, designed),
+            (plan.plans.conventional, conventional),
+        ):
+            end = float(profiles.total.max())
             t = np.linspace(0.0, end, 20001)
             q = np.zeros_like(t)
-            for n in range(len(laws)):
+            for n in range(len(profiles)):
                 share = plan.plans.share[n] @ modes.participation[k]
-                q += share * _position(laws, n, t)
+                q += share * _position(profiles, n, t)
             found = np.abs(polyline_response(t, q, pole)[0]) / pole[0].imag * abs(pole[0]) ** 2
             assert found == pytest.approx(expected, rel=1e-3, abs=1e-3 * conventional + 1e-3)
 
 
-def _position(laws, n, t):
-    """A unit law by adding up its acceleration twice."""
-    law = laws.take(slice(n, n + 1))
+def _position(profiles, n, t):
+    """A unit profile by adding up its acceleration twice."""
+    profile = profiles.take(slice(n, n + 1))
     a = np.zeros_like(t)
-    for begin, d, level, j in zip(law.begin, law.duration, law.acceleration, law.jerk, strict=True):
+    for begin, d, level, j in zip(
+        profile.begin, profile.duration, profile.acceleration, profile.jerk, strict=True
+    ):
         a = np.where((t >= begin) & (t < begin + d), level + j * (t - begin), a)
     v = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))])
     q = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])

@@ -47,7 +47,7 @@ def test_equal_problems_are_solved_once(solved):
 
 
 def test_lengths_with_the_same_limits_over_them_share_a_solution(solved):
-    # Twice the length and twice all limits: the same unit law, twice the residual.
+    # Twice the length and twice all limits: the same unit profile, twice the residual.
     move = question().move
     double = Question(
         Move(move.count, move.velocity, move.acceleration, move.jerk, move.poles,

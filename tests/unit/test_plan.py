@@ -1,4 +1,4 @@
-"""The planner's decisions: how long, which law, and why not."""
+"""The planner's decisions: how long, which profile, and why not."""
 
 import io
 
@@ -8,7 +8,7 @@ import pytest
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
-from gcodejerk.motion import Laws, laws_response, mode_poles
+from gcodejerk.motion import Profiles, mode_poles, profiles_response
 from gcodejerk.nc import read_program
 from gcodejerk.planning.plan import MOST_INTERVALS, plan_moves, plan_rapids
 from gcodejerk.planning.plans import path_length
@@ -47,7 +47,7 @@ def reasons(plans):
 
 
 def four_jerk_segments(T, J=5e5):
-    """Length that a conventional law of four segments covers in a time."""
+    """Length that a conventional profile of four segments covers in a time."""
     return 2.0 * J * (T / 4.0) ** 3
 
 
@@ -70,15 +70,15 @@ def test_no_jerk_limited_rapid_takes_an_interval_longer(interval):
     longer = plans.counts * interval - plans.conventional_time
     assert longer.min() >= -1e-8
     assert longer.max() < interval
-    law_time = plans.laws.total
+    law_time = plans.profiles.total
     kept = plans.kept
     np.testing.assert_allclose(law_time[~kept], plans.counts[~kept] * interval, rtol=1e-9)
     np.testing.assert_allclose(law_time[kept], plans.conventional_time[kept], rtol=1e-12)
 
 
-def durations(laws, k):
-    """Durations of the segments of one law."""
-    return [duration for duration, _ in laws.segments(k)]
+def durations(profiles, k):
+    """Durations of the segments of one profile."""
+    return [duration for duration, _ in profiles.segments(k)]
 
 
 def test_the_common_law_of_a_straight_line_keeps_the_limits_of_every_axis():
@@ -91,15 +91,15 @@ def test_the_common_law_of_a_straight_line_keeps_the_limits_of_every_axis():
     )
     row = {"X": 30.0, "Y": -40.0, "Z": 20.0}
     plans = plan_moves(moves(row), machine)
-    assert len(plans.laws) == 1
+    assert len(plans.profiles) == 1
     assert plans.share.tolist() == moves(row).tolist()
-    law = plans.laws
+    profile = plans.profiles
     for axis in machine.axes:
         size = abs(row[axis.name])
-        assert float(law.peak_velocity[0]) * size <= axis.limit.velocity * (1 + 1e-8)
-        assert float(law.peak_acceleration[0]) * size <= axis.limit.acceleration * (1 + 1e-8)
-        assert float(law.peak_jerk[0]) * size <= axis.limit.jerk * (1 + 1e-8)
-    # The conventional law runs into two of its limits: X's velocity, Y's acceleration.
+        assert float(profile.peak_velocity[0]) * size <= axis.limit.velocity * (1 + 1e-8)
+        assert float(profile.peak_acceleration[0]) * size <= axis.limit.acceleration * (1 + 1e-8)
+        assert float(profile.peak_jerk[0]) * size <= axis.limit.jerk * (1 + 1e-8)
+    # The conventional profile runs into two of its limits: X's velocity, Y's acceleration.
     conventional = plans.conventional
     assert float(conventional.peak_velocity[0]) * 30.0 == pytest.approx(100.0)
     assert float(conventional.peak_acceleration[0]) * 40.0 == pytest.approx(1000.0)
@@ -117,7 +117,7 @@ def test_a_trapezoid_at_its_limit_takes_an_interval_longer_or_is_left(extension,
         assert float(plans.conventional_time[0]) == pytest.approx(conventional)
         # Acceleration that rises and falls within an interval takes one interval more.
         assert plans.counts.tolist() == [round(conventional * 1000) + 1]
-        assert float(plans.laws.peak_acceleration[0]) * 30 <= 500 * (1 + 1e-8)
+        assert float(plans.profiles.peak_acceleration[0]) * 30 <= 500 * (1 + 1e-8)
     elif extension == 0.0:
         assert reasons(plans) == [Reason.LIMITS]
     else:
@@ -159,8 +159,8 @@ def test_a_trapezoid_with_reserve_keeps_its_time():
 def test_an_axis_that_no_mode_feels_gets_the_lowest_jerk():
     machine = machine_of({"X": f"{Z_AXIS}}}", "Z": f"{Z_AXIS}, {ROCKING}}}"})
     plans = plan_moves(moves({"X": 1.0}, {"Z": 1.0}), machine)
-    assert durations(plans.laws, 0) == pytest.approx([0.01] * 4, rel=1e-6)
-    assert durations(plans.laws, 1)[0] == 0.001
+    assert durations(plans.profiles, 0) == pytest.approx([0.01] * 4, rel=1e-6)
+    assert durations(plans.profiles, 1)[0] == 0.001
 
 
 def test_designs_are_never_worse_than_the_conventional_law():
@@ -174,15 +174,15 @@ def test_designs_are_never_worse_than_the_conventional_law():
     plans = plan_moves(moves(*({"Z": x} for x in lengths)), machine)
     poles = plans.modes.poles
     worst = [
-        (np.abs(laws_response(laws, poles)) / poles.imag).max(axis=1) * lengths
-        for laws in (plans.laws, plans.conventional)
+        (np.abs(profiles_response(profiles, poles)) / poles.imag).max(axis=1) * lengths
+        for profiles in (plans.profiles, plans.conventional)
     ]
     assert (worst[0] <= worst[1] * (1 + 1e-9)).all()
     assert np.median(worst[0] / worst[1]) < 0.6
 
 
 def test_where_the_conventional_law_is_still_already_it_stays():
-    # 80 ms is two periods of 25 Hz: the conventional law has its null there.
+    # 80 ms is two periods of 25 Hz: the conventional profile has its null there.
     machine = machine_of(
         {
             "Z": "{resolution: 1.0e-4, rapid: {velocity: 600, acceleration: 5000, jerk: 1.0e+5}, "
@@ -192,7 +192,7 @@ def test_where_the_conventional_law_is_still_already_it_stays():
     plans = plan_moves(moves({"Z": four_jerk_segments(0.080, 1e5)}), machine)
     assert plans.kept.tolist() == [True]
     assert plans.profile(0) == "conventional"
-    assert durations(plans.laws, 0) == pytest.approx([0.02] * 4)
+    assert durations(plans.profiles, 0) == pytest.approx([0.02] * 4)
 
 
 def test_independent_axes_have_laws_and_times_of_their_own():
@@ -204,17 +204,17 @@ def test_independent_axes_have_laws_and_times_of_their_own():
     machine = machine_of(axes, positioning="independent")
     plans = plan_moves(moves({"X": 20.0, "Z": -1.0}, {"Y": 3.0}), machine)
     assert plans.move.tolist() == [0, 0, 1]
-    assert list(plans.laws_of(0)) == [0, 1]
-    assert list(plans.laws_of(1)) == [2]
+    assert list(plans.profiles_of(0)) == [0, 1]
+    assert list(plans.profiles_of(1)) == [2]
     assert plans.share.tolist() == moves({"X": 20.0}, {"Z": -1.0}, {"Y": 3.0}).tolist()
     alone = [plan_moves(moves(row), machine) for row in ({"X": 20.0}, {"Z": -1.0}, {"Y": 3.0})]
     for k, own in enumerate(alone):
-        assert plans.law_counts[k] == own.counts[0]
-        for mine, theirs in zip(plans.laws.segments(k), own.laws.segments(0), strict=True):
+        assert plans.profile_counts[k] == own.counts[0]
+        for mine, theirs in zip(plans.profiles.segments(k), own.profiles.segments(0), strict=True):
             assert mine == pytest.approx(theirs, rel=1e-12)
-    assert plans.law_counts[1] == 40
-    assert plans.counts.tolist() == [plans.law_counts[0], plans.law_counts[2]]
-    assert plans.law_counts[0] > plans.law_counts[1]
+    assert plans.profile_counts[1] == 40
+    assert plans.counts.tolist() == [plans.profile_counts[0], plans.profile_counts[2]]
+    assert plans.profile_counts[0] > plans.profile_counts[1]
     assert float(plans.conventional_time[0]) == pytest.approx(float(plans.conventional.total[0]))
 
 
@@ -237,10 +237,10 @@ STRUCTURE = machine_of(
 
 
 def worst_by_hand(plans, weights):
-    """Largest residual of each law by jerk steps, weights [mm] given."""
+    """Largest residual of each profile by jerk steps, weights [mm] given."""
     out = []
     for k, weight in enumerate(weights):
-        segments = plans.laws.segments(k)
+        segments = plans.profiles.segments(k)
         times = np.cumsum([0.0, *(d for d, _ in segments)])
         steps = np.diff([j for _, j in segments], prepend=0.0, append=0.0)
         omega = 2 * np.pi * 30.0
@@ -256,12 +256,12 @@ def test_a_structure_mode_feels_axes_added_with_their_signs():
     np.testing.assert_allclose(felt[:, 0], [1.0, 1.0, 2.0, 0.0], atol=1e-12)
     assert plans.modes.labels == ("Y+Z",)
     # What nothing feels gets the lowest jerk, although both axes alone would be felt.
-    rising, falling = [jerk for _, jerk in plans.laws.segments(3) if jerk][:2]
+    rising, falling = [jerk for _, jerk in plans.profiles.segments(3) if jerk][:2]
     assert rising == pytest.approx(-falling, rel=1e-6)
-    assert durations(plans.laws, 0)[0] == 0.001
+    assert durations(plans.profiles, 0)[0] == 0.001
     by_hand = worst_by_hand(plans, felt[:, 0])
     pole = mode_poles([30.0], [0.0])
-    D = np.abs(laws_response(plans.laws, pole)[:, 0]) / pole[0].imag * np.abs(felt[:, 0])
+    D = np.abs(profiles_response(plans.profiles, pole)[:, 0]) / pole[0].imag * np.abs(felt[:, 0])
     np.testing.assert_allclose(by_hand, D, rtol=1e-6, atol=1e-12)
 
 
@@ -304,7 +304,7 @@ def test_a_time_names_the_axis_the_value_and_the_limit(row, time, quantity, limi
 def test_a_longer_time_is_used_as_it_is():
     plans = plan_moves(moves({"Z": 1.0}, {"Z": 2.0}), PAPER, time=0.0905)
     assert plans.counts.tolist() == [91, 91]
-    np.testing.assert_allclose(plans.laws.total, 0.091)
+    np.testing.assert_allclose(plans.profiles.total, 0.091)
 
 
 @pytest.mark.parametrize(
@@ -327,14 +327,14 @@ def test_a_T1_that_is_not_possible_is_refused_with_the_limit(T1, said):  # noqa:
 
 def test_a_T1_within_limits_is_used_as_it_is():  # noqa: N802
     plans = plan_moves(moves({"Z": 1.0}), PAPER, T1=0.0037)
-    assert durations(plans.laws, 0) == pytest.approx([0.0037, 0.0163, 0.0163, 0.0037])
+    assert durations(plans.profiles, 0) == pytest.approx([0.0037, 0.0163, 0.0163, 0.0037])
 
 
 def test_the_profile_conventional_is_what_the_controller_does():
     plans = plan_moves(moves({"Z": 1.0}, {"Z": 200.0}), PAPER, "conventional")
     assert plans.kept.all()
     for k in range(2):
-        assert plans.laws.segments(k) == plans.conventional.segments(k)
+        assert plans.profiles.segments(k) == plans.conventional.segments(k)
 
 
 def test_a_trapezoid_cannot_be_written_as_it_is():
@@ -360,7 +360,7 @@ def test_reasons_given_are_kept_and_those_rows_not_looked_at():
 
 def test_no_moves_make_an_empty_plan():
     plans = plan_moves(moves(), PAPER)
-    assert len(plans) == len(plans.laws) == 0
+    assert len(plans) == len(plans.profiles) == 0
 
 
 def test_moves_planned_together_are_planned_as_alone():
@@ -378,7 +378,9 @@ def test_moves_planned_together_are_planned_as_alone():
     for k, row in enumerate(rows):
         alone = plan_moves(moves(row), machine)
         assert alone.counts[0] == together.counts[k]
-        for one, other in zip(alone.laws.segments(0), together.laws.segments(k), strict=True):
+        for one, other in zip(
+            alone.profiles.segments(0), together.profiles.segments(k), strict=True
+        ):
             assert one == pytest.approx(other, rel=1e-9)
 
 
@@ -452,7 +454,7 @@ def test_laws_of_a_plan_stand_for_the_moves_they_belong_to():
     rapids = rapids_of("G21 G90 G94 G64\nG1 X0 Z0 F600\nG0 X0\nG0 X9\nG0 Z-4\nM2\n", KNOWN)
     plans = plan_rapids(rapids, KNOWN)
     assert plans.move.tolist() == [1, 2]
-    assert list(plans.laws_of(0)) == []
-    assert list(plans.laws_of(2)) == [1]
+    assert list(plans.profiles_of(0)) == []
+    assert list(plans.profiles_of(2)) == [1]
     assert plans.share[1].tolist() == moves({"Z": -4.0})[0].tolist()
-    assert isinstance(plans.laws, Laws)
+    assert isinstance(plans.profiles, Profiles)

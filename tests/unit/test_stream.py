@@ -7,7 +7,7 @@ import pytest
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.motion import polyline_response, sample_laws
+from gcodejerk.motion import polyline_response, sample_profiles
 from gcodejerk.planning import stream
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import plan_moves
@@ -116,12 +116,12 @@ def test_the_conventional_residual_is_that_of_the_controller_s_samples():
     batch = one_batch(displacement, INDEPENDENT)
     plans, modes = batch.plans, batch.plans.modes
     for row in range(12):
-        laws = list(plans.laws_of(row))
-        counts = [int(np.ceil(plans.conventional.total[k] / 0.001 - 1e-6)) for k in laws]
+        profiles = list(plans.profiles_of(row))
+        counts = [int(np.ceil(plans.conventional.total[k] / 0.001 - 1e-6)) for k in profiles]
         moments = np.arange(max(counts) + 1)
         driven = np.zeros(len(moments))
-        for k in laws:
-            unit, _ = sample_laws(
+        for k in profiles:
+            unit, _ = sample_profiles(
                 plans.conventional.take(slice(k, k + 1)), moments[np.newaxis], 1e-3
             )
             driven += unit[0] * (plans.share[k] @ modes.participation[0])
@@ -241,7 +241,7 @@ def test_where_rounding_spoils_a_design_the_conventional_law_is_written():
     fallen_back = batch.kept & ~design_kept
     assert fallen_back.any(), "no case of the fallback among these moves"
     for row in np.nonzero(fallen_back)[0]:
-        assert batch.laws.segments(row) == batch.plans.conventional.segments(row)
+        assert batch.profiles.segments(row) == batch.plans.conventional.segments(row)
         np.testing.assert_array_equal(batch.residual[row], batch.conventional_residual[row])
     kept = batch.kept
     assert (
@@ -267,7 +267,7 @@ def test_a_move_has_kept_the_conventional_law_only_if_all_of_its_axes_have():
         f"  Z: {{{axis}, modes: [{{frequency: 30, damping: 0.02}}]}}\n"
     )
     plan = plan_move({"X": 5.0, "Z": 1.0}, machine)
-    # X shakes nothing and keeps its law; Z does not.
+    # X shakes nothing and keeps its profile; Z does not.
     assert plan.plans.kept.tolist() == [True, False]
     assert plan.kept.tolist() == [False]
     assert plan.profile == "condition3"
@@ -275,7 +275,7 @@ def test_a_move_has_kept_the_conventional_law_only_if_all_of_its_axes_have():
 
 
 def test_a_conventional_law_that_does_not_fit_the_time_is_never_written():
-    # Steps of 0.3 mm spoil the design; the conventional law takes 58 ms and would be cut off.
+    # Steps of 0.3 mm spoil the design; the conventional profile takes 58 ms and would be cut off.
     machine = Machine.loads(
         "interval: 0.001\npositioning: linear\naxes:\n  Z: {resolution: 0.1, "
         "rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}, limit: {acceleration: 20000}, "

@@ -34,10 +34,10 @@ program:
 MACHINE = Machine.loads(TEXT)
 
 
-def law(t, T=0.040, T1=0.001):
+def profile(t, T=0.040, T1=0.001):
     """Position and speed of the paper's four segments over the length 1."""
     if t > T / 2:
-        position, speed = law(T - t, T, T1)
+        position, speed = profile(T - t, T, T1)
         return 1.0 - position, speed
     T2 = T / 2 - T1
     R = T2 / T1
@@ -59,14 +59,14 @@ def stream(begin, end, line_end="\n", relative=False, decimals=4):
         for axis in end:
             way = float(end[axis]) - float(begin[axis])
             if relative:
-                now = round(way * law(t)[0] * 10**decimals)
+                now = round(way * profile(t)[0] * 10**decimals)
                 words.append(f"{axis}{(now - at[axis]) / 10**decimals:.{decimals}f}")
                 at[axis] = now
             elif t == knots[-1]:
                 words.append(axis + end[axis])
             else:
-                words.append(f"{axis}{float(begin[axis]) + way * law(t)[0]:.{decimals}f}")
-        feed = max(law(before)[1], law(t)[1]) * size * 60
+                words.append(f"{axis}{float(begin[axis]) + way * profile(t)[0]:.{decimals}f}")
+        feed = max(profile(before)[1], profile(t)[1]) * size * 60
         lines.append(f"G1 {' '.join(words)} F{feed:.4f}{line_end}")
     return "".join(lines)
 
@@ -376,7 +376,7 @@ def test_inches_and_diameters_are_those_of_the_program():
 
 
 def table(rows=None, line=3):
-    rows = rows or [(k, law(k * 0.001)[0]) for k in range(41)]
+    rows = rows or [(k, profile(k * 0.001)[0]) for k in range(41)]
     text = "".join(f"{line},{k * 0.001:.3f},nan,{z:.4f}\n" for k, z in rows)
     return "block,t,X,Z\n" + text
 

@@ -1,4 +1,4 @@
-"""Independent positioning: every axis is held to its own start, arrival and law."""
+"""Independent positioning: every axis is held to its own start, arrival and profile."""
 
 import re
 from dataclasses import replace

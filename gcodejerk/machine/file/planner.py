@@ -1,4 +1,4 @@
-"""Which law the controller's own rapids follow: as the file states it, or as its control has it.
+"""Which profile the control's own rapids follow: as the file states it, or as the control has it.
 
 Rule: what the file states stands. A control that has no jerk limit cannot follow a `rapid.jerk`;
 then the file contradicts itself, which is told at the jerk: nobody but the user knows whether the
@@ -18,11 +18,11 @@ WITHOUT_JERK = {
     "linuxcnc": (LINUXCNC, "LinuxCNC 2.9"),
     "grbl": (TRAPEZOIDAL, "grbl"),
 }
-"""Controls whose G0 has no jerk limit: their law, and what messages call them."""
+"""Controls whose G0 has no jerk limit: their profile, and what messages call them."""
 
 
 def choose_planners(values: dict[str, Any], checker: Checker) -> dict[str, str]:
-    """The law of each axis; refuses laws that do not fit together or lack their jerk.
+    """The profile of each axis; refuses profiles that do not fit together or lack their jerk.
 
     Parameters
     ----------
@@ -96,13 +96,13 @@ def planner_warnings(
     control = values["controller"]
     own = WITHOUT_JERK.get(control) if checker.given(("controller",)) else None
     for a, axis in values["axes"].items():
-        rapid, law = axis["rapid"], planners[a]
+        rapid, planner = axis["rapid"], planners[a]
         stated = checker.given(("axes", a, "rapid", "planner"))
         jerk = ("axes", a, "rapid", "jerk")
-        if "jerk" in rapid and law not in (JERK_LIMITED, BELL):
+        if "jerk" in rapid and planner not in (JERK_LIMITED, BELL):
             out.append(
                 MachineError(
-                    f"axes.{a}.rapid.jerk stands beside planner: {law}, which has no jerk limit: "
+                    f"axes.{a}.rapid.jerk stands beside planner: {planner}, which has no jerk limit: "
                     "it is not used",
                     "leave it out, or state the planner that keeps it",
                     checker.place(jerk),

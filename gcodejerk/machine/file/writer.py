@@ -145,8 +145,8 @@ def _limits(limits: Limits, planner: str | None = None) -> str:
     values = {"velocity": limits.velocity, "acceleration": limits.acceleration}
     if math.isfinite(limits.jerk):
         values["jerk"] = limits.jerk
-    law = {} if planner is None else {"planner": planner}
-    return _braces({key: _number(value) for key, value in values.items()} | law)
+    profile = {} if planner is None else {"planner": planner}
+    return _braces({key: _number(value) for key, value in values.items()} | profile)
 
 
 def _flow(values: Mapping[str, float]) -> str:

@@ -7,11 +7,11 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.profile import Array, Profiles
 
 
-def box_laws(w1: Array, w2: Array, w3: Array) -> Laws:
-    """Laws of boxes: a step of the jerk, up or down, at the sum of every subset of the widths.
+def box_profiles(w1: Array, w2: Array, w3: Array) -> Profiles:
+    """Profiles of boxes: a step of the jerk, up or down, at the sum of every subset of the widths.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ def box_laws(w1: Array, w2: Array, w3: Array) -> Laws:
 
     Returns
     -------
-    Laws
+    Profiles
     """
     chosen = np.array(list(itertools.product((0, 1), repeat=3)))
     widths = np.stack([w1, w2, w3], axis=1)
@@ -33,4 +33,4 @@ def box_laws(w1: Array, w2: Array, w3: Array) -> Laws:
     used: NDArray[np.bool_] = duration > 1e-12
     acceleration = np.cumsum(jerk * duration, axis=1) - jerk * duration
     first = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
-    return Laws.of(first, duration[used], acceleration[used], jerk[used])
+    return Profiles.of(first, duration[used], acceleration[used], jerk[used])

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.profile import Array, Profiles
 
 
 class Condition(StrEnum):
@@ -331,12 +331,14 @@ def checked_times(T1: ArrayLike, T_SUM: ArrayLike) -> tuple[Array, Array]:
     return first, total
 
 
-def condition_laws(condition: str, T1: Array, total: Array) -> Laws:
-    """Unit laws of a condition, for n values of T1 and T_SUM [s]."""
+def condition_profiles(condition: str, T1: Array, total: Array) -> Profiles:
+    """Unit profiles of a condition, for n values of T1 and T_SUM [s]."""
     duration = condition_durations(condition, T1, total)
     A1, A2 = condition_accelerations(condition, 1.0, T1, total)
     zero = np.zeros(len(T1))
     acceleration = np.stack([zero, A1 + zero, zero, A2 + zero], axis=1)
     end = np.stack([A1 + zero, zero, A2 + zero, zero], axis=1)
     jerk = (end - acceleration) / duration
-    return Laws.of(4 * np.arange(len(T1) + 1), duration.ravel(), acceleration.ravel(), jerk.ravel())
+    return Profiles.of(
+        4 * np.arange(len(T1) + 1), duration.ravel(), acceleration.ravel(), jerk.ravel()
+    )

@@ -1,7 +1,7 @@
-r"""Symmetric time laws: four numbers, from which everything else follows.
+r"""Symmetric time profiles: four numbers, from which everything else follows.
 
 This module owns the family that Condition III of Sato and Shirase and its generalisation belong to,
-and with them the conventional law of a controller::
+and with them the conventional profile of a controller::
 
     acceleration
       A |    ______
@@ -15,11 +15,12 @@ and with them the conventional law of a controller::
                               |T2 | Ta |T1
 
 Rising acceleration takes T1, falling acceleration T2; Ta at constant acceleration and Tv at
-constant velocity are zero in a four-segment law. In the paper's count of segments T3 = T2 and
-T4 = T1. The law is odd about its middle: what accelerates in the order T1, Ta, T2 brakes in the
+constant velocity are zero in a four-segment profile. In the paper's count of segments T3 = T2 and
+T4 = T1. The profile is odd about its middle: what accelerates in the order T1, Ta, T2 brakes in the
 order T2, Ta, T1, and the velocity is even.
 
-Rule: laws are unit laws, from 0 to 1 in rest-to-rest motion; all quantities scale with the length.
+Rule: profiles are unit profiles, from 0 to 1 in rest-to-rest motion; all quantities scale with the
+length.
 """
 
 from __future__ import annotations
@@ -29,12 +30,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.profile import Array, Profiles
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SymmetricLaws:
-    """Unit laws as columns; entry i of every array is law i.
+class SymmetricProfiles:
+    """Unit profiles as columns; entry i of every array is profile i.
 
     Attributes
     ----------
@@ -70,8 +71,8 @@ class SymmetricLaws:
     def centroid(self) -> Array:
         """Moment at which the acceleration's area is balanced [s].
 
-        The length of a law is V (T_SUM - 2 centroid): the acceleration acts as if it all happened
-        at its centroid, and so, by symmetry, does the deceleration.
+        The length of a profile is V (T_SUM - 2 centroid): the acceleration acts as if it all
+        happened at its centroid, and so, by symmetry, does the deceleration.
         """
         T1, Ta, T2 = self.T1, self.Ta, self.T2
         moment = T1 * T1 / 3.0 + Ta * (T1 + 0.5 * Ta) + 0.5 * T2 * (T1 + Ta + T2 / 3.0)
@@ -79,41 +80,41 @@ class SymmetricLaws:
 
     @property
     def velocity(self) -> Array:
-        """Peak velocity of the unit law [1/s]."""
+        """Peak velocity of the unit profile [1/s]."""
         return 1.0 / (self.total - 2.0 * self.centroid)
 
     @property
     def acceleration(self) -> Array:
-        """Peak acceleration of the unit law [1/s^2]."""
+        """Peak acceleration of the unit profile [1/s^2]."""
         return self.velocity / self.area
 
     @property
     def jerk(self) -> Array:
-        """Peak jerk of the unit law; infinite where T1 or T2 is zero [1/s^3]."""
+        """Peak jerk of the unit profile; infinite where T1 or T2 is zero [1/s^3]."""
         with np.errstate(divide="ignore"):
             return self.acceleration / np.minimum(self.T1, self.T2)
 
-    def take(self, index: NDArray[np.intp] | NDArray[np.bool_] | slice) -> SymmetricLaws:
-        """Some of the laws."""
-        return SymmetricLaws(self.T1[index], self.Ta[index], self.T2[index], self.Tv[index])
+    def take(self, index: NDArray[np.intp] | NDArray[np.bool_] | slice) -> SymmetricProfiles:
+        """Some of the profiles."""
+        return SymmetricProfiles(self.T1[index], self.Ta[index], self.T2[index], self.Tv[index])
 
     def replaced(
-        self, index: NDArray[np.intp] | NDArray[np.bool_], other: SymmetricLaws
-    ) -> SymmetricLaws:
-        """These laws with those at `index` taken from `other` (of the same shape as the index)."""
+        self, index: NDArray[np.intp] | NDArray[np.bool_], other: SymmetricProfiles
+    ) -> SymmetricProfiles:
+        """These profiles with those at `index` taken from `other` (of the index's shape)."""
         columns = []
         for own, new in zip(self.columns(), other.columns(), strict=True):
             column = own.copy()
             column[index] = new
             columns.append(column)
-        return SymmetricLaws(*columns)
+        return SymmetricProfiles(*columns)
 
     def columns(self) -> tuple[Array, Array, Array, Array]:
         """T1, Ta, T2, Tv."""
         return self.T1, self.Ta, self.T2, self.Tv
 
-    def general(self) -> Laws:
-        """The same laws as segments: T1, Ta, T2, Tv, T2, Ta, T1, empty ones left out."""
+    def general(self) -> Profiles:
+        """The same profiles as segments: T1, Ta, T2, Tv, T2, Ta, T1, empty ones left out."""
         T1, Ta, T2, Tv = self.columns()
         A, zero = self.acceleration, np.zeros(len(self))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -124,25 +125,25 @@ class SymmetricLaws:
         jerk = np.stack([rising, zero, falling, zero, falling, zero, rising], axis=1)
         used = duration > 0.0
         first = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
-        return Laws.of(first, duration[used], acceleration[used], jerk[used])
+        return Profiles.of(first, duration[used], acceleration[used], jerk[used])
 
 
-def conventional_laws(
+def conventional_profiles(
     velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike, shortest_ramp: float = 0.0
-) -> SymmetricLaws:
-    r"""The fastest symmetric law within limits: what controllers do today.
+) -> SymmetricProfiles:
+    r"""The fastest symmetric profile within limits: what controllers do today.
 
     Parameters
     ----------
     velocity, acceleration, jerk : array_like, shape (n,)
-        Limits of the unit law; the limits of an axis divided by its displacement. Jerk may be
+        Limits of the unit profile; the limits of an axis divided by its displacement. Jerk may be
         infinite: the velocity is then a trapezoid. [1/s], [1/s^2], [1/s^3]
     shortest_ramp : float, optional
-        Least duration of T1 = T2, for the fastest law that a command interval allows. [s]
+        Least duration of T1 = T2, for the fastest profile that a command interval allows. [s]
 
     Returns
     -------
-    SymmetricLaws
+    SymmetricProfiles
         Four segments where neither velocity nor acceleration is reached, up to seven otherwise.
 
     Notes
@@ -156,8 +157,8 @@ def conventional_laws(
     --------
     1 mm with 600 mm/s, 5000 mm/s^2 and 5e5 mm/s^3 takes four times 10 ms:
 
-    >>> law = conventional_laws([600.0], [5000.0], [5e5])
-    >>> [round(float(t[0]), 6) for t in law.columns()]
+    >>> profile = conventional_profiles([600.0], [5000.0], [5e5])
+    >>> [round(float(t[0]), 6) for t in profile.columns()]
     [0.01, 0.0, 0.01, 0.0]
     """
     V, A, J = np.broadcast_arrays(
@@ -177,4 +178,4 @@ def conventional_laws(
     ta = np.where(ta < 1e-12, 0.0, ta)
     tv = 1.0 / V - (2.0 * tj + ta)
     tv = np.where(tv < 1e-12, 0.0, tv)
-    return SymmetricLaws(tj, ta, tj.copy(), tv)
+    return SymmetricProfiles(tj, ta, tj.copy(), tv)

@@ -19,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.profiles.boxes import box_laws
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.boxes import box_profiles
+from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.search.objective import Objective
 
@@ -42,7 +42,7 @@ STEPS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]], float)
 def design_cascade(
     total: Array, velocity: Array, acceleration: Array, jerk: Array,
     objective: Objective, interval: float,
-) -> tuple[Laws, Array]:  # fmt: skip
+) -> tuple[Profiles, Array]:  # fmt: skip
     """The cascade of three boxes in the given time with the least worst residual.
 
     Parameters
@@ -50,7 +50,7 @@ def design_cascade(
     total : ndarray, shape (n,)
         T_SUM. [s]
     velocity, acceleration, jerk : ndarray, shape (n,)
-        Limits of the unit law. [1/s], [1/s^2], [1/s^3]
+        Limits of the unit profile. [1/s], [1/s^2], [1/s^3]
     objective : Objective
         Of n moves.
     interval : float
@@ -58,8 +58,8 @@ def design_cascade(
 
     Returns
     -------
-    laws : Laws
-        n laws; meaningless where none is feasible.
+    profiles : Profiles
+        n profiles; meaningless where none is feasible.
     worst : ndarray, shape (n,)
         Largest residual displacement, infinite where no cascade keeps the limits. [mm]
     """
@@ -78,7 +78,7 @@ def design_cascade(
         w2[part], w3[part], worst[part] = search.run(boxes)
     feasible = np.isfinite(worst)
     w2, w3 = np.where(feasible, w2, total / 3.0), np.where(feasible, w3, total / 6.0)
-    return box_laws(total - w2 - w3, w2, w3), worst
+    return box_profiles(total - w2 - w3, w2, w3), worst
 
 
 def box_response(width: Array, poles: Complex) -> Complex:

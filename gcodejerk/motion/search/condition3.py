@@ -1,12 +1,12 @@
-r"""Design of Condition III: the law of given duration that leaves the modes most still.
+r"""Design of Condition III: the profile of given duration that leaves the modes most still.
 
-This module owns the search on the amplitude map. Every law in it has the given T_SUM and length and
-keeps the limits; among them the one is taken whose largest residual displacement over all modes
+This module owns the search on the amplitude map. Every profile in it has the given T_SUM and length
+and keeps the limits; among them the one is taken whose largest residual displacement over all modes
 is least. The search has two parts:
 
 * four segments (the paper's Condition III): one free number, T1, whose feasible range has a closed
-  form. It is used wherever the conventional law has four segments itself, so that the
-  conventional law is a member and the result cannot be worse;
+  form. It is used wherever the conventional profile has four segments itself, so that the
+  conventional profile is a member and the result cannot be worse;
 * the generalisation with constant acceleration and cruise, where a limit binds: T1, T2 and Ta are
   free, and Ta's feasible range is a closed form of the other two.
 
@@ -21,17 +21,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.profiles.laws import Array
-from gcodejerk.motion.profiles.symmetric import SymmetricLaws, conventional_laws
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.profiles.symmetric import SymmetricProfiles, conventional_profiles
 from gcodejerk.motion.residual import Complex, symmetric_response
 from gcodejerk.motion.search.objective import Objective
 
 MAP_COLUMNS = 257
-"""Values of T1 on the map of four-segment laws, T_SUM/4 among them."""
+"""Values of T1 on the map of four-segment profiles, T_SUM/4 among them."""
 RAMP_GRID = 6
-"""Values of T1 and of T2 each on the map of general laws."""
+"""Values of T1 and of T2 each on the map of general profiles."""
 REFINEMENTS = 10
-"""Halvings of the step in the search around the best general law of the map."""
+"""Halvings of the step in the search around the best general profile of the map."""
 TIE = 1e-7
 """Residuals that differ by less than this are equal, and the lower jerk decides [mm]."""
 ROUNDING = 1e-9
@@ -43,25 +43,25 @@ CELLS = 1 << 16
 def four_segment_range(
     total: Array, velocity: Array, acceleration: Array, jerk: Array, interval: float
 ) -> tuple[Array, Array]:
-    r"""Least and greatest T1 of a four-segment law within limits.
+    r"""Least and greatest T1 of a four-segment profile within limits.
 
     Parameters
     ----------
     total : ndarray, shape (n,)
         T_SUM. [s]
     velocity, acceleration, jerk : ndarray, shape (n,)
-        Limits of the unit law. [1/s], [1/s^2], [1/s^3]
+        Limits of the unit profile. [1/s], [1/s^2], [1/s^3]
     interval : float
         Command interval, the least duration of a segment. [s]
 
     Returns
     -------
     tuple of ndarray, shape (n,)
-        (least, greatest) T1 [s]; no law is feasible where least > greatest.
+        (least, greatest) T1 [s]; no profile is feasible where least > greatest.
 
     Notes
     -----
-    With T2 = T_SUM/2 - T1 the unit law has V = 1.5/(T_SUM - T1), A = 6/(T_SUM (T_SUM - T1)),
+    With T2 = T_SUM/2 - T1 the unit profile has V = 1.5/(T_SUM - T1), A = 6/(T_SUM (T_SUM - T1)),
     J1 = A/T1 and J2 = A/T2, each monotone in T1, so each limit is one bound.
 
     Examples
@@ -84,15 +84,15 @@ def four_segment_range(
     high = np.minimum(
         np.minimum(T - 1.5 / V, T - 6.0 / (T * A)), np.minimum(by_J2, 0.5 * T - interval)
     )
-    # The ends may cross by rounding where only one law is left.
+    # The ends may cross by rounding where only one profile is left.
     high = np.where((high < low) & (high > low * (1.0 - 1e-7)), low, high)
     return low, high
 
 
 def design_four_segments(
     total: Array, low: Array, high: Array, objective: Objective
-) -> tuple[SymmetricLaws, Array]:
-    """The four-segment law with the least worst residual, T1 within a range.
+) -> tuple[SymmetricProfiles, Array]:
+    """The four-segment profile with the least worst residual, T1 within a range.
 
     Parameters
     ----------
@@ -103,8 +103,8 @@ def design_four_segments(
 
     Returns
     -------
-    laws : SymmetricLaws
-        n laws.
+    profiles : SymmetricProfiles
+        n profiles.
     worst : ndarray, shape (n,)
         Largest residual displacement. [mm]
     """
@@ -173,37 +173,37 @@ def design_condition3(
     jerk: Array,
     objective: Objective,
     interval: float,
-    conventional: SymmetricLaws,
-) -> tuple[SymmetricLaws, Array, NDArray[np.bool_]]:
-    """The general law of given duration with the least worst residual within limits.
+    conventional: SymmetricProfiles,
+) -> tuple[SymmetricProfiles, Array, NDArray[np.bool_]]:
+    """The general profile of given duration with the least worst residual within limits.
 
     Parameters
     ----------
     total : ndarray, shape (n,)
         T_SUM. [s]
     velocity, acceleration, jerk : ndarray, shape (n,)
-        Limits of the unit law; jerk may be infinite. [1/s], [1/s^2], [1/s^3]
+        Limits of the unit profile; jerk may be infinite. [1/s], [1/s^2], [1/s^3]
     objective : Objective
         Of n moves.
     interval : float
         Command interval, the least duration of a segment. [s]
-    conventional : SymmetricLaws
-        The laws to improve on; stretched to T_SUM they are candidates, where they are within
+    conventional : SymmetricProfiles
+        The profiles to improve on; stretched to T_SUM they are candidates, where they are within
         limits.
 
     Returns
     -------
-    laws : SymmetricLaws
-        n laws; meaningless where `feasible` is False.
+    profiles : SymmetricProfiles
+        n profiles; meaningless where `feasible` is False.
     worst : ndarray, shape (n,)
-        Largest residual displacement, infinite where no law is feasible. [mm]
+        Largest residual displacement, infinite where no profile is feasible. [mm]
     feasible : ndarray of bool, shape (n,)
-        Whether the search found a law within the limits.
+        Whether the search found a profile within the limits.
     """
     n = len(total)
     columns = [np.empty(n) for _ in range(4)]
     worst = np.empty(n)
-    fastest = conventional_laws(velocity, acceleration, jerk, interval)
+    fastest = conventional_profiles(velocity, acceleration, jerk, interval)
     for part in _slices(n, RAMP_GRID * RAMP_GRID * 2):
         search = _GeneralSearch(
             total[part],
@@ -213,14 +213,14 @@ def design_condition3(
             objective.take(part),
             interval,
         )
-        laws, worst[part] = search.run([conventional.take(part), fastest.take(part)])
-        for column, new in zip(columns, laws.columns(), strict=True):
+        profiles, worst[part] = search.run([conventional.take(part), fastest.take(part)])
+        for column, new in zip(columns, profiles.columns(), strict=True):
             column[part] = new
     feasible = np.isfinite(worst)
     if not len(objective.poles):
         # The search went by the jerk; nothing vibrates.
         worst = np.where(feasible, 0.0, np.inf)
-    return SymmetricLaws(*columns), worst, feasible
+    return SymmetricProfiles(*columns), worst, feasible
 
 
 COMPASS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
@@ -254,12 +254,12 @@ class _GeneralSearch:
         # V = 1/(T_SUM - 2 centroid): the velocity limit is a limit of the centroid.
         self.centroid = 0.5 * (total - 1.0 / self.V)
 
-    def run(self, known: list[SymmetricLaws]) -> tuple[SymmetricLaws, Array]:
-        """Known laws stretched to T_SUM, the map, and the refinement of the best of them."""
+    def run(self, known: list[SymmetricProfiles]) -> tuple[SymmetricProfiles, Array]:
+        """Known profiles stretched to T_SUM, the map, and the refinement of the best of them."""
         n = len(self.total)
         best = _Points(np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf))
-        for laws in known:
-            best = self._better(best, self._stretched(laws))
+        for profiles in known:
+            best = self._better(best, self._stretched(profiles))
         best = self._better(best, self._map())
         step = np.maximum(0.25 * np.maximum(best.T1, best.T2), self.interval)
         step_share = np.full(n, 0.5)
@@ -272,8 +272,8 @@ class _GeneralSearch:
             best = self._better(best, self._least(T1, T2, np.clip(share, 0.0, 1.0)))
             moved = best.worst < worst
             step, step_share = (np.where(moved, x, 0.5 * x) for x in (step, step_share))
-        laws, _ = self._laws(best.T1, best.T2, best.share)
-        return laws, best.worst
+        profiles, _ = self._profiles(best.T1, best.T2, best.share)
+        return profiles, best.worst
 
     def _better(self, best: _Points, other: _Points) -> _Points:
         """The better of two points in each row; the first unless the second gains something."""
@@ -286,14 +286,14 @@ class _GeneralSearch:
         index, chosen = np.arange(len(value)), np.argmin(value, axis=1)
         return _Points(*(x[index, chosen] for x in (T1, T2, share, value)))
 
-    def _stretched(self, laws: SymmetricLaws) -> _Points:
-        """SymmetricLaws stretched to T_SUM, as points of the search."""
-        stretch = self.total / laws.total
-        T1 = np.maximum(laws.T1 * stretch, self.interval)
-        T2 = np.maximum(laws.T2 * stretch, self.interval)
+    def _stretched(self, profiles: SymmetricProfiles) -> _Points:
+        """SymmetricProfiles stretched to T_SUM, as points of the search."""
+        stretch = self.total / profiles.total
+        T1 = np.maximum(profiles.T1 * stretch, self.interval)
+        T2 = np.maximum(profiles.T2 * stretch, self.interval)
         low, high = self._range_of_Ta(T1, T2)
         with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.clip((laws.Ta * stretch - low) / (high - low), 0.0, 1.0)
+            share = np.clip((profiles.Ta * stretch - low) / (high - low), 0.0, 1.0)
         share = np.where(np.isfinite(share), share, 0.0)
         return self._least(T1[:, np.newaxis], T2[:, np.newaxis], share[:, np.newaxis])
 
@@ -328,8 +328,10 @@ class _GeneralSearch:
             low = p - np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
         return np.maximum(low, 0.0), high
 
-    def _laws(self, T1: Array, T2: Array, share: Array) -> tuple[SymmetricLaws, NDArray[np.bool_]]:
-        """The laws of these coordinates, and whether each keeps limits and segment durations."""
+    def _profiles(
+        self, T1: Array, T2: Array, share: Array
+    ) -> tuple[SymmetricProfiles, NDArray[np.bool_]]:
+        """The profiles of these coordinates; whether each keeps limits and segment durations."""
         T = self.total.reshape((len(self.total),) + (1,) * (T1.ndim - 1))
         J = self.J.reshape(T.shape)
         low, high = self._range_of_Ta(T1, T2)
@@ -346,7 +348,7 @@ class _GeneralSearch:
         Tv = 2.0 * (room - Ta)
         Tv = np.where(np.abs(Tv) < 1e-12, 0.0, Tv)
         with np.errstate(invalid="ignore", divide="ignore"):
-            laws = SymmetricLaws(T1, Ta, T2, Tv)
+            profiles = SymmetricProfiles(T1, Ta, T2, Tv)
             tolerance = 1e-12
             legal = (
                 (low <= high + tolerance)
@@ -355,16 +357,16 @@ class _GeneralSearch:
                 & ((Ta == 0.0) | (Ta >= dt))
                 & ((Tv == 0.0) | (Tv >= dt))
                 & (np.minimum(T1, T2) >= dt)
-                & (laws.acceleration <= J * np.minimum(T1, T2))
+                & (profiles.acceleration <= J * np.minimum(T1, T2))
             )
-        return laws, legal
+        return profiles, legal
 
     def _value(self, T1: Array, T2: Array, share: Array) -> Array:
         """Worst residual of candidates, shape (n, k); infinite where one is not legal."""
-        laws, legal = self._laws(T1, T2, share)
+        profiles, legal = self._profiles(T1, T2, share)
         value = np.full(T1.shape, np.inf)
         rows = np.nonzero(legal)[0]
-        flat = SymmetricLaws(*(column[legal] for column in laws.columns()))
+        flat = SymmetricProfiles(*(column[legal] for column in profiles.columns()))
         if len(self.objective.poles):
             value[legal] = self.objective.take(rows).of(flat)
         else:
@@ -373,17 +375,17 @@ class _GeneralSearch:
         return value
 
 
-def _four(T1: Array, total: Array) -> SymmetricLaws:
-    """Four-segment laws of these T1 and T_SUM."""
+def _four(T1: Array, total: Array) -> SymmetricProfiles:
+    """Four-segment profiles of these T1 and T_SUM."""
     T1, T = np.broadcast_arrays(T1, total)
     zero = np.zeros(T1.shape)
-    return SymmetricLaws(np.array(T1), zero, 0.5 * T - T1, zero)
+    return SymmetricProfiles(np.array(T1), zero, 0.5 * T - T1, zero)
 
 
-def _displacement(laws: SymmetricLaws, poles: Complex) -> Array:
-    """Displacement envelopes of unit laws for weight 1, shape (..., m) [-]."""
-    shape = laws.T1.shape
-    flat = SymmetricLaws(*(column.ravel() for column in laws.columns()))
+def _displacement(profiles: SymmetricProfiles, poles: Complex) -> Array:
+    """Displacement envelopes of unit profiles for weight 1, shape (..., m) [-]."""
+    shape = profiles.T1.shape
+    flat = SymmetricProfiles(*(column.ravel() for column in profiles.columns()))
     amplitude: Array = np.abs(symmetric_response(flat, poles)) / poles.imag
     return amplitude.reshape(*shape, len(poles))
 

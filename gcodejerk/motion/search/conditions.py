@@ -1,7 +1,7 @@
 r"""Conditions I and II as designs: the paper's other two families, at their best T1.
 
 This module owns the search for T1 in the families of four segments that are not symmetric. Their
-closed forms stand in `conditions.py`; here they are laws like all others, so that they compete
+closed forms stand in `conditions.py`; here they are profiles like all others, so that they compete
 under the same limits and the same objective.
 """
 
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gcodejerk.motion.profiles.conditions import condition_laws
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.conditions import condition_profiles
+from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.search.objective import Objective
 
 CANDIDATES = 65
@@ -25,7 +25,7 @@ ROUNDING = 1e-9
 def design_condition(
     condition: str, total: Array, velocity: Array, acceleration: Array, jerk: Array,
     objective: Objective, interval: float,
-) -> tuple[Laws, Array]:  # fmt: skip
+) -> tuple[Profiles, Array]:  # fmt: skip
     """The profile of Condition I or II in the given time with the least worst residual.
 
     Parameters
@@ -35,7 +35,7 @@ def design_condition(
     total : ndarray, shape (n,)
         T_SUM, more than four intervals where anything is feasible. [s]
     velocity, acceleration, jerk : ndarray, shape (n,)
-        Limits of the unit law; infinite ones bind nothing. [1/s], [1/s^2], [1/s^3]
+        Limits of the unit profile; infinite ones bind nothing. [1/s], [1/s^2], [1/s^3]
     objective : Objective
         Of n moves.
     interval : float
@@ -43,8 +43,8 @@ def design_condition(
 
     Returns
     -------
-    laws : Laws
-        n laws; meaningless where none is feasible.
+    profiles : Profiles
+        n profiles; meaningless where none is feasible.
     worst : ndarray, shape (n,)
         Largest residual displacement, infinite where no T1 keeps the limits. [mm]
     """
@@ -57,7 +57,7 @@ def design_condition(
         T1[part], worst[part] = _best_T1(
             condition, total[part], limits, objective.take(part), interval
         )
-    return condition_laws(condition, T1, total), worst
+    return condition_profiles(condition, T1, total), worst
 
 
 def _best_T1(
@@ -89,13 +89,13 @@ def _value(
     every = np.broadcast_to(total[:, np.newaxis], T1.shape)
     edge = interval * (1.0 - ROUNDING)
     legal = (edge <= T1) & (edge <= 0.5 * every - T1)
-    laws = condition_laws(condition, T1[legal], every[legal])
+    profiles = condition_profiles(condition, T1[legal], every[legal])
     rows = np.nonzero(legal)[0]
-    peaks = (laws.peak_velocity, laws.peak_acceleration, laws.peak_jerk)
+    peaks = (profiles.peak_velocity, profiles.peak_acceleration, profiles.peak_jerk)
     kept = np.ones(len(rows), dtype=bool)
     for peak, limit in zip(peaks, limits, strict=True):
         kept &= peak <= limit[rows] * (1.0 + ROUNDING)
     found = np.full(len(rows), np.inf)
-    found[kept] = objective.take(rows[kept]).of(laws.take(kept))
+    found[kept] = objective.take(rows[kept]).of(profiles.take(kept))
     value[legal] = found
     return value

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion.profiles.laws import Array, Laws
-from gcodejerk.motion.profiles.symmetric import SymmetricLaws
-from gcodejerk.motion.residual import Complex, grouped, laws_response, symmetric_response
+from gcodejerk.motion.profiles.profile import Array, Profiles
+from gcodejerk.motion.profiles.symmetric import SymmetricProfiles
+from gcodejerk.motion.residual import Complex, grouped, profiles_response, symmetric_response
 
 DENSE = 0.06
 """Distance of frequencies, times T_SUM/2, at which a band is judged at most. [rad]"""
@@ -101,16 +101,16 @@ class Objective:
         worst: Array = grouped(weighted, self.group).max(axis=-1, initial=0.0)
         return worst
 
-    def dominant(self, laws: Laws) -> NDArray[np.intp]:
-        """The mode whose residual displacement is largest, for each of n laws, shape (n,)."""
-        displacement = np.abs(laws_response(laws, self.poles)) / self.poles.imag
+    def dominant(self, profiles: Profiles) -> NDArray[np.intp]:
+        """The mode whose residual displacement is largest, for each of n profiles, shape (n,)."""
+        displacement = np.abs(profiles_response(profiles, self.poles)) / self.poles.imag
         mode: NDArray[np.intp] = np.argmax(displacement * self.weights, axis=1)
         return mode
 
-    def of(self, laws: Laws | SymmetricLaws) -> Array:
-        """Largest residual displacement of n unit laws, one for each move, shape (n,) [mm]."""
-        if isinstance(laws, Laws):
-            response = laws_response(laws, self.poles)
+    def of(self, profiles: Profiles | SymmetricProfiles) -> Array:
+        """Largest residual displacement of n unit profiles, one for each move, shape (n,) [mm]."""
+        if isinstance(profiles, Profiles):
+            response = profiles_response(profiles, self.poles)
         else:
-            response = symmetric_response(laws, self.poles)
+            response = symmetric_response(profiles, self.poles)
         return self.worst(np.abs(response) / self.poles.imag)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gcodejerk.motion.profiles.laws import Array, Laws
+from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.search.objective import DENSE, FEWEST
 from gcodejerk.motion.search.socp import (
@@ -72,7 +72,7 @@ class Move:
     count : int
         T_SUM. [intervals]
     velocity, acceleration, jerk : float
-        Limits of the unit law; the jerk may be infinite. [1/s], [1/s^2], [1/s^3]
+        Limits of the unit profile; the jerk may be infinite. [1/s], [1/s^2], [1/s^3]
     poles : ndarray of complex, shape (m,)
         Of the modes. [rad/s]
     weights : ndarray, shape (m,)
@@ -98,7 +98,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Optimum:
-    """An optimal unit law: a jerk for each block of whole intervals.
+    """An optimal unit profile: a jerk for each block of whole intervals.
 
     Attributes
     ----------
@@ -115,8 +115,8 @@ class Optimum:
     worst: float
 
 
-def optimum_laws(optima: list[Optimum], interval: float) -> Laws:
-    """The laws of optima, a segment for each block.
+def optimum_profiles(optima: list[Optimum], interval: float) -> Profiles:
+    """The profiles of optima, a segment for each block.
 
     Parameters
     ----------
@@ -127,33 +127,33 @@ def optimum_laws(optima: list[Optimum], interval: float) -> Laws:
 
     Returns
     -------
-    Laws
-        n laws.
+    Profiles
+        n profiles.
     """
     first = np.concatenate([[0], np.cumsum([len(optimum.jerk) for optimum in optima])])
     none = np.zeros(0)
     jerk = np.concatenate([none, *(optimum.jerk for optimum in optima)]) / interval**3
     duration = np.concatenate([none, *(np.diff(optimum.knots) for optimum in optima)]) * interval
     gained = np.insert(np.cumsum(jerk * duration), 0, 0.0)
-    # Every law begins at rest: what rounding has left of the laws before it is not its own.
+    # Every profile begins at rest: what rounding has left of the profiles before it is not its own.
     acceleration = gained[:-1] - np.repeat(gained[first[:-1]], np.diff(first))
-    return Laws.of(first, duration, acceleration, jerk)
+    return Profiles.of(first, duration, acceleration, jerk)
 
 
 def least_residual(move: Move, reference: float) -> Optimum | None:
-    """The law of least worst residual; among equal ones the smoothest.
+    """The profile of least worst residual; among equal ones the smoothest.
 
     Parameters
     ----------
     move : Move
         At least one pole has a weight above zero.
     reference : float
-        Residual of the controller's own law, the measure for what is small. [mm]
+        Residual of the controller's own profile, the measure for what is small. [mm]
 
     Returns
     -------
     Optimum or None
-        None where no law on the grid keeps the limits.
+        None where no profile on the grid keeps the limits.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def least_residual(move: Move, reference: float) -> Optimum | None:
 
 
 def smoothest_within(move: Move, worst: float, reference: float) -> Optimum | None:
-    """The law of least peak jerk that leaves at most `worst` in every mode, over the band.
+    """The profile of least peak jerk that leaves at most `worst` in every mode, over the band.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def smoothest_within(move: Move, worst: float, reference: float) -> Optimum | No
     Returns
     -------
     Optimum or None
-        None where no law on the grid does that within the limits.
+        None where no profile on the grid does that within the limits.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def smoothest_within(move: Move, worst: float, reference: float) -> Optimum | No
 
 
 def quiet_enough(move: Move, worst: float, reference: float) -> Optimum | None:
-    """Any law that leaves at most `worst`; found sooner than the best or the smoothest.
+    """Any profile that leaves at most `worst`; found sooner than the best or the smoothest.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def quiet_enough(move: Move, worst: float, reference: float) -> Optimum | None:
     Returns
     -------
     Optimum or None
-        None where no law on the grid does that within the limits.
+        None where no profile on the grid does that within the limits.
 
     Raises
     ------

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion.profiles.laws import Array
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex, grouped
 
 if TYPE_CHECKING:
@@ -108,17 +108,17 @@ def require_solver() -> None:
 def solve(
     problem: Problem, reference: float, jerk_cost: float, accuracy: float = ACCURACY
 ) -> Solution | None:
-    """The law that has the least sum of residual and cost of its peak jerk.
+    """The profile that has the least sum of residual and cost of its peak jerk.
 
     Parameters
     ----------
     problem : Problem
         The move.
     reference : float
-        A residual, such as that of the controller's own law: the solver's accuracy is a share of
-        it. [-]
+        A residual, such as that of the controller's own profile: the solver's accuracy is a share
+        of it. [-]
     jerk_cost : float
-        What the full jerk costs, as a share of the reference: it decides among laws that are
+        What the full jerk costs, as a share of the reference: it decides among profiles that are
         equal. [-]
     accuracy : float, optional
         Asked of the solver. [-]
@@ -126,7 +126,7 @@ def solve(
     Returns
     -------
     Solution or None
-        None where no law keeps the limits.
+        None where no profile keeps the limits.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def solve(
 
 
 def smoothest(problem: Problem, worst: float) -> Solution | None:
-    """The law of least peak jerk whose residual stays within `worst`, exactly null where it is 0.
+    """The profile of least peak jerk with a residual within `worst`, exactly null where it is 0.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def smoothest(problem: Problem, worst: float) -> Solution | None:
     Returns
     -------
     Solution or None
-        None where no law within the limits does that.
+        None where no profile within the limits does that.
 
     Raises
     ------
@@ -267,9 +267,10 @@ class _Rows:
 class _Unknowns:
     """Acceleration and velocity at every knot, the peak jerk as a share of its limit, the residual.
 
-    Columns of the matrix; -1 stands for what is zero: rest at both ends. Without damping a law and
-    its mirror image in time (braking first, reversed) leave the same, and half of both no more: the
-    optimum can be odd about its middle, and the second half of the knots are images of the first.
+    Columns of the matrix; -1 stands for what is zero: rest at both ends. Without damping a profile
+    and its mirror image in time (braking first, reversed) leave the same, and half of both no more:
+    the optimum can be odd about its middle, and the second half of the knots are images of the
+    first.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -344,8 +345,8 @@ class _Unknowns:
     def responses(self) -> list[Array]:
         """Displacement of each pole for each unknown acceleration: real rows, shape (., len(a)).
 
-        Two rows a pole, real and imaginary part; one where the law is odd: seen from the middle,
-        its response is imaginary throughout.
+        Two rows a pole, real and imaginary part; one where the profile is odd: seen from the
+        middle, its response is imaginary throughout.
         """
         # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
         per_time = self.by_block() / self.h

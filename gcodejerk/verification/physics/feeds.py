@@ -8,8 +8,8 @@ better than from rounded points. That gives these tests:
 - a stream whose F words are their own mirror image, or those of the controller's own rapid, but
   for one block that is not in the middle is damaged in it: notices nearly any change of one F.
 
-For independent axes the speeds are those of no single law: F is held between the bounds that the
-points and the axes' jerk give, which notices gross changes only.
+For independent axes the speeds are those of no single profile: F is held between the bounds that
+the points and the axes' jerk give, which notices gross changes only.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from gcodejerk.verification.physics.speeds import RELATIVE, Blocks, Speeds
 FEED_STEP = 1e-3
 """Rounding of F that is allowed for. [units/min]"""
 FREE_BLOCKS = 8
-"""At corners of a law that the limits drive, fewer blocks than these are within the limits."""
+"""At corners of a profile that the limits drive, fewer blocks than these are within the limits."""
 DRIVEN = 0.9
-"""Share of a limit from which on a law counts as driven by it."""
+"""Share of a limit from which on a profile counts as driven by it."""
 SOLVED = 1e-3
 """Share of F that a stream may differ by where it is nearly symmetric."""
 NOT_OWN = "F differs from that of the controller's own rapid"
@@ -208,27 +208,27 @@ class _Judge:
     def conventional(self) -> tuple[Kind, Rows, str]:
         """Hold what is nearly the controller's own rapid to it."""
         V, A, J = rapid_limits(self.paths, self.machine).min(axis=2)
-        law = np.isfinite(J)
-        J = np.where(law, J, 1.0)
+        profile = np.isfinite(J)
+        J = np.where(profile, J, 1.0)
         bell = self.machine.planner == BELL
         total, peak = rapid_time(V, A, J, bell=bell), peak_velocity(V, A, J, bell=bell)
         t = self.t - self.t[self.paths.begin][self.owner]
         columns = (column[self.owner] for column in (total, peak, A, J))
         v = rapid_speed(t, *columns, bell=bell) * self.length[self.owner]
         expected = np.where(self.first, 0.0, np.maximum(v, np.roll(v, 1)))
-        bad = self._odd_ones(expected, few=1) & law[self.owner]
+        bad = self._odd_ones(expected, few=1) & profile[self.owner]
         return Kind.FEED, bad, NOT_OWN
 
     def _odd_ones(self, expected: Array, few: int) -> Rows:
         """Find the few F words that differ where all others are as expected.
 
-        Of two laws that the limits drive, the ramps can agree in every F and only the middle
+        Of two profiles that the limits drive, the ramps can agree in every F and only the middle
         differ. So what differs counts as odd only where F words nearer to the middle agree, or
         many that no limit forces.
         """
         begin, end, owner = self.paths.begin, self.paths.end, self.owner
         equal = np.abs(self.F - expected) <= 2.0 * self.rounding
-        # At constant velocity all laws are alike.
+        # At constant velocity all profiles are alike.
         highest = np.maximum.reduceat(self.F, begin)[owner]
         telling = ~self.first & (highest - self.F > self.rounding)
         off = np.abs(2.0 * np.arange(len(owner)) - (begin + end)[owner])

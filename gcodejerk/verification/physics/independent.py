@@ -1,11 +1,11 @@
-r"""Axes that run on their own: each held to its own start, arrival and law.
+r"""Axes that run on their own: each held to its own start, arrival and profile.
 
 Under `positioning: independent` the path follows from when each axis moves, so a stream in which
 one axis is late is another path, though every point of it is between the ends. This module owns:
 
 - an axis stands at its end from the longest time on that its own rapid may take;
 - the mean moment of its motion, :math:`\int (1 - x/D)\,dt`, which any delay moves by itself, is
-  half of its own time where the profile's laws are symmetric, and in the middle half where not.
+  half of its own time where the profile's profiles are symmetric, and in the middle half where not.
 
 Rule: times are those of each axis alone, from the limits of its rapid.
 """
@@ -22,9 +22,9 @@ from gcodejerk.verification.physics.points import TINY, Array, Paths
 
 Rows = NDArray[np.bool_]
 SYMMETRIC = ("conventional", "condition3", "cascade")
-"""Profiles whose laws are their own mirror image."""
+"""Profiles whose profiles are their own mirror image."""
 MIDDLE = (0.5, 1.5)
-"""Share of half the time in which the mean moment of any other law lies."""
+"""Share of half the time in which the mean moment of any other profile lies."""
 
 
 def judge_axes(

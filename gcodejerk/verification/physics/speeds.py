@@ -43,7 +43,7 @@ SEGMENT_END = 0.016
 FEW_ENDS = 8 * 2.0 * 0.0081
 """What the eight ends of seven segments can leave at most, of the jerk limit and h^3."""
 FEW_BLOCKS = 6
-"""Blocks that are not smooth, in a law of few segments."""
+"""Blocks that are not smooth, in a profile of few segments."""
 SPREAD = 4.0 / 162.0
 """The same in the sum of trapezoids, of the jerk limit and h^3, for a block of three intervals."""
 SPREAD_MANY = 1.0 / 31.0
@@ -201,7 +201,7 @@ class Speeds:
         return ~first & ~self.single & (np.abs(self.mean - expected) > allowed), jerk
 
     def unfit(self, mirrored: Rows) -> Rows:
-        """Blocks that no law explains: neither one of few segments nor one of a jerk per interval.
+        """Blocks that no profile explains, of few segments or with a jerk for every interval.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class Speeds:
         ends += self._sum(np.where(self.first, 0.0, many))
         excused = mirrored | self.closed(np.where(few, ends, 0.0))
         bad = rough & ~excused[self.blocks.owner]
-        # Whatever the law, it is one of few segments or one of a jerk per interval.
+        # Whatever the profile, it is one of few segments or one of a jerk per interval.
         h = np.maximum.reduceat(np.where(self.first, 0.0, self.blocks.h), self.blocks.begin)
         whole = self.closed(ends + FEW_ENDS * self.blocks.J * h**3)
         out: Rows = bad | (self.last & ~self.single & ~whole[self.blocks.owner])

@@ -1,12 +1,12 @@
-r"""Time laws of rapids: rest-to-rest motions from 0 to 1, as segments of constant jerk.
+r"""Profiles of rapids: rest-to-rest motions from 0 to 1, as segments of constant jerk.
 
-This module owns the one form in which a law leaves the planner, whatever designed it: Condition
+This module owns the one form in which a profile leaves the planner, whatever designed it: Condition
 III, a shaper, or an optimum with a jerk of its own in every interval. It is sampled, judged, drawn
 and reported in this form alone. The acceleration is linear in each segment; between segments it
-may step, so that a trapezoid of velocity is a law too.
+may step, so that a trapezoid of velocity is a profile too.
 
-Rule: laws are unit laws; all quantities scale with the length, and limits divided by the length are
-the limits of the law.
+Rule: profiles are unit profiles; all quantities scale with the length, and limits divided by the
+length are the limits of the profile.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Laws:
-    """Unit laws as columns: n laws, and the s segments of all of them, one law after the other.
+class Profiles:
+    """Unit profiles as columns: n profiles, and the s segments of all of them in their order.
 
     Attributes
     ----------
     first : ndarray of int, shape (n + 1,)
-        Law i has the segments ``first[i]`` to ``first[i + 1]``, at least one.
+        Profile i has the segments ``first[i]`` to ``first[i + 1]``, at least one.
     begin : ndarray, shape (s,)
-        When each segment begins, since the law's start. [s]
+        When each segment begins, since the profile's start. [s]
     duration : ndarray, shape (s,)
         Its length, above zero. [s]
     position, velocity, acceleration : ndarray, shape (s,)
@@ -47,26 +47,27 @@ class Laws:
     jerk: Array
 
     @classmethod
-    def of(cls, first: Index, duration: Array, acceleration: Array, jerk: Array) -> Laws:
-        """Laws from their segments; what they add up to is integrated here.
+    def of(cls, first: Index, duration: Array, acceleration: Array, jerk: Array) -> Profiles:
+        """Profiles from their segments; what they add up to is integrated here.
 
         Parameters
         ----------
         first : ndarray of int, shape (n + 1,)
-            As in `Laws`.
+            As in `Profiles`.
         duration, acceleration, jerk : ndarray, shape (s,)
             Of the segments; the acceleration is that at a segment's begin. [s], [1/s^2], [1/s^3]
 
         Returns
         -------
-        Laws
+        Profiles
 
         Examples
         --------
         One second of acceleration 1 and one of -1:
 
-        >>> law = Laws.of(*(np.array(x) for x in ([0, 2], [1.0, 1.0], [1.0, -1.0], [0.0, 0.0])))
-        >>> law.position.tolist(), law.peak_velocity.tolist()
+        >>> columns = ([0, 2], [1.0, 1.0], [1.0, -1.0], [0.0, 0.0])
+        >>> profile = Profiles.of(*(np.array(x) for x in columns))
+        >>> profile.position.tolist(), profile.peak_velocity.tolist()
         ([0.0, 0.5], [1.0])
         """
         first = np.asarray(first, dtype=np.int64)
@@ -75,7 +76,8 @@ class Laws:
         d = duration
         gained = (acceleration + 0.5 * jerk * d) * d
         passed = (0.5 * acceleration + jerk * d / 6.0) * d * d
-        # Segment k of every law that has one: few steps where laws are short, and no sum over laws.
+        # Segment k of every profile that has one: few steps where profiles are short, and no sum
+        # over profiles.
         for k in range(1, int(count.max(initial=1))):
             here = first[:-1][count > k] + k
             before = here - 1
@@ -89,14 +91,14 @@ class Laws:
 
     @property
     def total(self) -> Array:
-        """Duration of each law, T_SUM, shape (n,) [s]."""
+        """Duration of each profile, T_SUM, shape (n,) [s]."""
         last = self.first[1:] - 1
         total: Array = self.begin[last] + self.duration[last]
         return total
 
     @property
     def owner(self) -> Index:
-        """The law of each segment, shape (s,)."""
+        """The profile of each segment, shape (s,)."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))
 
     @property
@@ -115,17 +117,17 @@ class Laws:
 
     @property
     def peak_velocity(self) -> Array:
-        """Largest velocity of each law, shape (n,) [1/s]."""
+        """Largest velocity of each profile, shape (n,) [1/s]."""
         return self._largest(np.maximum(self.velocity, self.turning_velocity))
 
     @property
     def least_velocity(self) -> Array:
-        """Least velocity of each law, shape (n,); below zero it would go backwards [1/s]."""
+        """Least velocity of each profile, shape (n,); below zero it would go backwards [1/s]."""
         return -self._largest(-np.minimum(self.velocity, self.turning_velocity))
 
     @property
     def peak_acceleration(self) -> Array:
-        """Largest modulus of the acceleration of each law, shape (n,) [1/s^2]."""
+        """Largest modulus of the acceleration of each profile, shape (n,) [1/s^2]."""
         return self._largest(np.maximum(np.abs(self.acceleration), np.abs(self.end_acceleration)))
 
     @property
@@ -143,18 +145,18 @@ class Laws:
         return np.where(np.isin(np.arange(len(self)), self._of_steps()[stepped]), np.inf, peak)
 
     def _largest(self, value: Array) -> Array:
-        """Largest of a column within each law."""
+        """Largest of a column within each profile."""
         if not len(self):
             return np.zeros(0)
         largest: Array = np.maximum.reduceat(value, self.first[:-1])
         return largest
 
     def _of_steps(self) -> Index:
-        """The law of each step: one at every segment's begin and one at the law's end."""
+        """The profile of each step: one at every segment's begin and one at the profile's end."""
         return np.repeat(np.arange(len(self)), np.diff(self.first) + 1)
 
     def step_times(self) -> Array:
-        """Moments of the steps, shape (s + n,): every segment's begin, and the law's end [s]."""
+        """Moments of the steps, shape (s + n,): every segment's begin, the profile's end [s]."""
         return self._with_ends(self.begin, self.total)
 
     def acceleration_steps(self) -> Array:
@@ -171,27 +173,29 @@ class Laws:
         return self._with_ends(step, -self.jerk[self.first[1:] - 1])
 
     def _with_ends(self, at_begins: Array, at_ends: Array) -> Array:
-        """A column of the steps, from those at the segments' begins and at the laws' ends."""
+        """A column of the steps, from those at the segments' begins and at the profiles' ends."""
         return np.insert(at_begins, self.first[1:], at_ends)
 
-    def take(self, index: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Laws:
-        """Some of the laws."""
+    def take(self, index: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Profiles:
+        """Some of the profiles."""
         rows = np.arange(len(self))[index]
         count = np.diff(self.first)[rows]
         first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
         segment = np.arange(first[-1]) + np.repeat(self.first[rows] - first[:-1], count)
-        return Laws(first, *(column[segment] for column in self._columns()))
+        return Profiles(first, *(column[segment] for column in self._columns()))
 
-    def replaced(self, index: NDArray[np.integer] | NDArray[np.bool_], other: Laws) -> Laws:
-        """These laws with those at `index` taken from `other` (of the same shape as the index)."""
+    def replaced(self, index: NDArray[np.integer] | NDArray[np.bool_], other: Profiles) -> Profiles:
+        """These profiles with those at `index` taken from `other` (of the index's shape)."""
         order = np.arange(len(self))
         order[index] = len(self) + np.arange(len(other))
         return joined([self, other]).take(order)
 
-    def stretched(self, factor: Array) -> Laws:
-        """The same laws slower by a factor each, shape (n,)."""
+    def stretched(self, factor: Array) -> Profiles:
+        """The same profiles slower by a factor each, shape (n,)."""
         by = factor[self.owner]
-        return Laws.of(self.first, self.duration * by, self.acceleration / by**2, self.jerk / by**3)
+        return Profiles.of(
+            self.first, self.duration * by, self.acceleration / by**2, self.jerk / by**3
+        )
 
     def _columns(self) -> tuple[Array, ...]:
         """The columns of segments, in the order of the attributes."""
@@ -200,7 +204,7 @@ class Laws:
         )  # fmt: skip
 
     def segments(self, index: int) -> list[tuple[float, float]]:
-        """(duration [s], unit jerk [1/s^3]) of each segment of one law.
+        """(duration [s], unit jerk [1/s^3]) of each segment of one profile.
 
         A trapezoid of velocity has jerk 0 throughout: its acceleration steps are no segments.
         """
@@ -208,10 +212,10 @@ class Laws:
         return list(zip(self.duration[part].tolist(), self.jerk[part].tolist(), strict=True))
 
 
-def joined(parts: list[Laws]) -> Laws:
-    """All laws of several `Laws`, in their order."""
+def joined(parts: list[Profiles]) -> Profiles:
+    """All profiles of several `Profiles`, in their order."""
     offsets = np.cumsum([0, *(len(part.begin) for part in parts)])
     firsts = [part.first[:-1] + offset for part, offset in zip(parts, offsets[:-1], strict=True)]
     first = np.concatenate([*firsts, offsets[-1:]]).astype(np.int64)
     columns = zip(*(part._columns() for part in parts), strict=True)
-    return Laws(first, *(np.concatenate(column) for column in columns))
+    return Profiles(first, *(np.concatenate(column) for column in columns))
