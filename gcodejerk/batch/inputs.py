@@ -31,7 +31,7 @@ class NameClashError(EmitError):
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Input:
     """A program, and its name below the folder that was given (or below its own)."""
 
     path: str
@@ -54,9 +54,9 @@ def is_program(name: str) -> bool:
     )
 
 
-def gather(
+def find_inputs(
     arguments: list[str], passed_over: str | None = None
-) -> tuple[list[Found], list[ProgramError]]:
+) -> tuple[list[Input], list[ProgramError]]:
     """Find the programs that files and folders stand for.
 
     Parameters
@@ -68,16 +68,16 @@ def gather(
 
     Returns
     -------
-    list of Found
+    list of Input
         Each path once.
     list of ProgramError
         Folders that cannot be read, and those that hold no program.
     """
-    found: dict[Found, None] = {}
+    found: dict[Input, None] = {}
     problems: list[ProgramError] = []
     for argument in arguments:
         if not os.path.isdir(argument):
-            found[Found(argument, os.path.basename(argument))] = None
+            found[Input(argument, os.path.basename(argument))] = None
             continue
         inside, trouble = _walk(argument, passed_over)
         if not inside and not trouble:
@@ -92,7 +92,7 @@ def gather(
     return list(found), problems
 
 
-def _walk(root: str, passed_over: str | None) -> tuple[list[Found], list[ProgramError]]:
+def _walk(root: str, passed_over: str | None) -> tuple[list[Input], list[ProgramError]]:
     """Programs in and below a folder; a list of folders still to read, as depth has no limit."""
     found, problems = [], []
     waiting = [""]
@@ -120,17 +120,17 @@ def _walk(root: str, passed_over: str | None) -> tuple[list[Found], list[Program
                 if passed_over is None or not _same_folder(path, passed_over):
                     folders.append(name)
             elif is_program(entry.name) and os.path.isfile(path):
-                found.append(Found(path, name))
+                found.append(Input(path, name))
         waiting += reversed(folders)
     return found, problems
 
 
-def output_name(found: Found, output_dir: str | None, suffix: str) -> str:
+def output_name(found: Input, output_dir: str | None, suffix: str) -> str:
     """Where the result of a program goes.
 
     Parameters
     ----------
-    found : Found
+    found : Input
         The program.
     output_dir : str or None
         The folder in which its name below is kept; None: beside the program, under another name.
@@ -144,9 +144,9 @@ def output_name(found: Found, output_dir: str | None, suffix: str) -> str:
 
     Examples
     --------
-    >>> output_name(Found("jobs/a/part.nc", "a/part.nc"), None, "")
+    >>> output_name(Input("jobs/a/part.nc", "a/part.nc"), None, "")
     'jobs/a/part.jerk.nc'
-    >>> output_name(Found("jobs/a/part.nc", "a/part.nc"), "out", ".csv")
+    >>> output_name(Input("jobs/a/part.nc", "a/part.nc"), "out", ".csv")
     'out/a/part.csv'
     """
     if output_dir is not None:
@@ -156,12 +156,12 @@ def output_name(found: Found, output_dir: str | None, suffix: str) -> str:
     return str(path.parent / f"{path.stem}{OURS}{suffix or path.suffix}")
 
 
-def report_name(found: Found, report_dir: str) -> str:
+def report_name(found: Input, report_dir: str) -> str:
     """Where the report on a program goes, in a folder of reports.
 
     Examples
     --------
-    >>> report_name(Found("jobs/a/part.nc", "a/part.nc"), "reports/")
+    >>> report_name(Input("jobs/a/part.nc", "a/part.nc"), "reports/")
     'reports/a/part.nc.json'
     """
     return str(PurePath(report_dir) / f"{found.below}.json")

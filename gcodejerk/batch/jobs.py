@@ -59,7 +59,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What became of one program; `error` is a message where it failed."""
+    """The outcome of one program; `error` is a message where it failed."""
 
     input: str
     planned: int = 0

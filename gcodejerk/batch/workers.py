@@ -51,7 +51,7 @@ def map_jobs(
     object
         The answers, in the order of the jobs.
     """
-    crew = [_Worker(function) for _ in range(min(workers, len(jobs)))]
+    pool = [_Worker(function) for _ in range(min(workers, len(jobs)))]
     waiting = iter(range(len(jobs)))
     busy: dict[Any, tuple[int, _Worker[In, Out]]] = {}
     answers: dict[int, Out] = {}
@@ -63,7 +63,7 @@ def map_jobs(
             busy[worker.pipe] = index, worker
 
     try:
-        for worker in crew:
+        for worker in pool:
             hand_out(worker)
         for index in range(len(jobs)):
             while index not in answers:
@@ -76,9 +76,9 @@ def map_jobs(
                     hand_out(worker)
             yield answers.pop(index)
     finally:
-        for worker in crew:
+        for worker in pool:
             worker.process.terminate()
-        for worker in crew:
+        for worker in pool:
             worker.end()
 
 
@@ -87,9 +87,9 @@ class _Worker(Generic[In, Out]):
 
     def __init__(self, function: Callable[[In], Out]) -> None:
         self.function = function
-        self._hire()
+        self._start_process()
 
-    def _hire(self) -> None:
+    def _start_process(self) -> None:
         """Start the process, or another one in the place of a dead one."""
         self.pipe, theirs = _CONTEXT.Pipe()
         self.process = _CONTEXT.Process(target=_work, args=(theirs, self.function), daemon=True)
@@ -103,7 +103,7 @@ class _Worker(Generic[In, Out]):
             self.pipe.send(job)
         except OSError:  # it died of the last one, or since then
             self.end()
-            self._hire()
+            self._start_process()
             with contextlib.suppress(OSError):
                 self.pipe.send(job)
 

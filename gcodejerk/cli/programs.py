@@ -15,7 +15,7 @@ import typer
 from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
 
 if TYPE_CHECKING:
-    from gcodejerk.batch.inputs import Found
+    from gcodejerk.batch.inputs import Input
     from gcodejerk.batch.jobs import Done
     from gcodejerk.machine import Machine
     from gcodejerk.rewrite.pipeline import Settings
@@ -79,7 +79,7 @@ def process(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors and notes")] = False,
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
-    from gcodejerk.batch.inputs import NameClashError, check_names, gather
+    from gcodejerk.batch.inputs import NameClashError, check_names, find_inputs
     from gcodejerk.batch.jobs import Job, run_jobs
     from gcodejerk.rewrite.pipeline import Settings
 
@@ -89,7 +89,7 @@ def process(
         raise typer.BadParameter("standard input (-) is one program: give it alone")
     if in_place and "-" in files:
         raise typer.BadParameter("--in-place needs a file, not standard input")
-    found, problems = gather(files, output_dir)
+    found, problems = find_inputs(files, output_dir)
     many = len(found) + len(problems) > 1
     report_dir = report if report is not None and report.endswith("/") else None
     if output is not None or (report is not None and report_dir is None):
@@ -143,7 +143,7 @@ def process(
 
 
 class _Tally:
-    """Prints what became of each program, and counts."""
+    """Prints the outcome of each program, and counts."""
 
     def __init__(self, mode: str, quiet: bool, aside: bool, many: bool) -> None:
         self.mode, self.quiet, self.many = mode, quiet, many
@@ -312,7 +312,7 @@ def _suffix(in_place: bool, machine: Machine, settings: Settings) -> str:
 
 
 def _output(
-    program: Found, output: str | None, output_dir: str | None, in_place: bool, suffix: str
+    program: Input, output: str | None, output_dir: str | None, in_place: bool, suffix: str
 ) -> str:
     """Where the result of a program goes."""
     from gcodejerk.batch.inputs import output_name
@@ -326,7 +326,7 @@ def _output(
     return output_name(program, output_dir, suffix)
 
 
-def _report(program: Found, report: str | None, report_dir: str | None) -> str | None:
+def _report(program: Input, report: str | None, report_dir: str | None) -> str | None:
     """Where the report on a program goes."""
     from gcodejerk.batch.inputs import report_name
 

@@ -32,8 +32,8 @@ from gcodejerk.cycles.series import (
     doubt,
     drills,
     g_codes,
-    judge,
     passes,
+    why_left_alone,
     write_block,
 )
 from gcodejerk.errors import EmitError, ProgramError
@@ -67,7 +67,7 @@ class LineMap:
     """
 
     line: NDArray[np.int64]
-    """First line of what became of the block; counted from 1, like all lines."""
+    """First line of the moves written for the block; counted from 1, like all lines."""
     lines: NDArray[np.int64]
     begin: NDArray[np.int64]
     """It is the result's bytes begin:end, line ends included."""
@@ -195,11 +195,11 @@ def expand(
             f"leave --expand-cycles out; it knows the cycles of: {known}",
         )
     begin = source.tell()
-    judging = _Walker(name, chosen, start, comments, None, None)
+    judging = _Expander(name, chosen, start, comments, None, None)
     digest = judging.walk(source)
     if any(verdict.reason is None for verdict in judging.verdicts):
         source.seek(begin)
-        writing = _Walker(name, chosen, start, comments, target, judging.verdicts)
+        writing = _Expander(name, chosen, start, comments, target, judging.verdicts)
         if writing.walk(source) != digest:
             raise EmitError(
                 f"{name} was changed while it was being read",
@@ -226,7 +226,7 @@ def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-class _Walker(Reader):
+class _Expander(Reader):
     """Reads a program, and judges or writes its series on the way."""
 
     def __init__(
@@ -248,7 +248,7 @@ class _Walker(Reader):
         self.series: Series | None = None
         self.reason_at = 0
         self.holes = 0
-        self.lenders: list[int] = []
+        self.dwell_series: list[int] = []
         """Series to be written out whose dwell a later cycle might take."""
         self.places = array("q")
         """The columns of the map, row by row."""
@@ -284,19 +284,19 @@ class _Walker(Reader):
         bare = text.removesuffix(b"\r")
         if self.series is None and not _CYCLE.search(bare):
             noted = _NOTED.search(bare) is not None
-            faults, inside = self.odd_count, self.inside
+            faults, inside = self.problem_count, self.inside
             super().read_line(text, begin, number, terminator)
             if noted:
-                sure = faults == self.odd_count and not inside
+                sure = faults == self.problem_count and not inside
                 self._note(parse_line(bare, self.dialect), sure, number)
             return
         block = parse_line(bare, self.dialect)
-        before, faults, inside = list(self.state.position), self.odd_count, self.inside
+        before, faults, inside = list(self.state.position), self.problem_count, self.inside
         ended, motion = self.state.ended, self.state.motion
         super().read_line(text, begin, number, terminator)
         if ended:
             return
-        why = str(Reason.NOT_UNDERSTOOD) if faults != self.odd_count else doubt(block)
+        why = str(Reason.NOT_UNDERSTOOD) if faults != self.problem_count else doubt(block)
         if inside or self.inside:
             why = str(Reason.SUBPROGRAM)
         if self.collecting and self.series is None:
@@ -363,7 +363,7 @@ class _Walker(Reader):
         """A block that makes a hole: judge it, or write what it was judged to be."""
         if series.reason is not None:
             return
-        reason = judge(series, moment, block, self.rules)
+        reason = why_left_alone(series, moment, block, self.rules)
         if len(text) > self.dialect.text.line_limit - ROOM:
             reason = reason or "the block is too long"
         call = reason or call_of(series, moment, block, self.rules)
@@ -397,16 +397,18 @@ class _Walker(Reader):
         """The series is over."""
         if series.dwells:
             # A dwell that the controller itself reads replaces those before it.
-            self.lenders = [*self.lenders, len(self.verdicts)] if series.reason is None else []
+            self.dwell_series = (
+                [*self.dwell_series, len(self.verdicts)] if series.reason is None else []
+            )
         self.verdicts.append(_Verdict(series.line, series.reason, self.reason_at))
         self.series = None
 
     def _borrow(self, line: int) -> None:
         """A cycle may take its dwell from those before it: the controller has to read them."""
-        for index in self.lenders:
+        for index in self.dwell_series:
             reason = "a later cycle takes its dwell from this one"
             self.verdicts[index] = _Verdict(self.verdicts[index].line, reason, line)
-        self.lenders = []
+        self.dwell_series = []
 
     def _note(self, block: Block, sure: bool, line: int) -> None:
         """Follow the spindle, the words of G64, and calls of what may hold any cycle."""

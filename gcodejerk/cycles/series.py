@@ -163,7 +163,9 @@ def passes(block: Block) -> bool:
     return True
 
 
-def judge(series: Series, moment: Moment, block: Block, rules: DrillingRules) -> str | None:
+def why_left_alone(
+    series: Series, moment: Moment, block: Block, rules: DrillingRules
+) -> str | None:
     """Why the modal state does not allow to write a block out; None where it does."""
     state = moment.state
     code = state.motion or 0

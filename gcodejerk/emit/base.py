@@ -22,7 +22,7 @@ from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import DIALECTS, Dialect, Rapids
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import Batch, Spelling
+from gcodejerk.planning.stream import Batch, NumberFormat
 from gcodejerk.units import MM_PER_INCH
 
 GROUP = "gcodejerk.controllers"
@@ -66,7 +66,7 @@ class Controller(Protocol):
         """Intervals from one written point to the next."""
         ...
 
-    def spelling(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> Spelling:
+    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """Steps and origins for all rapids of a program."""
         ...
 

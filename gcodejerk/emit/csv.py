@@ -19,7 +19,7 @@ from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import FINE_DECIMALS, Batch, Spelling
+from gcodejerk.planning.stream import FINE_DECIMALS, Batch, NumberFormat
 
 
 class CsvController:
@@ -35,10 +35,10 @@ class CsvController:
         """Every interval is written."""
         return 1
 
-    def spelling(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> Spelling:
+    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """Multiples of the resolution, whatever the program's unit."""
         step = np.broadcast_to(step_sizes(machine, inch=False), rapids.start.shape)
-        return Spelling(rapids.start, step, np.zeros_like(rapids.start))
+        return NumberFormat(rapids.start, step, np.zeros_like(rapids.start))
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """Nothing to say."""

@@ -39,7 +39,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
 from gcodejerk.nc.dialects.dialect import Writing, code_name
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import FINE_DECIMALS, Batch, Spelling
+from gcodejerk.planning.stream import FINE_DECIMALS, Batch, NumberFormat
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
@@ -69,13 +69,13 @@ class GcodeController:
         """About 2 ms."""
         return max(1, round(BLOCK_TIME / interval))
 
-    def spelling(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> Spelling:
+    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """Steps in the program's own unit; increments are counted from the start."""
         doubles = writing_of(dialect).doubles
         mm, inch = (step_sizes(machine, unit, doubles) for unit in (False, True))
         step = np.where(rapids.inch[:, np.newaxis], inch, mm)
         origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
-        return Spelling(rapids.start, step, origin, finer=doubles)
+        return NumberFormat(rapids.start, step, origin, finer=doubles)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What a user of these streams has to know."""

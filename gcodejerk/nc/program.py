@@ -35,7 +35,7 @@ STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""
 _STAMP = re.compile(rb"[(;][ \t]*gcodejerk stamp", re.IGNORECASE)
 SHORT_RUN = 24
-"""Fewer plain lines than this between odd ones go the careful way; arrays would not pay."""
+"""Fewer plain lines than this between careful ones go the careful way; arrays would not pay."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,7 +170,7 @@ def open_reader(
         )
     reader = Reader(name, chosen, start)
     if why:
-        reader.runner.odd_lines.append(Finding(None, f"read as {chosen.name}: {why}"))
+        reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
     if refers(chosen):
         file = source = seekable(file)
         origin = source.tell()
@@ -229,14 +229,14 @@ def read_chunk(reader: Reader, chunk: Chunk, fast: bool) -> None:
     complete = chunk.data.endswith(b"\n")
     begins = lines.begin.tolist()
     ends = [begin - 1 for begin in begins[1:]] + [len(chunk.data) - complete]
-    odd = [*np.flatnonzero(lines.odd).tolist(), len(lines)]
+    careful = [*np.flatnonzero(lines.careful).tolist(), len(lines)]
     place = (chunk.line, chunk.offset)
     at = following = by_hand = 0
     patience = SHORT_RUN
     while at < len(lines):
-        while odd[following] < at:
+        while careful[following] < at:
             following += 1
-        stop = odd[following]
+        stop = careful[following]
         if stop - at >= SHORT_RUN and at >= by_hand and reader.can_run():
             at = reader.read_run(lines, at, stop, place)
             if at < stop:

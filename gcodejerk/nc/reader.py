@@ -64,9 +64,9 @@ class Reader:
         return self.runner.log
 
     @property
-    def odd_count(self) -> int:
+    def problem_count(self) -> int:
         """Lines so far that were not understood."""
-        return self.runner.odd_count
+        return self.runner.problem_count
 
     @property
     def inside(self) -> bool:
@@ -145,7 +145,7 @@ class Reader:
         block = line.block
         self.blocks += bool(block.words or block.names or block.o_word is not None)
         if block.problem is not None:
-            self.runner.odd(line, block.problem, block.column)
+            self.runner.add_problem(line, block.problem, block.column)
 
     def _is_name(self, text: bytes) -> bool:
         """Whether the first line is the name of the file."""
@@ -213,7 +213,9 @@ class Reader:
         elif self.percent is not None:
             self.runner.executor.end()
         else:
-            self.runner.odd(line, "% in the middle of a program that did not begin with one", 1)
+            self.runner.add_problem(
+                line, "% in the middle of a program that did not begin with one", 1
+            )
             self.state.forget()
             self.log.feed_event(USES_FEED)
         if any(word.letter == "G" for word in line.block.words):
@@ -283,10 +285,10 @@ class Reader:
     def findings(self, rapids: Rapids) -> tuple[Finding, ...]:
         """Collect what the user should know."""
         runner = self.runner
-        found = list(runner.odd_lines)
-        if runner.odd_count > len(found):
+        found = list(runner.syntax_problems)
+        if runner.problem_count > len(found):
             found.append(
-                Finding(None, f"{runner.odd_count - len(found)} more lines not understood")
+                Finding(None, f"{runner.problem_count - len(found)} more lines not understood")
             )
         lines = rapids.line[rapids.reason == REASONS.index(Reason.UNITS_UNKNOWN)]
         if len(lines):

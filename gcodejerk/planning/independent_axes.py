@@ -73,7 +73,9 @@ def path_deviation(batch: Batch) -> Array:
         share = plans.share[rows, axis]
         used = share != 0.0
         np.add.at(own[..., column], row_of[used], unit[used] * share[used, np.newaxis])
-        start = np.where(plans.displacement[moves, axis] != 0.0, batch.spelling.start[:, axis], 0.0)
+        start = np.where(
+            plans.displacement[moves, axis] != 0.0, batch.number_format.start[:, axis], 0.0
+        )
         planned[..., column] = batch.exact[axis] - start[:, np.newaxis]
     result: Array = _distances(planned, own).max(axis=1, initial=0.0)
     return result

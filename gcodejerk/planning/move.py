@@ -18,7 +18,7 @@ from gcodejerk.motion import profiles_response
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import Batch, Spelling, make_streams
+from gcodejerk.planning.stream import Batch, NumberFormat, make_streams
 from gcodejerk.reasons import CERTAIN, REASONS
 
 
@@ -59,14 +59,14 @@ class Plan:
         return float(self.plans.length[0])
 
     @property
-    def kept(self) -> NDArray[np.bool_]:
+    def stays_conventional(self) -> NDArray[np.bool_]:
         """Whether the conventional profile is written, shape (1,)."""
-        return self.batch.kept
+        return self.batch.stays_conventional
 
     @property
     def profile(self) -> str:
         """Name of the profile that is written."""
-        return "conventional" if self.batch.kept[0] else self.plans.designed
+        return "conventional" if self.batch.stays_conventional[0] else self.plans.designed
 
     @property
     def profiles(self) -> Profiles:
@@ -172,7 +172,7 @@ def plan_move(
     for described in machine.axes:
         step[AXES.index(described.name)] = described.resolution
     zero = np.zeros((1, len(AXES)))
-    ((batch,),) = make_streams(plans, Spelling(zero, step[np.newaxis, :], zero), 1)
+    ((batch,),) = make_streams(plans, NumberFormat(zero, step[np.newaxis, :], zero), 1)
     return Plan(machine, {a.upper(): float(x) for a, x in displacement.items()}, plans, batch)
 
 

@@ -243,10 +243,10 @@ class _Planner:
             self.conventional.total if self.time is None else np.full(len(self.share), self.time)
         )
         counts = np.maximum(whole_intervals(total, self.interval), 1)
-        kept = np.zeros(len(counts), dtype=bool)
+        stays_conventional = np.zeros(len(counts), dtype=bool)
         if self.profile == "conventional":
             profiles, feasible = self._conventional(counts)
-            kept[:] = True
+            stays_conventional[:] = True
         elif self.profile in SHAPERS:
             profiles, counts, feasible = self._shaped()
         elif self.T1 is not None:
@@ -254,9 +254,9 @@ class _Planner:
         elif self.profile == "shortest":
             profiles, counts, feasible = self._shortest(counts)
         else:
-            profiles, counts, feasible, kept = self._designed(counts)
+            profiles, counts, feasible, stays_conventional = self._designed(counts)
         self._rule_out_profiles(~feasible, Reason.LIMITS)
-        return self._plans(profiles, counts, kept)
+        return self._plans(profiles, counts, stays_conventional)
 
     def _conventional(self, counts: NDArray[np.int64]) -> tuple[Profiles, NDArray[np.bool_]]:
         """The controller's own profiles; a trapezoid cannot be written with finite jerk."""
@@ -342,14 +342,14 @@ class _Planner:
     ) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
         """A profile of unchanged time; longer only where the limits leave no room."""
         profiles, worst = DESIGNS[self.profile](self.task.after(counts))
-        kept = np.zeros(len(counts), dtype=bool)
+        stays_conventional = np.zeros(len(counts), dtype=bool)
         fits = self._within_limits(self.conventional)
         if self.time is None:
-            reference = self._judged(self.task.after(counts), self.conventional)
+            reference = self._worst_of(self.task.after(counts), self.conventional)
             keep = fits & (worst >= reference - self._worthwhile())
             profiles = profiles.replaced(keep, self.conventional.take(keep))
             worst = np.where(keep, reference, worst)
-            kept |= keep
+            stays_conventional |= keep
             profiles, counts, worst = self._extend(profiles, counts, worst)
             # A trapezoid cannot be written: where the design shakes more, it is left alone.
             worse = ~fits & np.isfinite(worst) & (worst > reference)
@@ -359,9 +359,9 @@ class _Planner:
             limits = tuple(limit[row : row + 1] for limit in self.limits)
             total = float(counts[row] * self.interval)
             raise time_error(self.machine, self.share[row], limits, total, self.profile)
-        return profiles, counts, np.isfinite(worst), kept
+        return profiles, counts, np.isfinite(worst), stays_conventional
 
-    def _judged(self, task: Task, profiles: Profiles) -> Array:
+    def _worst_of(self, task: Task, profiles: Profiles) -> Array:
         """Largest residual displacement of profiles, as the profile judges its own [mm]."""
         nominal = task.objective.of(profiles)
         return worst_in_band(task, profiles) if self.profile == "optimal" else nominal
@@ -413,7 +413,7 @@ class _Planner:
         _rule_out(self.reason, moves, why)
 
     def _plans(
-        self, profiles: Profiles, counts: NDArray[np.int64], kept: NDArray[np.bool_]
+        self, profiles: Profiles, counts: NDArray[np.int64], stays_conventional: NDArray[np.bool_]
     ) -> Plans:
         """The profiles of planned moves, and the moves' own columns."""
         conventional_time = np.zeros(len(self.reason))
@@ -434,6 +434,6 @@ class _Planner:
             profiles=profiles.take(keep),
             conventional=self.conventional.take(keep),
             profile_counts=counts[keep],
-            kept=kept[keep],
+            stays_conventional=stays_conventional[keep],
             designed=self.profile,
         )

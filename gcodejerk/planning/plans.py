@@ -121,7 +121,7 @@ class Plans:
         The designed profiles, and those of the controller's own G0.
     profile_counts : ndarray of int, shape (l,)
         T_SUM of each profile. [intervals]
-    kept : ndarray of bool, shape (l,)
+    stays_conventional : ndarray of bool, shape (l,)
         The profile is the conventional one, because none is better.
     designed : str
         Name of the profile that all other profiles follow.
@@ -139,7 +139,7 @@ class Plans:
     profiles: Profiles
     conventional: Profiles
     profile_counts: NDArray[np.int64]
-    kept: NDArray[np.bool_]
+    stays_conventional: NDArray[np.bool_]
     designed: str
 
     def __len__(self) -> int:
@@ -153,7 +153,7 @@ class Plans:
 
     def profile(self, profile: int) -> str:
         """Name of the profile that a profile follows."""
-        return "conventional" if self.kept[profile] else self.designed
+        return "conventional" if self.stays_conventional[profile] else self.designed
 
     def excited(self, move: int) -> list[int]:
         """The entries of the modes that a move excites."""

@@ -40,7 +40,7 @@ FEW_STEPS = 8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spelling:
+class NumberFormat:
     """How positions are to be rounded: columns of n moves.
 
     Attributes
@@ -61,9 +61,9 @@ class Spelling:
     origin: Array
     finer: bool = True
 
-    def take(self, index: NDArray[np.int64]) -> Spelling:
+    def take(self, index: NDArray[np.int64]) -> NumberFormat:
         """Some of the moves."""
-        return Spelling(self.start[index], self.step[index], self.origin[index], self.finer)
+        return NumberFormat(self.start[index], self.step[index], self.origin[index], self.finer)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +83,7 @@ class Batch:
         the origin. The first and the last column stand for the exact start and end.
     exact : dict of int to ndarray, shape (b, k)
         The positions before rounding. [mm] or [deg]
-    spelling : Spelling
+    number_format : NumberFormat
         The steps and origins of these moves.
     fine : ndarray of bool, shape (b, 9)
         The step is FINE_DECIMALS finer than asked for, since the axis moves a few steps only.
@@ -92,7 +92,7 @@ class Batch:
     residual, conventional_residual : ndarray, shape (b, m)
         Displacement envelope of each mode at arrival, of the stream as written and of the
         controller's own rapid sampled at the interval. [mm]
-    kept : ndarray of bool, shape (b,)
+    stays_conventional : ndarray of bool, shape (b,)
         The stream is the conventional profile.
     profiles : Profiles
         The profiles that are written, one for each of the plans' profiles of these moves.
@@ -103,12 +103,12 @@ class Batch:
     grid: Grid
     whole: dict[int, NDArray[np.int64]]
     exact: dict[int, Array]
-    spelling: Spelling
+    number_format: NumberFormat
     fine: NDArray[np.bool_]
     velocity: dict[int, Array]
     residual: Array
     conventional_residual: Array
-    kept: NDArray[np.bool_]
+    stays_conventional: NDArray[np.bool_]
     profiles: Profiles
 
     def __len__(self) -> int:
@@ -118,11 +118,12 @@ class Batch:
         """Moments [s] and positions [mm], shape (k, 9), of one move as written; ends exact."""
         knots = self.grid.knots[row]
         begin = len(knots) - 1 - int(np.count_nonzero(knots))
-        start = self.spelling.start[row]
+        start = self.number_format.start[row]
         out = np.tile(start, (len(knots) - begin, 1))
         for axis, whole in self.whole.items():
             written = (
-                self.spelling.origin[row, axis] + whole[row, begin:] * self.spelling.step[row, axis]
+                self.number_format.origin[row, axis]
+                + whole[row, begin:] * self.number_format.step[row, axis]
             )
             displacement = self.plans.displacement[self.moves[row], axis]
             if displacement:
@@ -131,14 +132,14 @@ class Batch:
         return knots[begin:] * self.grid.interval, out
 
 
-def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[list[Batch]]:
+def make_streams(plans: Plans, number_format: NumberFormat, stride: int) -> Iterator[list[Batch]]:
     """Streams of all planned moves, window by window.
 
     Parameters
     ----------
     plans : Plans
         n moves.
-    spelling : Spelling
+    number_format : NumberFormat
         Columns of the same n moves.
     stride : int
         Intervals from one written point to the next.
@@ -159,33 +160,35 @@ def make_streams(plans: Plans, spelling: Spelling, stride: int) -> Iterator[list
         # Of like duration: within a factor of two.
         octave = np.frexp(plans.counts[window].astype(float))[1]
         yield [
-            _make_batch(plans, moves, spelling.take(moves), stride)
+            _make_batch(plans, moves, number_format.take(moves), stride)
             for moves in (window[octave == k] for k in np.unique(octave))
         ]
         begin = end
 
 
-def _make_batch(plans: Plans, moves: NDArray[np.int64], spelling: Spelling, stride: int) -> Batch:
+def _make_batch(
+    plans: Plans, moves: NDArray[np.int64], number_format: NumberFormat, stride: int
+) -> Batch:
     """One batch; a move that rounding made worse than the conventional profile gets that one."""
     rows = np.concatenate([np.arange(*_bounds(plans, move)) for move in moves]).astype(np.int64)
     row_of = np.searchsorted(moves, plans.move[rows])
     # Of axes that run on their own, some may keep the conventional profile: the move has not kept
     # it.
-    kept = np.ones(len(moves), dtype=bool)
-    np.logical_and.at(kept, row_of, plans.kept[rows])
-    made = _Maker(plans, moves, rows, row_of, spelling, stride)
+    stays_conventional = np.ones(len(moves), dtype=bool)
+    np.logical_and.at(stays_conventional, row_of, plans.stays_conventional[rows])
+    made = _Maker(plans, moves, rows, row_of, number_format, stride)
     conventional = made.conventional_residual()
-    batch = made.batch(plans.profiles.take(rows), kept, conventional)
+    batch = made.batch(plans.profiles.take(rows), stays_conventional, conventional)
     worst = plans.modes.grouped(batch.residual).max(axis=1, initial=0.0)
     reference = plans.modes.grouped(conventional).max(axis=1, initial=0.0)
-    worse = (worst > reference) & made.writable(plans.conventional.take(rows)) & ~kept
+    worse = (worst > reference) & made.writable(plans.conventional.take(rows)) & ~stays_conventional
     if worse.any():
         profiles = plans.profiles.take(rows)
         again = worse[row_of]
         profiles = profiles.replaced(again, plans.conventional.take(rows[again]))
-        batch = made.batch(profiles, kept | worse, conventional)
+        batch = made.batch(profiles, stays_conventional | worse, conventional)
     # What is written as the conventional profile is the conventional profile, rounding included.
-    same = batch.kept[:, np.newaxis]
+    same = batch.stays_conventional[:, np.newaxis]
     return replace(batch, conventional_residual=np.where(same, batch.residual, conventional))
 
 
@@ -204,7 +207,7 @@ class _Maker:
         moves: NDArray[np.int64],
         rows: NDArray[np.int64],
         row_of: NDArray[np.int64],
-        spelling: Spelling,
+        number_format: NumberFormat,
         stride: int,
     ) -> None:
         self.plans, self.moves, self.rows, self.row_of = plans, moves, rows, row_of
@@ -214,13 +217,13 @@ class _Maker:
         self.interval = plans.machine.interval
         self.grid = Grid.every(plans.counts[moves], stride, self.interval)
         size = np.abs(plans.displacement[moves])
-        fine = (size > 0.0) & (size < FEW_STEPS * spelling.step) & spelling.finer
+        fine = (size > 0.0) & (size < FEW_STEPS * number_format.step) & number_format.finer
         self.fine = fine
-        self.spelling = Spelling(
-            spelling.start,
-            np.where(fine, spelling.step / 10.0**FINE_DECIMALS, spelling.step),
-            spelling.origin,
-            spelling.finer,
+        self.number_format = NumberFormat(
+            number_format.start,
+            np.where(fine, number_format.step / 10.0**FINE_DECIMALS, number_format.step),
+            number_format.origin,
+            number_format.finer,
         )
 
     def writable(self, profiles: Profiles) -> NDArray[np.bool_]:
@@ -245,7 +248,9 @@ class _Maker:
         np.maximum.at(longest, self.row_of, counts)
         return residual_displacement(self._response(profiles, longest), self.modes.poles)
 
-    def batch(self, profiles: Profiles, kept: NDArray[np.bool_], conventional: Array) -> Batch:
+    def batch(
+        self, profiles: Profiles, stays_conventional: NDArray[np.bool_], conventional: Array
+    ) -> Batch:
         """Sample, round, and see what is left in the modes."""
         moments = self.grid.knots[self.row_of]
         unit, speed = sample_profiles(profiles, moments, self.interval)
@@ -256,12 +261,12 @@ class _Maker:
         for axis in self.axes:
             # Where an axis stands still its position may be unknown, and nothing is written of it.
             moving = self.plans.displacement[self.moves, axis] != 0.0
-            start = np.where(moving, self.spelling.start[:, axis], 0.0)
-            exact[axis] = start[:, np.newaxis] + self._gather(unit, axis)
-            velocity[axis] = self._gather(speed, axis)
+            start = np.where(moving, self.number_format.start[:, axis], 0.0)
+            exact[axis] = start[:, np.newaxis] + self._displaced(unit, axis)
+            velocity[axis] = self._displaced(speed, axis)
             active = np.abs(self.modes.participation[:, axis]) > 0.0
-            step = self.spelling.step[:, axis]
-            origin = np.where(moving, self.spelling.origin[:, axis], 0.0)
+            step = self.number_format.step[:, axis]
+            origin = np.where(moving, self.number_format.origin[:, axis], 0.0)
             whole[axis] = round_positions(
                 exact[axis], self.grid, step, origin,
                 self.modes.poles[active], self.modes.participation[active, axis],
@@ -279,16 +284,16 @@ class _Maker:
             grid=self.grid,
             whole=whole,
             exact=exact,
-            spelling=self.spelling,
+            number_format=self.number_format,
             fine=self.fine,
             velocity=velocity,
             residual=residual_displacement(response, self.modes.poles),
             conventional_residual=conventional,
-            kept=kept,
+            stays_conventional=stays_conventional,
             profiles=profiles,
         )
 
-    def _gather(self, unit: Array, axis: int) -> Array:
+    def _displaced(self, unit: Array, axis: int) -> Array:
         """Sum of an axis's profiles times its share of each, shape (b, k)."""
         out = np.zeros((len(self.moves), unit.shape[1]))
         used = self.share[:, axis] != 0.0
@@ -313,10 +318,10 @@ class Residuals:
         shape = (len(plans), len(plans.modes.poles))
         self.residual = np.full(shape, np.nan)
         self.conventional = np.full(shape, np.nan)
-        self.kept = np.zeros(len(plans), dtype=bool)
+        self.stays_conventional = np.zeros(len(plans), dtype=bool)
 
     def add(self, batch: Batch) -> None:
         """Note one batch."""
         self.residual[batch.moves] = batch.residual
         self.conventional[batch.moves] = batch.conventional_residual
-        self.kept[batch.moves] = batch.kept
+        self.stays_conventional[batch.moves] = batch.stays_conventional

@@ -22,7 +22,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.report.figures import acceleration_curve, new_figure
-from gcodejerk.studies.comparison import Comparison, Contender
+from gcodejerk.studies.comparison import Candidate, Comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,9 +113,9 @@ class _Drawing:
         self.styles = dict(STYLES)
         for name, style in zip(_best_shapers(comparison), SHAPER_STYLES, strict=False):
             self.styles[name] = style
-        there = {c.name: c for c in comparison.contenders}
+        there = {c.name: c for c in comparison.candidates}
         self.shown = [there[name] for name in self.styles if name in there]
-        self.others = [c for c in comparison.contenders if c.name not in self.styles]
+        self.others = [c for c in comparison.candidates if c.name not in self.styles]
         self.axis = comparison.longest
         column = comparison.share[:, AXES.index(self.axis)]
         self.profile = int(np.argmax(np.abs(column)))
@@ -141,15 +141,15 @@ class _Drawing:
         """Lines and names."""
         from matplotlib.lines import Line2D
 
-        handles = [Line2D([], [], **self._style(contender)) for contender in self.shown]
-        words = [contender.name for contender in self.shown]
+        handles = [Line2D([], [], **self._style(candidate)) for candidate in self.shown]
+        words = [candidate.name for candidate in self.shown]
         if self.others:
             handles.append(Line2D([], [], **OTHERS))
             words.append("all others")
         return handles, words
 
-    def _style(self, contender: Contender) -> dict[str, Any]:
-        colour, line, width = self.styles[contender.name]
+    def _style(self, candidate: Candidate) -> dict[str, Any]:
+        colour, line, width = self.styles[candidate.name]
         return {"color": colour, "linestyle": line, "linewidth": width}
 
     def _lanes(self, axes: Axes, named: bool) -> None:
@@ -162,8 +162,8 @@ class _Drawing:
         words = [f"{c.name}\n{MS * c.time:.4g} ms" for c in self.shown] if named else []
         axes.set_yticks(-np.arange(count)[: len(words)], words)
         axes.tick_params(axis="y", length=0)
-        for label, contender in zip(axes.get_yticklabels(), self.shown, strict=False):
-            label.set_color(self.styles[contender.name][0])
+        for label, candidate in zip(axes.get_yticklabels(), self.shown, strict=False):
+            label.set_color(self.styles[candidate.name][0])
 
     def _bar(self, axes: Axes, value: float, scale: float, unit: str) -> None:
         """How much a piece of the first lane is."""
@@ -180,14 +180,14 @@ class _Drawing:
     def profiles(self, axes: Axes) -> str:
         """Acceleration of the axis that moves farthest."""
         curves = []
-        for contender in self.shown:
+        for candidate in self.shown:
             t, a = acceleration_curve(
-                contender.profiles.take(slice(self.profile, self.profile + 1))
+                candidate.profiles.take(slice(self.profile, self.profile + 1))
             )
             curves.append((t, self.length * a))
         scale = max(float(np.abs(a).max()) for _, a in curves)
-        for k, (contender, (t, a)) in enumerate(zip(self.shown, curves, strict=True)):
-            colour = self.styles[contender.name][0]
+        for k, (candidate, (t, a)) in enumerate(zip(self.shown, curves, strict=True)):
+            colour = self.styles[candidate.name][0]
             axes.fill_between(MS * t, -k, LANE * a / scale - k, color=colour, alpha=0.15, lw=0)
             axes.plot(MS * t, LANE * a / scale - k, color=colour, linewidth=0.9)
         self._lanes(axes, named=True)
@@ -205,21 +205,21 @@ class _Drawing:
         end = last + PERIODS / modes.modes[strongest].frequency
         fastest = float(modes.poles.imag.max()) / (2.0 * np.pi)
         curves = []
-        for contender in self.shown:
-            count = int(np.clip(30.0 * fastest * (end - contender.time), 400, 8000))
-            t = np.linspace(0.0, end - contender.time, count)
-            response = arrival_response(contender.profiles, weights, modes.poles) / modes.poles.imag
+        for candidate in self.shown:
+            count = int(np.clip(30.0 * fastest * (end - candidate.time), 400, 8000))
+            t = np.linspace(0.0, end - candidate.time, count)
+            response = arrival_response(candidate.profiles, weights, modes.poles) / modes.poles.imag
             swing = np.zeros(count)
             for pole, amplitude in zip(modes.poles, response, strict=True):
                 swing -= (amplitude * np.exp(pole * t)).imag
-            curves.append((contender.time + t, swing))
+            curves.append((candidate.time + t, swing))
         scale = max(float(np.abs(swing).max()) for _, swing in curves) or 1.0
-        for k, (contender, (t, swing)) in enumerate(zip(self.shown, curves, strict=True)):
-            colour = self.styles[contender.name][0]
+        for k, (candidate, (t, swing)) in enumerate(zip(self.shown, curves, strict=True)):
+            colour = self.styles[candidate.name][0]
             axes.plot(MS * t, LANE * swing / scale - k, color=colour, linewidth=0.9)
             axes.plot(MS * t[0], LANE * swing[0] / scale - k, "o", color=colour, markersize=3)
             axes.annotate(
-                _settled(contender), (1.0, 0.14 - k), xycoords=axes.get_yaxis_transform(),
+                _settled(candidate), (1.0, 0.14 - k), xycoords=axes.get_yaxis_transform(),
                 ha="right", va="center", fontsize=TEXT - 1.5, color=colour,
             )  # fmt: skip
         self._lanes(axes, named=False)
@@ -251,11 +251,11 @@ class _Drawing:
         frequency = _range([m.frequency for m, _ in own], lines)
         poles = mode_poles(frequency, _damping(frequency, [m for m, _ in own]))
         top = 0.0
-        for contender in (*self.others, *self.shown):
-            profile = contender.profiles.take(slice(self.profile, self.profile + 1))
+        for candidate in (*self.others, *self.shown):
+            profile = candidate.profiles.take(slice(self.profile, self.profile + 1))
             D = UM * abs(self.length) * np.abs(profiles_response(profile, poles)[0]) / poles.imag
             top = max(top, float(D.max()))
-            style = OTHERS if contender in self.others else self._style(contender)
+            style = OTHERS if candidate in self.others else self._style(candidate)
             axes.plot(frequency, D, **style)
         tolerance = UM * self.comparison.machine.design.tolerance
         lowest = tolerance / max([1.0, *(weight for _, weight in own)])
@@ -329,17 +329,17 @@ def _round_below(value: float) -> float:
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * 1.001))
 
 
-def _settled(contender: Contender) -> str:
+def _settled(candidate: Candidate) -> str:
     """When all is still, in the words of a lane."""
-    if contender.settling is None:
+    if candidate.settling is None:
         return "never settles"
-    ms = MS * contender.settling
+    ms = MS * candidate.settling
     return f"settled at {ms:.0f} ms" if ms >= 100.0 else f"settled at {ms:.3g} ms"
 
 
 def _best_shapers(comparison: Comparison) -> list[str]:
     """The shaper that lets the machine settle first, and the one that bears most error."""
-    shapers = [c for c in comparison.contenders if c.name in SHAPERS]
+    shapers = [c for c in comparison.candidates if c.name in SHAPERS]
     settled = min(shapers, key=lambda c: (c.settling is None, c.settling or 0.0, c.time))
     robust = min(shapers, key=lambda c: c.worst_band[-1])
     if robust is settled:

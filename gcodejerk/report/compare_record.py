@@ -12,7 +12,7 @@ from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
 from gcodejerk.planning.arrival import BANDS
 from gcodejerk.report.records import Record, number
-from gcodejerk.studies.comparison import CONTENDERS, QUANTITIES, Comparison, Contender
+from gcodejerk.studies.comparison import CONTENDERS, QUANTITIES, Candidate, Comparison
 
 MOST_SEGMENTS = 400
 """More segments than these say nothing to anyone."""
@@ -35,8 +35,8 @@ def compare_record(comparison: Comparison) -> Record:
     """
     usual = comparison["conventional"]
     present = {
-        contender.name: _profile(comparison, contender, usual)
-        for contender in comparison.contenders
+        candidate.name: _profile(comparison, candidate, usual)
+        for candidate in comparison.candidates
     }
     return {
         "gcodejerk": __version__,
@@ -58,38 +58,38 @@ def compare_record(comparison: Comparison) -> Record:
     }
 
 
-def _profile(comparison: Comparison, contender: Contender, usual: Contender) -> Record:
-    """One contender."""
+def _profile(comparison: Comparison, candidate: Candidate, usual: Candidate) -> Record:
+    """One candidate."""
     return {
-        "profile": contender.name,
-        "time": number(contender.time),
-        "segments": _segments(comparison, contender),
-        "peak": axis_peaks(comparison, contender),
-        "residual": _residual(comparison, contender, usual),
-        "worst_band": _bands(contender.worst_band),
-        "worst_band_acceleration": _bands(contender.worst_band_acceleration),
-        "settling": None if contender.settling is None else number(contender.settling),
-        "limit": None if contender.limit is None else number(contender.limit),
-        "within_limits": contender.within_limits,
-        "note": contender.note or None,
+        "profile": candidate.name,
+        "time": number(candidate.time),
+        "segments": _segments(comparison, candidate),
+        "peak": axis_peaks(comparison, candidate),
+        "residual": _residual(comparison, candidate, usual),
+        "worst_band": _bands(candidate.worst_band),
+        "worst_band_acceleration": _bands(candidate.worst_band_acceleration),
+        "settling": None if candidate.settling is None else number(candidate.settling),
+        "limit": None if candidate.limit is None else number(candidate.limit),
+        "within_limits": candidate.within_limits,
+        "note": candidate.note or None,
     }
 
 
 def _absent(name: str, why: str) -> Record:
-    """A contender that does not exist: nothing is known but the reason."""
+    """A candidate that does not exist: nothing is known but the reason."""
     keys = ("time", "segments", "peak", "residual", "worst_band", "worst_band_acceleration")
     more = ("settling", "limit", "within_limits")
     return {"profile": name} | dict.fromkeys((*keys, *more)) | {"note": why}
 
 
-def axis_peaks(comparison: Comparison, contender: Contender) -> dict[str, Record]:
+def axis_peaks(comparison: Comparison, candidate: Candidate) -> dict[str, Record]:
     """Peak velocity, acceleration and jerk of each moving axis.
 
     Parameters
     ----------
     comparison : Comparison
         Tells what each profile carries.
-    contender : Contender
+    candidate : Candidate
         Whose peaks.
 
     Returns
@@ -98,7 +98,7 @@ def axis_peaks(comparison: Comparison, contender: Contender) -> dict[str, Record
         By axis: `velocity`, `acceleration`, `jerk`, the last one None where the acceleration
         steps. [mm/s], [mm/s^2], [mm/s^3] or of degrees
     """
-    profiles = contender.profiles
+    profiles = candidate.profiles
     peaks = (profiles.peak_velocity, profiles.peak_acceleration, profiles.peak_jerk)
     out = {}
     for k, share in enumerate(comparison.share):
@@ -111,11 +111,11 @@ def axis_peaks(comparison: Comparison, contender: Contender) -> dict[str, Record
     return out
 
 
-def _segments(comparison: Comparison, contender: Contender) -> list[Record] | Record | None:
+def _segments(comparison: Comparison, candidate: Candidate) -> list[Record] | Record | None:
     """Segments of constant jerk, of the common profile or of each axis's."""
-    profiles = contender.profiles
+    profiles = candidate.profiles
     stepped = bool(np.isinf(profiles.peak_jerk).any())
-    if contender.name == AVERAGE or stepped or len(profiles.begin) > MOST_SEGMENTS * len(profiles):
+    if candidate.name == AVERAGE or stepped or len(profiles.begin) > MOST_SEGMENTS * len(profiles):
         return None
     if comparison.machine.positioning == "linear":
         lengths = np.abs(comparison.share[0])
@@ -136,7 +136,7 @@ def _scaled(segments: list[tuple[float, float]], length: float) -> list[Record]:
     return [{"duration": number(d), "jerk": number(j * length)} for d, j in segments]
 
 
-def _residual(comparison: Comparison, contender: Contender, usual: Contender) -> list[Record]:
+def _residual(comparison: Comparison, candidate: Candidate, usual: Candidate) -> list[Record]:
     """What each mode keeps, beside what the controller's own G0 leaves."""
     modes = comparison.modes
     return [
@@ -145,8 +145,8 @@ def _residual(comparison: Comparison, contender: Contender, usual: Contender) ->
             "mode": modes.modes[g].name,
             "frequency": number(modes.modes[g].frequency),
             "damping": number(modes.modes[g].damping),
-            "acceleration": number(float(contender.acceleration[g])),
-            "displacement": number(float(contender.displacement[g])),
+            "acceleration": number(float(candidate.acceleration[g])),
+            "displacement": number(float(candidate.displacement[g])),
             "conventional_acceleration": number(float(usual.acceleration[g])),
             "conventional_displacement": number(float(usual.displacement[g])),
         }

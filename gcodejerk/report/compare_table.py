@@ -1,4 +1,4 @@
-"""A comparison for a terminal: one row for each contender, and what has to be said about them.
+"""A comparison for a terminal: one row for each candidate, and what has to be said about them.
 
 Rule: the best of a column is bold among those that keep the limits; a figure that nobody could
 have on this machine is no best.
@@ -15,7 +15,7 @@ from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.planning.arrival import BANDS
 from gcodejerk.report.compare_record import axis_peaks
 from gcodejerk.report.tables import MS_PER_S, UM_PER_MM, bare_table
-from gcodejerk.studies.comparison import DESIGNED, NEEDS_SOLVER, Comparison, Contender
+from gcodejerk.studies.comparison import DESIGNED, NEEDS_SOLVER, Candidate, Comparison
 
 NEVER = "never"
 UNKNOWN = "-"
@@ -24,7 +24,7 @@ SAME = 1.0 + 1e-6
 
 
 def compare_table(comparison: Comparison) -> Table:
-    """Times, peaks and residuals, a row for each contender.
+    """Times, peaks and residuals, a row for each candidate.
 
     Parameters
     ----------
@@ -49,21 +49,21 @@ def compare_table(comparison: Comparison) -> Table:
         (f"limit\n[{small}]", "right"),
     )
     best = _Best(comparison)
-    for contender in comparison.contenders:
-        peak = axis_peaks(comparison, contender)[axis]
+    for candidate in comparison.candidates:
+        peak = axis_peaks(comparison, candidate)[axis]
         table.add_row(
-            contender.name + ("" if contender.within_limits else " *"),
-            f"{contender.time * MS_PER_S:.1f}",
-            best.of(contender, "settled", _settled(contender)),
+            candidate.name + ("" if candidate.within_limits else " *"),
+            f"{candidate.time * MS_PER_S:.1f}",
+            best.of(candidate, "settled", _settled(candidate)),
             f"{peak['velocity']:.2f}",
             f"{peak['acceleration']:.0f}",
             "step" if peak["jerk"] is None else f"{peak['jerk']:.3g}",
-            best.of(contender, "residual", _small(contender.worst)),
+            best.of(candidate, "residual", _small(candidate.worst)),
             *(
-                best.of(contender, band, f"{worst * UM_PER_MM:.1f}")
-                for band, worst in zip(BANDS, contender.worst_band, strict=True)
+                best.of(candidate, band, f"{worst * UM_PER_MM:.1f}")
+                for band, worst in zip(BANDS, candidate.worst_band, strict=True)
             ),
-            UNKNOWN if contender.limit is None else _small(contender.limit),
+            UNKNOWN if candidate.limit is None else _small(candidate.limit),
         )
     for name in comparison.absent:
         table.add_row(f"{name} **", *[UNKNOWN] * (len(table.columns) - 1))
@@ -96,7 +96,7 @@ def compare_notes(comparison: Comparison) -> list[str]:
         lines.append("positioning: independent: each axis moves and arrives on its own")
     broken = [
         f"{c.name} ({', '.join(f'{name} {_times(use)}' for name, use in c.broken)})"
-        for c in comparison.contenders
+        for c in comparison.candidates
         if c.broken
     ]
     if broken:
@@ -107,14 +107,14 @@ def compare_notes(comparison: Comparison) -> list[str]:
     for why, names in reasons.items():
         remedy = f" and for the limit: pip install '{NEEDS_SOLVER.split()[-1]}'"
         lines.append(f"** {', '.join(names)}: {why}{remedy if why == NEEDS_SOLVER else ''}")
-    lines += [f"{c.name}: {c.note}" for c in comparison.contenders if c.note]
+    lines += [f"{c.name}: {c.note}" for c in comparison.candidates if c.note]
     return [*lines, *_gains(comparison)]
 
 
 def _gains(comparison: Comparison) -> list[str]:
     """What the best designs would bring, beside the controller's own G0."""
     usual = comparison["conventional"]
-    designed = [c for c in comparison.contenders if c.name in DESIGNED and c.within_limits]
+    designed = [c for c in comparison.candidates if c.name in DESIGNED and c.within_limits]
     lines = []
     settled = [c for c in designed if c.settling is not None]
     if settled:
@@ -156,24 +156,24 @@ class _Best:
     """The best figure of each column, among those who keep the limits."""
 
     def __init__(self, comparison: Comparison) -> None:
-        figures: dict[object, Callable[[Contender], float]] = {
+        figures: dict[object, Callable[[Candidate], float]] = {
             "settled": lambda c: float("inf") if c.settling is None else c.settling,
             "residual": lambda c: c.worst,
         }
         for k, band in enumerate(BANDS):
             figures[band] = lambda c, k=k: c.worst_band[k]  # type: ignore[misc]
         self.figures = figures
-        fair = [c for c in comparison.contenders if c.within_limits]
+        fair = [c for c in comparison.candidates if c.within_limits]
         self.least = {
             column: min((figure(c) for c in fair), default=float("inf"))
             for column, figure in figures.items()
         }
 
-    def of(self, contender: Contender, column: object, text: str) -> Text:
+    def of(self, candidate: Candidate, column: object, text: str) -> Text:
         """A figure, bold where it is the best of its column."""
-        value = self.figures[column](contender)
+        value = self.figures[column](candidate)
         best = (
-            contender.within_limits
+            candidate.within_limits
             and value < float("inf")
             and value <= max(self.least[column] * SAME, 0.5e-5)
         )
@@ -186,8 +186,8 @@ def _units(comparison: Comparison) -> tuple[str, str]:
     return ("deg", "deg/1000") if rotary else ("mm", "um")
 
 
-def _settled(contender: Contender) -> str:
-    return NEVER if contender.settling is None else f"{contender.settling * MS_PER_S:.1f}"
+def _settled(candidate: Candidate) -> str:
+    return NEVER if candidate.settling is None else f"{candidate.settling * MS_PER_S:.1f}"
 
 
 def _small(value: float) -> str:

@@ -39,14 +39,14 @@ class Records:
     def __init__(
         self,
         plans: Plans,
-        kept: NDArray[np.bool_],
+        stays_conventional: NDArray[np.bool_],
         residual: Array,
         conventional: Array,
         limit: Array | None = None,
         deviation: Array | None = None,
         rest: Left | None = None,
     ) -> None:
-        self.plans, self.kept = plans, kept
+        self.plans, self.stays_conventional = plans, stays_conventional
         self.deviation = np.zeros(len(plans)) if deviation is None else deviation
         self.limit = np.full(len(plans), np.nan) if limit is None else limit
         modes = plans.modes
@@ -57,7 +57,7 @@ class Records:
         usual = whole_intervals(plans.conventional_time, interval)
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
         self.extension = extra * interval
-        written = kept[plans.move] if len(plans) else np.zeros(0, dtype=bool)
+        written = stays_conventional[plans.move] if len(plans) else np.zeros(0, dtype=bool)
         self.profiles = plans.profiles.replaced(written, plans.conventional.take(written))
         self.rest = rest
         self.oscillators = (residual, conventional)
@@ -129,11 +129,11 @@ class Records:
         }
         if planned:
             of_move = plans.profiles_of(row)
-            kept = bool(self.kept[row])
+            stays_conventional = bool(self.stays_conventional[row])
             record |= {
                 "time": number(float(plans.counts[row]) * plans.machine.interval),
                 "extension": number(float(self.extension[row])),
-                "profile": "conventional" if kept else plans.profile(of_move.start),
+                "profile": "conventional" if stays_conventional else plans.profile(of_move.start),
                 "segments": self._segments(row, of_move),
                 "peak": self._peak(of_move),
                 "residual": self._residual(row),
@@ -206,7 +206,11 @@ class Records:
 def summary_of(result: Result) -> Record:
     """The summary of a report, without the records of its rapids."""
     records = Records(
-        result.plans, result.kept, result.residual, result.conventional_residual, rest=result.rest
+        result.plans,
+        result.stays_conventional,
+        result.residual,
+        result.conventional_residual,
+        rest=result.rest,
     )
     summary = {"blocks": result.program.blocks} | records.summary()
     summary["read_once"] = result.read_once
@@ -245,7 +249,12 @@ def process_record(
     """
     plans = result.plans
     records = Records(
-        plans, result.kept, result.residual, result.conventional_residual, limit, result.deviation
+        plans,
+        result.stays_conventional,
+        result.residual,
+        result.conventional_residual,
+        limit,
+        result.deviation,
     )
     rapids = result.program.rapids
     rows = [
@@ -274,7 +283,12 @@ def move_record(plan: Plan) -> Record:
     limit = known_limits(plan.plans)
     deviation = path_deviation(plan.batch)
     records = Records(
-        plan.plans, plan.kept, plan.residual, plan.conventional_residual, limit, deviation
+        plan.plans,
+        plan.stays_conventional,
+        plan.residual,
+        plan.conventional_residual,
+        limit,
+        deviation,
     )
     end = {axis: number(length) for axis, length in plan.displacement.items()}
     row: Record = {
@@ -300,7 +314,11 @@ def move_record(plan: Plan) -> Record:
 def conventional_motion(plan: Plan) -> Record:
     """Time, segments and peaks of the controller's own G0, as the `motion` of a record has them."""
     plans = plan.plans
-    usual = replace(plans, profiles=plans.conventional, kept=np.ones_like(plans.kept))
+    usual = replace(
+        plans,
+        profiles=plans.conventional,
+        stays_conventional=np.ones_like(plans.stays_conventional),
+    )
     records = Records(usual, np.ones(1, dtype=bool), plan.residual, plan.conventional_residual)
     motion = records.motion(0) | {"time": number(plan.conventional_time)}
     if isinstance(motion["segments"], list):

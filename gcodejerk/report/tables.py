@@ -245,7 +245,7 @@ def map_tables(survey: Survey) -> list[Table]:
         (f"displacement [{'um' if unit == 'mm' else 'deg/1000'}]\ntoday -> best", "right"),
         ("next null [ms]\nT_SUM (T1)", "right"),
     )
-    for mode in survey.judged:
+    for mode in survey.counted_modes:
         now = survey.conventional_amplitude(mode)
         then = survey.amplitude(mode, chosen.T1, chosen.T_SUM)
         moved = [survey.displacement(mode, a) * UM_PER_MM for a in (now, then)]

@@ -99,7 +99,7 @@ def prove_expansion(
     dialect: str | None = None,
     most: int = 100,
 ) -> Verification:
-    """Compare a program with what became of it when its cycles were written out.
+    """Compare a program with the same program after its cycles were written out.
 
     Parameters
     ----------

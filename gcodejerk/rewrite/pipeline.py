@@ -63,7 +63,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """What became of one program.
+    """The outcome of one program.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Result:
         The emitter that wrote.
     residual, conventional_residual : ndarray, shape (n, m)
         Displacement envelopes of every rapid and mode, NaN where not planned. [mm]
-    kept : ndarray of bool, shape (n,)
+    stays_conventional : ndarray of bool, shape (n,)
         The stream is the conventional profile: nothing better was found.
     deviation : ndarray, shape (n,)
         Under independent positioning, how far the path leaves the control's own, at most. [mm]
@@ -90,7 +90,7 @@ class Result:
     hunks : ndarray of int, shape (n, 5)
         All that is not the source's, cycles included: see `expanded.hunks`.
     expansion : Expansion or None
-        What became of the cycles; None where they were not to be written out.
+        The outcome for the cycles; None where they were not to be written out.
     notes : tuple of str
         What the user has to know: of the program, and of the controller.
     output : bytes or None
@@ -104,7 +104,7 @@ class Result:
     form: str
     residual: Array
     conventional_residual: Array
-    kept: NDArray[np.bool_]
+    stays_conventional: NDArray[np.bool_]
     deviation: Array
     rest: Left
     verification: Verification | None
@@ -303,7 +303,7 @@ def _process(
     done = 0
     for window in make_streams(
         plans,
-        emitter.spelling(program.rapids, machine, options.dialect),
+        emitter.number_format(program.rapids, machine, options.dialect),
         emitter.stride(machine.interval),
     ):
         for batch in window:
@@ -317,7 +317,7 @@ def _process(
     if target is not None and settings.verify:
         report("verifying", 0, 1)
         try:
-            verification = _judged(source, target, machine, settings, program, emitter.in_place)
+            verification = _verified(source, target, machine, settings, program, emitter.in_place)
             require(lines_in_original(verification, lines))
         except (ProgramError, VerifyError):
             if digest_of(source) != program.digest:
@@ -344,7 +344,7 @@ def _process(
         form=settings.form,
         residual=collected.residual,
         conventional_residual=collected.conventional,
-        kept=collected.kept,
+        stays_conventional=collected.stays_conventional,
         deviation=deviation,
         rest=left_alone(program.rapids, plans),
         verification=verification,
@@ -378,7 +378,7 @@ def _operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list
     return notes
 
 
-def _judged(
+def _verified(
     source: BinaryIO,
     target: BinaryIO,
     machine: Machine,
@@ -389,9 +389,9 @@ def _judged(
     """Read an output back."""
     source.seek(0)
     target.seek(0)
-    judge = verify_files if in_place else verify_csv
+    prove = verify_files if in_place else verify_csv
     design = replace(machine.design, profile=settings.profile or machine.design.profile)
-    return judge(
+    return prove(
         source,
         target,
         replace(machine, design=design),

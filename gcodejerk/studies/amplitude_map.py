@@ -137,7 +137,7 @@ class Survey:
         return "deg" if self.axis.rotary else "mm"
 
     @property
-    def judged(self) -> tuple[Mode, ...]:
+    def counted_modes(self) -> tuple[Mode, ...]:
         """The modes that the map is of."""
         return self.modes if self.mode is None else (self.mode,)
 
@@ -222,7 +222,9 @@ class Survey:
     @property
     def dominant(self) -> Mode:
         """The mode of those judged that the controller's own G0 moves most."""
-        return max(self.judged, key=lambda m: self.displacement(m, self.conventional_amplitude(m)))
+        return max(
+            self.counted_modes, key=lambda m: self.displacement(m, self.conventional_amplitude(m))
+        )
 
     def peaks(self, chosen: Chosen) -> Peaks:
         """Largest velocity, acceleration and jerk of a point's profile."""

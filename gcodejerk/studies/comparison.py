@@ -1,6 +1,6 @@
 """A comparison: one move, made by every profile and every shaper that this package knows.
 
-This module owns the list of contenders for one move of a machine, and how they are judged: their
+This module owns the list of candidates for one move of a machine, and how they are judged: their
 time, their peaks, what every mode keeps at its own frequency and within a band around it, and when
 the machine has come to rest. It knows no file and draws nothing; `report.compare_record`,
 `report.compare_table` and `report.compare_figure` do.
@@ -48,7 +48,7 @@ QUANTITIES = ("velocity", "acceleration", "jerk")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contender:
+class Candidate:
     """One profile or shaper on the move.
 
     Attributes
@@ -103,7 +103,7 @@ class Contender:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """All contenders on one move.
+    """All candidates on one move.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Comparison:
         The machine's modes.
     share : ndarray, shape (l, 9)
         Displacement of each axis that each profile carries. [mm] or [deg]
-    contenders : tuple of Contender
+    candidates : tuple of Candidate
         Those that exist, in the order of `CONTENDERS`.
     absent : dict of str to str
         The others, and why.
@@ -130,16 +130,16 @@ class Comparison:
     displacement: dict[str, float]
     modes: Modes
     share: Array
-    contenders: tuple[Contender, ...]
+    candidates: tuple[Candidate, ...]
     absent: dict[str, str]
     time: float
     shaped: tuple[tuple[float, float], ...]
 
-    def __getitem__(self, name: str) -> Contender:
-        """The contender of that name; KeyError where it is absent."""
-        for contender in self.contenders:
-            if contender.name == name:
-                return contender
+    def __getitem__(self, name: str) -> Candidate:
+        """The candidate of that name; KeyError where it is absent."""
+        for candidate in self.candidates:
+            if candidate.name == name:
+                return candidate
         raise KeyError(name)
 
     @property
@@ -223,7 +223,7 @@ def compare_move(
 
 
 class _Field:
-    """The contenders of one move, as they enter, and how they are judged."""
+    """The candidates of one move, as they enter, and how they are judged."""
 
     def __init__(
         self, machine: Machine, row: Array, time: float | None, damping: float | None,
@@ -302,7 +302,7 @@ class _Field:
 
     def _note(self, plans: Plans, name: str) -> str:
         """What the planner had to do about it."""
-        if plans.kept.all():
+        if plans.stays_conventional.all():
             return "no better law within the limits: the conventional one is kept"
         extra = int(plans.counts[0] - self.task.counts.max())
         if name != "shortest" and extra > 0:
@@ -326,18 +326,18 @@ class _Field:
         """Everyone's figures."""
         names = [name for name in CONTENDERS if name in self.profiles]
         limits = known_limits(self._plans(names), self.progress)
-        contenders = tuple(
-            self._contender(name, np.nan if limits is None else float(limits[k]))
+        candidates = tuple(
+            self._candidate(name, np.nan if limits is None else float(limits[k]))
             for k, name in enumerate(names)
         )
         absent = {name: self.absent[name] for name in CONTENDERS if name in self.absent}
         return Comparison(
-            self.machine, displacement, self.modes, self.share, contenders, absent,
+            self.machine, displacement, self.modes, self.share, candidates, absent,
             float(self.task.total.max()), tuple(self.shaped),
         )  # fmt: skip
 
     def _plans(self, names: list[str]) -> Plans:
-        """The contenders as moves, side by side."""
+        """The candidates as moves, side by side."""
         n, each = len(names), len(self.share)
         profiles = joined([self.profiles[name] for name in names])
         counts = np.maximum(whole_intervals(profiles.total, self.machine.interval), 1)
@@ -355,12 +355,12 @@ class _Field:
             profiles=profiles,
             conventional=joined([self.conventional] * n),
             profile_counts=counts,
-            kept=np.zeros(n * each, dtype=bool),
+            stays_conventional=np.zeros(n * each, dtype=bool),
             designed=self.machine.design.profile,
         )
 
-    def _contender(self, name: str, limit: float) -> Contender:
-        """One contender's figures."""
+    def _candidate(self, name: str, limit: float) -> Candidate:
+        """One candidate's figures."""
         profiles, modes = self.profiles[name], self.modes
         response = np.abs(arrival_response(profiles, self.weights, modes.poles))
         each = response / modes.poles.imag
@@ -370,7 +370,7 @@ class _Field:
             # Segments that end between intervals may be a little better than the bound on these.
             limit = min(limit, float(displacement.max()))
         bands = worst_in_bands(profiles, self.weights, modes)
-        return Contender(
+        return Candidate(
             name=name,
             profiles=profiles,
             displacement=displacement,

@@ -16,10 +16,10 @@ from typing import BinaryIO
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import LINUXCNC, Machine
 from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
+from gcodejerk.verification.bytes.alignment import Alignment
 from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
-from gcodejerk.verification.bytes.walk import Walk
 from gcodejerk.verification.findings import Findings, Verification
 from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
@@ -144,16 +144,16 @@ def verify_files(
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
-    walk = Walk(Window(original), Window(processed), program, machine, found)
+    alignment = Alignment(Window(original), Window(processed), program, machine, found)
     reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
     stride = stride_of(machine)
-    for streams in _batches(_checked(walk, reader)):
-        _judge(reader.paths(streams), program, machine, stride, found)
-    walk.check_sum()
+    for streams in _batches(_checked(alignment, reader)):
+        _check_points(reader.paths(streams), program, machine, stride, found)
+    alignment.check_sum()
     original.seek(begin)
-    confirmed = confirm(original, program.dialect, start, program.rapids, walk.replaced, found)
+    confirmed = confirm(original, program.dialect, start, program.rapids, alignment.replaced, found)
     return Verification(
-        len(program.rapids), walk.rewritten, walk.kept, found.sorted(), names, confirmed
+        len(program.rapids), alignment.rewritten, alignment.kept, found.sorted(), names, confirmed
     )
 
 
@@ -192,7 +192,7 @@ def verify_csv(
     found = Findings(most)
     reader = TableReader(table, program.rapids, machine, found)
     for paths in reader.paths():
-        _judge(paths, program, machine, 1, found)
+        _check_points(paths, program, machine, 1, found)
     original.seek(begin)
     confirmed = confirm(original, program.dialect, start, program.rapids, reader.replaced, found)
     return Verification(
@@ -220,10 +220,10 @@ def _read(
     return program
 
 
-def _checked(walk: Walk, reader: Reader) -> Iterator[Stream]:
+def _checked(alignment: Alignment, reader: Reader) -> Iterator[Stream]:
     """Streams whose axes are right."""
-    for stream in walk.streams():
-        if reader.check_end(stream, walk.block):
+    for stream in alignment.streams():
+        if reader.check_end(stream, alignment.block):
             yield stream
 
 
@@ -241,7 +241,9 @@ def _batches(streams: Iterator[Stream]) -> Iterator[list[Stream]]:
         yield batch
 
 
-def _judge(paths: Paths, program: Program, machine: Machine, stride: int, found: Findings) -> None:
+def _check_points(
+    paths: Paths, program: Program, machine: Machine, stride: int, found: Findings
+) -> None:
     """All checks on points."""
     check_rapids(paths, program.rapids, machine, found)
     check_line(paths, machine, found)

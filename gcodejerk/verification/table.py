@@ -66,16 +66,16 @@ class TableReader:
             rows = np.concatenate([kept, numbers.reshape(-1, kept.shape[1])])
             last = np.flatnonzero(rows[:, 0] != rows[-1, 0])
             cut = int(last[-1]) + 1 if len(last) else 0
-            yield from self._judge(rows[:cut])
+            yield from self._check_points(rows[:cut])
             kept = rows[cut:]
-        yield from self._judge(kept)
+        yield from self._check_points(kept)
 
     def _piece(self) -> bytes:
         """Whole rows, about PIECE bytes of them."""
         text = self.table.read(PIECE)
         return text + self.table.readline() if text and not text.endswith(b"\n") else text
 
-    def _judge(self, rows: Array) -> Iterator[Paths]:
+    def _check_points(self, rows: Array) -> Iterator[Paths]:
         """Match rows with rapids, then make them paths."""
         if not len(rows) or self.found.full:
             return

@@ -15,7 +15,7 @@ from timing import best_of
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.stream import Spelling, make_streams
+from gcodejerk.planning.stream import NumberFormat, make_streams
 
 
 def moves(machine, axes, count, longest):
@@ -33,7 +33,7 @@ def moves(machine, axes, count, longest):
 def points_of(plans, displacement):
     """Sample and round every planned move; how many points that are."""
     zero = np.zeros_like(displacement)
-    windows = make_streams(plans, Spelling(zero, np.full_like(zero, 1e-4), zero), 2)
+    windows = make_streams(plans, NumberFormat(zero, np.full_like(zero, 1e-4), zero), 2)
     return sum(int(batch.grid.blocks.sum()) for window in windows for batch in window)
 
 
@@ -42,7 +42,10 @@ def main():
     parser.add_argument("--rapids", type=int, default=10_000)
     parser.add_argument("--alone", type=int, default=100)
     given = parser.parse_args()
-    print(f"{'machine, axes':16}{'rapids':>8}{'planned':>9}{'kept':>7}{'together':>10}", end="")
+    print(
+        f"{'machine, axes':16}{'rapids':>8}{'planned':>9}{'as today':>9}{'together':>10}",
+        end="",
+    )
     print(f"{'each':>9}{'alone':>9}{'times':>7}{'streams':>9}{'points':>10}")
     cases = [
         ("vmc", "Z", 1.9),
@@ -62,7 +65,10 @@ def main():
         each, single = together / len(displacement), alone / len(few)
         writing, points = best_of(lambda p=plans, d=displacement: points_of(p, d), 1)
         print(f"{name + ' ' + axes:10}{longest:4.0f}mm{len(displacement):8}", end="")
-        print(f"{int(plans.planned.sum()):9}{int(plans.kept.sum()):7}{together:9.2f}s", end="")
+        print(
+            f"{int(plans.planned.sum()):9}{int(plans.stays_conventional.sum()):9}{together:9.2f}s",
+            end="",
+        )
         print(f"{1e6 * each:7.0f}us{1e6 * single:7.0f}us{single / each:7.1f}", end="")
         print(f"{writing:8.2f}s{points:10}")
 

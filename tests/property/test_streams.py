@@ -105,7 +105,7 @@ def test_segments_add_up_to_the_time_and_to_the_length(case):
         velocity += acceleration * d + j * d**2 / 2
         acceleration += j * d
         total += d
-        if not plan.kept[0]:
+        if not plan.stays_conventional[0]:
             assert d >= plan.machine.interval * (1 - 1e-9)
     assert position == pytest.approx(1.0, rel=1e-9)
     assert abs(velocity) * total < 1e-9

@@ -22,7 +22,7 @@ def test_the_modes_are_the_axis_s_own_and_the_structure_s():
     assert [m.name for m in survey("router", "z", 20).modes] == ["spindle"]
     assert survey("router", "X", 20).mode is None
     assert survey("router", "X", 20, mode="2").mode.name == "frame"
-    assert survey("router", "X", 20, mode="carriage").judged[0].frequency == 32
+    assert survey("router", "X", 20, mode="carriage").counted_modes[0].frequency == 32
 
 
 def test_what_todays_rapid_leaves_is_the_general_rule():

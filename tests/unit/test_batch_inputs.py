@@ -5,7 +5,14 @@ import subprocess
 
 import pytest
 
-from gcodejerk.batch.inputs import SUFFIXES, Found, NameClashError, check_names, gather, output_name
+from gcodejerk.batch.inputs import (
+    SUFFIXES,
+    Input,
+    NameClashError,
+    check_names,
+    find_inputs,
+    output_name,
+)
 
 
 @pytest.fixture
@@ -23,7 +30,7 @@ def tree(tmp_path, monkeypatch):
 
 
 def names(*arguments, passed_over=None):
-    found, problems = gather(list(arguments), passed_over)
+    found, problems = find_inputs(list(arguments), passed_over)
     assert not problems
     return [(f.path, f.below) for f in found]
 
@@ -109,7 +116,7 @@ def test_folders_nest_as_deep_as_they_like(tree, tmp_path):
 
 def test_a_folder_without_programs_is_told(tree):
     tree("s/readme.txt", "t/a.nc")
-    found, problems = gather(["s", "t"])
+    found, problems = find_inputs(["s", "t"])
     assert [f.path for f in found] == ["t/a.nc"]
     assert "s holds no program" in str(problems[0])
     assert ".mpf" in str(problems[0])
@@ -119,7 +126,7 @@ def test_a_folder_without_programs_is_told(tree):
 def test_a_folder_that_cannot_be_read_is_told_and_the_others_are_read(tree, tmp_path):
     tree("s/a.nc", "s/shut/b.nc", "s/t/c.nc")
     (tmp_path / "s" / "shut").chmod(0)
-    found, problems = gather(["s"])
+    found, problems = find_inputs(["s"])
     (tmp_path / "s" / "shut").chmod(0o755)
     assert [f.below for f in found] == ["a.nc", "t/c.nc"]
     assert "s/shut cannot be read" in str(problems[0])
@@ -137,7 +144,7 @@ def test_a_folder_that_cannot_be_read_is_told_and_the_others_are_read(tree, tmp_
     ],
 )
 def test_outputs_are_named_after_their_programs(path, below, folder, suffix, output):
-    assert output_name(Found(path, below), folder, suffix) == output
+    assert output_name(Input(path, below), folder, suffix) == output
 
 
 def test_two_outputs_of_one_name_are_refused(tree):

@@ -110,7 +110,7 @@ def test_a_bug_in_one_file_is_told_with_its_traceback_and_stops_nobody(shop, mon
     assert "bug of gcodejerk" in second.error
     assert "ZeroDivisionError: drawn" in second.error
     with pytest.raises(ZeroDivisionError):
-        list(run_jobs(jobs[1:2], vmc, Settings(), 1, None))
+        list(run_jobs(asked[1:2], vmc, Settings(), 1, None))
     assert not Path("shop/b.ngc.out").exists()
 
 

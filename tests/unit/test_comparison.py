@@ -62,12 +62,12 @@ def acceleration(profiles, k, t):
 
 def integral(comparison, name, frequency, damping, participation, points=40001):
     """Residual displacement of a mode [mm] by Simpson's rule over the acceleration."""
-    contender = comparison[name]
-    T = contender.time
+    candidate = comparison[name]
+    T = candidate.time
     t = np.linspace(0.0, T, points)
     a = np.zeros_like(t)
     for k, share in enumerate(comparison.share):
-        a += share @ participation * acceleration(contender.profiles, k, t)
+        a += share @ participation * acceleration(candidate.profiles, k, t)
     weight = np.full(len(t), 2.0)
     weight[1::2] = 4.0
     weight[[0, -1]] = 1.0
@@ -129,9 +129,9 @@ def test_conditions_compete_without_limits_and_say_so():
 )  # fmt: skip
 def test_settling_is_where_a_simulated_envelope_stays_below_the_tolerance(case, name):
     found = independent() if case == "both" else compared("centre", ("Z", 1.0))
-    contender = found[name]
+    candidate = found[name]
     tolerance = found.machine.design.tolerance
-    settled = contender.time
+    settled = candidate.time
     for mode in found.modes.modes:
         weights = [
             sum(s * mode.participation_of(axis) for axis, s in zip("XYZ", share, strict=False))
@@ -143,9 +143,9 @@ def test_settling_is_where_a_simulated_envelope_stays_below_the_tolerance(case, 
         # State and drive as one linear system: exact for a drive that is constant in each step.
         system = np.array([[0, 1, 0], [-(omega**2), -2 * zeta * omega, -1], [0, 0, 0]])
         count = 4000
-        step = contender.time / count
+        step = candidate.time / count
         middle = (np.arange(count) + 0.5) * step
-        drive = sum(w * acceleration(contender.profiles, k, middle) for k, w in enumerate(weights))
+        drive = sum(w * acceleration(candidate.profiles, k, middle) for k, w in enumerate(weights))
         state = np.zeros(2)
         matrix = expm(system * step)
         for a in drive:
@@ -156,9 +156,9 @@ def test_settling_is_where_a_simulated_envelope_stays_below_the_tolerance(case, 
         for k in range(30000):
             rate = (state[1] + zeta * omega * state[0]) / (omega * np.sqrt(1 - zeta**2))
             if np.hypot(state[0], rate) > tolerance:
-                settled = max(settled, contender.time + (k + 1) * step)
+                settled = max(settled, candidate.time + (k + 1) * step)
             state = matrix @ state
-    assert contender.settling == pytest.approx(settled, abs=3e-4)
+    assert candidate.settling == pytest.approx(settled, abs=3e-4)
 
 
 def test_a_mode_without_damping_never_settles_unless_it_is_still_enough():
@@ -215,9 +215,9 @@ def test_optimal_is_never_worse_in_its_band_than_others_of_its_time(name, moves)
         if rival in found.absent or found[rival].time < best.time - 1e-9:
             continue
         assert best.worst_band[k] <= found[rival].worst_band[k] * 1.002 + 1e-9
-    for contender in found.contenders:
-        if contender.within_limits and contender.limit is not None:
-            assert contender.limit <= contender.worst * (1 + 1e-9) + 1e-12
+    for candidate in found.candidates:
+        if candidate.within_limits and candidate.limit is not None:
+            assert candidate.limit <= candidate.worst * (1 + 1e-9) + 1e-12
 
 
 def test_every_contender_is_in_the_record_and_keeps_the_schema():

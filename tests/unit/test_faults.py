@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from gcodejerk.batch import files
 from gcodejerk.batch.files import PREFIX
-from gcodejerk.batch.inputs import gather
+from gcodejerk.batch.inputs import find_inputs
 from gcodejerk.batch.jobs import Job, run_job
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.rewrite.pipeline import Settings, process
@@ -104,7 +104,7 @@ def test_killed_before_any_call_to_the_system_it_leaves_no_half_file(folder, num
         assert (found.read_bytes() if found.exists() else None) in (old, WHOLE)
         hidden = set(names()) - {"part.nc", "part.jerk.nc", "part.json"}
         assert all(name.startswith(PREFIX) for name in hidden)
-        assert [f.path for f in gather(["."])[0]] == ["part.nc"]
+        assert [f.path for f in find_inputs(["."])[0]] == ["part.nc"]
         if run.returncode == 0:
             break
         assert run.returncode == (-number if number == signal.SIGKILL else 128 + number)

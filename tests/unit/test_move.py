@@ -131,7 +131,7 @@ def test_an_extended_move_says_how_long_the_controller_takes():
 def test_a_kept_conventional_law_says_so():
     plan = plan_move({"Z": 1.0}, PAPER, "conventional")
     assert plan.profile == "conventional"
-    assert plan.kept.tolist() == [True]
+    assert plan.stays_conventional.tolist() == [True]
     np.testing.assert_array_equal(plan.residual, plan.conventional_residual)
 
 

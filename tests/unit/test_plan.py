@@ -71,9 +71,13 @@ def test_no_jerk_limited_rapid_takes_an_interval_longer(interval):
     assert longer.min() >= -1e-8
     assert longer.max() < interval
     law_time = plans.profiles.total
-    kept = plans.kept
-    np.testing.assert_allclose(law_time[~kept], plans.counts[~kept] * interval, rtol=1e-9)
-    np.testing.assert_allclose(law_time[kept], plans.conventional_time[kept], rtol=1e-12)
+    stays_conventional = plans.stays_conventional
+    np.testing.assert_allclose(
+        law_time[~stays_conventional], plans.counts[~stays_conventional] * interval, rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        law_time[stays_conventional], plans.conventional_time[stays_conventional], rtol=1e-12
+    )
 
 
 def durations(profiles, k):
@@ -190,7 +194,7 @@ def test_where_the_conventional_law_is_still_already_it_stays():
         }
     )
     plans = plan_moves(moves({"Z": four_jerk_segments(0.080, 1e5)}), machine)
-    assert plans.kept.tolist() == [True]
+    assert plans.stays_conventional.tolist() == [True]
     assert plans.profile(0) == "conventional"
     assert durations(plans.profiles, 0) == pytest.approx([0.02] * 4)
 
@@ -332,7 +336,7 @@ def test_a_T1_within_limits_is_used_as_it_is():  # noqa: N802
 
 def test_the_profile_conventional_is_what_the_controller_does():
     plans = plan_moves(moves({"Z": 1.0}, {"Z": 200.0}), PAPER, "conventional")
-    assert plans.kept.all()
+    assert plans.stays_conventional.all()
     for k in range(2):
         assert plans.profiles.segments(k) == plans.conventional.segments(k)
 

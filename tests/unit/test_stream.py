@@ -11,7 +11,7 @@ from gcodejerk.motion import polyline_response, sample_profiles
 from gcodejerk.planning import stream
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.stream import FINE_DECIMALS, Spelling, make_streams
+from gcodejerk.planning.stream import FINE_DECIMALS, NumberFormat, make_streams
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 MACHINE = Machine.loads(
@@ -52,7 +52,9 @@ def drawn_moves(count, seed=1):
 def spelling_of(displacement, start=0.0, step=0.001, origin=0.0):
     """The same step and origin for all axes."""
     shape = displacement.shape
-    return Spelling(*(np.broadcast_to(np.asarray(x, float), shape) for x in (start, step, origin)))
+    return NumberFormat(
+        *(np.broadcast_to(np.asarray(x, float), shape) for x in (start, step, origin))
+    )
 
 
 def by_move(batches):
@@ -60,19 +62,19 @@ def by_move(batches):
     return {int(move): (batch, k) for batch in batches for k, move in enumerate(batch.moves)}
 
 
-def streams(displacement, machine=MACHINE, stride=1, profile=None, **spelling):
+def streams(displacement, machine=MACHINE, stride=1, profile=None, **number_format):
     """All batches of some moves."""
     plans = plan_moves(displacement, machine, profile)
-    windows = make_streams(plans, spelling_of(displacement, **spelling), stride)
+    windows = make_streams(plans, spelling_of(displacement, **number_format), stride)
     return [batch for window in windows for batch in window]
 
 
-def one_batch(displacement, machine=MACHINE, stride=1, profile=None, **spelling):
+def one_batch(displacement, machine=MACHINE, stride=1, profile=None, **number_format):
     """All planned moves in one batch, short ones behind much padding."""
     plans = plan_moves(displacement, machine, profile)
     moves = np.nonzero(plans.planned)[0]
-    spelling = spelling_of(displacement, **spelling).take(moves)
-    return stream._make_batch(plans, moves, spelling, stride)
+    number_format = spelling_of(displacement, **number_format).take(moves)
+    return stream._make_batch(plans, moves, number_format, stride)
 
 
 @pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
@@ -126,7 +128,7 @@ def test_the_conventional_residual_is_that_of_the_controller_s_samples():
             )
             driven += unit[0] * (plans.share[k] @ modes.participation[0])
         D = np.abs(polyline_response(moments * 1e-3, driven, modes.poles)) / modes.poles.imag
-        if not batch.kept[row]:
+        if not batch.stays_conventional[row]:
             assert float(batch.conventional_residual[row, 0]) == pytest.approx(
                 float(D[0]), rel=1e-7
             )
@@ -166,7 +168,7 @@ def test_many_small_batches_are_the_same_as_one(machine, samples, monkeypatch):
         np.testing.assert_allclose(
             part.conventional_residual[k], other.conventional_residual[row], rtol=1e-6
         )
-        assert part.kept[k] == other.kept[row]
+        assert part.stays_conventional[k] == other.stays_conventional[row]
 
 
 def test_a_window_holds_about_as_many_samples_as_it_may(monkeypatch):
@@ -237,15 +239,16 @@ def test_where_rounding_spoils_a_design_the_conventional_law_is_written():
     displacement = np.zeros((40, len(AXES)))
     displacement[:, Z] = np.linspace(9.0, 60.0, 40)
     batch = one_batch(displacement, step=1.0)
-    design_kept = batch.plans.kept
-    fallen_back = batch.kept & ~design_kept
+    design_kept = batch.plans.stays_conventional
+    fallen_back = batch.stays_conventional & ~design_kept
     assert fallen_back.any(), "no case of the fallback among these moves"
     for row in np.nonzero(fallen_back)[0]:
         assert batch.profiles.segments(row) == batch.plans.conventional.segments(row)
         np.testing.assert_array_equal(batch.residual[row], batch.conventional_residual[row])
-    kept = batch.kept
+    stays_conventional = batch.stays_conventional
     assert (
-        batch.residual[~kept].max(axis=1) <= batch.conventional_residual[~kept].max(axis=1)
+        batch.residual[~stays_conventional].max(axis=1)
+        <= batch.conventional_residual[~stays_conventional].max(axis=1)
     ).all()
 
 
@@ -253,7 +256,7 @@ def test_a_kept_law_reaches_its_end_before_the_last_interval_has_passed():
     displacement = np.zeros((1, len(AXES)))
     displacement[0, Z] = 1.07
     batch = one_batch(displacement, profile="conventional")
-    assert batch.kept.all()
+    assert batch.stays_conventional.all()
     t, q = batch.positions(0)
     assert t[-1] == pytest.approx(np.ceil(float(batch.plans.conventional_time[0]) * 1e3) / 1e3)
     assert q[-1, Z] == 1.07
@@ -268,8 +271,8 @@ def test_a_move_has_kept_the_conventional_law_only_if_all_of_its_axes_have():
     )
     plan = plan_move({"X": 5.0, "Z": 1.0}, machine)
     # X shakes nothing and keeps its profile; Z does not.
-    assert plan.plans.kept.tolist() == [True, False]
-    assert plan.kept.tolist() == [False]
+    assert plan.plans.stays_conventional.tolist() == [True, False]
+    assert plan.stays_conventional.tolist() == [False]
     assert plan.profile == "condition3"
     assert plan.residual.max() < 0.5 * plan.conventional_residual.max()
 

@@ -102,8 +102,8 @@ def planner_warnings(
         if "jerk" in rapid and planner not in (JERK_LIMITED, BELL):
             out.append(
                 MachineError(
-                    f"axes.{a}.rapid.jerk stands beside planner: {planner}, which has no jerk limit: "
-                    "it is not used",
+                    f"axes.{a}.rapid.jerk stands beside planner: {planner}, which has no jerk "
+                    "limit: it is not used",
                     "leave it out, or state the planner that keeps it",
                     checker.place(jerk),
                 )

@@ -76,21 +76,21 @@ def plausibility_warnings(values: dict[str, Any], checker: Checker) -> list[Mach
     list of MachineError
         In the order of the axes.
     """
-    judge = _Judge(checker, values["interval"])
+    slips = _Slips(checker, values["interval"])
     for name, axis in values["axes"].items():
         rotary = name in checker.rotary
         for which in ("rapid", "limit"):
-            judge.limits(("axes", name, which), axis.get(which, {}), axis["rapid"], rotary)
-        judge.below(("axes", name, "limit"), axis.get("limit", {}), axis["rapid"])
-        judge.resolution(("axes", name, "resolution"), axis["resolution"], rotary)
+            slips.limits(("axes", name, which), axis.get(which, {}), axis["rapid"], rotary)
+        slips.below(("axes", name, "limit"), axis.get("limit", {}), axis["rapid"])
+        slips.resolution(("axes", name, "resolution"), axis["resolution"], rotary)
         for k, mode in axis.get("modes", {}).items():
-            judge.mode(("axes", name, "modes", k), mode)
+            slips.mode(("axes", name, "modes", k), mode)
     for k, mode in values.get("modes", {}).items():
-        judge.mode(("modes", k), mode)
-    return judge.found
+        slips.mode(("modes", k), mode)
+    return slips.found
 
 
-class _Judge:
+class _Slips:
     """Collects warnings, each at its key."""
 
     def __init__(self, checker: Checker, interval: float) -> None:

@@ -1,6 +1,6 @@
 r"""The optimum: of all jerk sequences on the command grid, the one that leaves modes most still.
 
-This module owns the two questions that the convex programme of `programme.py` leaves open for one
+This module owns the two questions that the cone programme of `socp` leaves open for one
 move:
 
 * *which frequencies*. A mode is known to a relative band only; the residual is a smooth function
@@ -273,7 +273,7 @@ class _Search:
             first = every[: len(every) // 2 + 1 : BLOCK]
             coarse = np.union1d(first, self.move.count - first)
             found = self._null(coarse) or self._exchanged(coarse, 2, target, COARSE_ACCURACY)
-            if found is not None and self._judged(coarse, found).max() <= target:
+            if found is not None and self._amplitudes(coarse, found).max() <= target:
                 return self._optimum(coarse, found)
             if found is not None:
                 knots = self._refined(coarse, found)
@@ -323,13 +323,13 @@ class _Search:
                 break
         return best
 
-    def _judged(self, knots: Index, found: Solution) -> Array:
+    def _amplitudes(self, knots: Index, found: Solution) -> Array:
         """Residuals over the whole band."""
         return amplitudes(self._problem(knots, self.dense), found.jerk)
 
     def _missing(self, knots: Index, found: Solution) -> tuple[float, bool]:
         """The true worst residual; frequencies that are worse than the points become points."""
-        amplitude = self._judged(knots, found)
+        amplitude = self._amplitudes(knots, found)
         worst = float(amplitude.max(initial=0.0))
         if worst <= max(WORSE * found.worst, NULL * self.reference):
             return worst, False
@@ -384,5 +384,5 @@ class _Search:
 
     def _optimum(self, knots: Index, found: Solution) -> Optimum:
         """The solution in the units of the move."""
-        worst = float(self._judged(knots, found).max(initial=0.0)) * self.scale
+        worst = float(self._amplitudes(knots, found).max(initial=0.0)) * self.scale
         return Optimum(knots, found.jerk / self.move.count**3, worst)

@@ -252,10 +252,10 @@ class Dialect:
     lengths_only: frozenset[int] = frozenset()
     """Codes for inch or mm that leave the unit of F as it was."""
     bars: Mapping[int, tuple[str, bool | Literal["P"]]] = field(default_factory=dict)
-    """G code -> a name in `judge.BARS`, and whether it begins or ends; "P": it begins where P is
-    given and not 0."""
+    """G code -> a name in `eligibility.BARS`, and whether it begins or ends; "P": it begins where
+    P is given and not 0."""
     m_bars: Mapping[int, str] = field(default_factory=dict)
-    """M code -> a name in `judge.BARS`, which begins unless P is 0."""
+    """M code -> a name in `eligibility.BARS`, which begins unless P is 0."""
     tool_word_moves: bool = False
     """T may call a program of the builder's."""
     dark_rapids: bool = False

@@ -105,7 +105,7 @@ def looks_rapid(
     return bool((dialect.rapid in stated or implied) and axes)
 
 
-def judge(
+def why_left_alone(
     block: Block,
     codes: Codes,
     step: Step,

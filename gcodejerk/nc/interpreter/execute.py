@@ -15,7 +15,7 @@ from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import inline_power, shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes, sort_words
 from gcodejerk.nc.interpreter.cycles import begin_cycle, run_cycle
-from gcodejerk.nc.interpreter.eligibility import Call, Step, judge, looks_rapid
+from gcodejerk.nc.interpreter.eligibility import Call, Step, looks_rapid, why_left_alone
 from gcodejerk.nc.interpreter.flow_words import known_behind
 from gcodejerk.nc.interpreter.mcodes import run_m_code
 from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, State
@@ -98,7 +98,7 @@ class Executor:
         if step.fault or codes.unknown:
             step.rapid = step.rapid or looks_rapid(block, codes, step, before, self.dialect)
         if step.rapid:
-            step.reason = judge(block, codes, step, state, self.dialect, ended, contour)
+            step.reason = why_left_alone(block, codes, step, state, self.dialect, ended, contour)
         return step
 
     def _leave_contour(self, block: Block) -> None:

@@ -41,7 +41,7 @@ _NAME = re.compile(rb"<[^<>\[\]#]+>")
 _R = re.compile(rb"R([0-9]+)(?![0-9.])")
 
 
-class _Odd(Exception):  # noqa: N818 - not an error of ours: nothing that can be evaluated
+class _NotComputableError(Exception):
     """What stands here is no expression."""
 
 
@@ -85,7 +85,7 @@ def evaluate(text: bytes, variables: Mapping[str, float], rules: Arithmetic) -> 
     reader = _Reader(text.translate(None, b" \t").upper(), variables, rules)
     try:
         value = reader.expression(0)
-    except (_Odd, ArithmeticError, ValueError):
+    except (_NotComputableError, ArithmeticError, ValueError):
         return NAN
     return value if reader.at == len(reader.text) and math.isfinite(value) else NAN
 
@@ -127,7 +127,7 @@ class _Reader:
         if (sign := self.next()) in (b"+", b"-") and sign:
             self.at += 1
             if self.next() in (b"+", b"-"):
-                raise _Odd
+                raise _NotComputableError
             value = self.operand()
             return -value if sign == b"-" else value
         if match := _NUMBER.match(self.text, self.at):
@@ -147,12 +147,12 @@ class _Reader:
         """Read an expression in brackets."""
         opens, closes = self.rules.brackets
         if self.next() != opens.encode() or self.depth >= DEEPEST:
-            raise _Odd
+            raise _NotComputableError
         self.at += 1
         self.depth += 1
         value = self.expression(0)
         if self.next() != closes.encode():
-            raise _Odd
+            raise _NotComputableError
         self.at += 1
         self.depth -= 1
         return value
@@ -169,7 +169,7 @@ class _Reader:
             self.at += 1
             self.depth += 1
             if self.depth > DEEPEST:
-                raise _Odd
+                raise _NotComputableError
             value = self.variables.get(self.variable(), NAN)
             self.depth -= 1
         else:
@@ -181,14 +181,14 @@ class _Reader:
         """Read a function with its argument."""
         match = _LETTERS.match(self.text, self.at)
         if not match or (name := match[0].decode()) not in self.rules.functions:
-            raise _Odd
+            raise _NotComputableError
         self.at = match.end()
         if name == "EXISTS":
             return self.exists()
         value = self.bracket()
         if name == "ATAN":
             if self.next() != b"/":
-                raise _Odd
+                raise _NotComputableError
             self.at += 1
             other = self.bracket()
             if abs(value) <= NEARLY_ZERO * max(1.0, abs(other)) and other <= NEARLY_ZERO:
@@ -202,11 +202,11 @@ class _Reader:
     def exists(self) -> float:
         """Read ``EXISTS[#<name>]``; that a variable is not known does not say that it is not."""
         if self.text[self.at : self.at + 2] != b"[#":
-            raise _Odd
+            raise _NotComputableError
         self.at += 2
         known = self.variable() in self.variables
         if self.next() != b"]":
-            raise _Odd
+            raise _NotComputableError
         self.at += 1
         return 1.0 if known else NAN
 

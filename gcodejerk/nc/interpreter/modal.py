@@ -160,7 +160,7 @@ class State:
     transforms: dict[str, bool | None]
     """Rotation, scaling, mirroring..."""
     bars: dict[str, bool | None]
-    """What besides makes rapids unfit to be rewritten while it is in force, by `judge.BARS`."""
+    """What besides makes rapids ineligible while it is in force, by `eligibility.BARS`."""
     offsets: dict[int, list[float]]
     variables: dict[str, float]
     """Variables whose value is certain, by `expressions.variable_name`."""

@@ -43,8 +43,8 @@ class Runner:
         self.log = RapidLog()
         state = initial_state(dialect, start)
         self.executor = Executor(dialect, state, start)
-        self.odd_lines: list[Finding] = []
-        self.odd_count = 0
+        self.syntax_problems: list[Finding] = []
+        self.problem_count = 0
         self.asked_distance: int | None = None
         self.asked_feed_mode: int | None = None
         self.call: Callable[[Call, Line], bool] | None = None
@@ -87,10 +87,12 @@ class Runner:
         if visit and line.number in self.log.visits.rows:
             pass  # said on the first pass
         elif step.fault and block.problem is None:
-            self.odd(line, "the controller would refuse this combination of words")
+            self.add_problem(line, "the controller would refuse this combination of words")
         elif step.unknown:
             name = self.dialect.name
-            self.odd(line, f"{step.unknown} is a code that the dialect {name} does not know")
+            self.add_problem(
+                line, f"{step.unknown} is a code that the dialect {name} does not know"
+            )
         if not ((before is not None or uncertain) and step.feed_event == GIVES_FEED):
             self.log.feed_event(step.feed_event)
         self.log.habits |= step.habit
@@ -175,9 +177,11 @@ class Runner:
         if not (fixed or state.feed_mode_stated) and self.asked_feed_mode is None:
             self.asked_feed_mode = number
 
-    def odd(self, line: Line, problem: str, column: int | None = None) -> None:
+    def add_problem(self, line: Line, problem: str, column: int | None = None) -> None:
         """Note a line that is not understood."""
-        self.odd_count += 1
-        if len(self.odd_lines) < _SHOWN:
+        self.problem_count += 1
+        if len(self.syntax_problems) < _SHOWN:
             place = Place(self.name, line.number, column, line.text[:200].decode("latin-1"))
-            self.odd_lines.append(Finding(line.number, f"block not understood: {problem}", place))
+            self.syntax_problems.append(
+                Finding(line.number, f"block not understood: {problem}", place)
+            )

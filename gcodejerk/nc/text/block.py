@@ -1,4 +1,4 @@
-"""One line of a program as seen by the careful tokenizer: its words, comments and oddities.
+"""One line of a program as the careful tokenizer sees it: words, comments, what is wrong with it.
 
 Rule: a block is what is written, not what it means. Meaning needs the modal state (`modal.py`).
 """

@@ -25,7 +25,7 @@ _FUNCTIONS = frozenset(
 _NUMBER = re.compile(rb"[-+]?[0-9. \t]*")
 
 
-class Odd(Exception):  # noqa: N818 - not an error of ours: a place in the line
+class SyntaxProblem(Exception):  # noqa: N818 - not an error of ours: a place in the line
     """A problem and where it is, from 0."""
 
     def __init__(self, problem: str, at: int) -> None:
@@ -62,7 +62,7 @@ class Cursor:
                 byte = self.text[after : after + 1]
         if byte in (b"#", b"[") or byte.isalpha():
             if self.rules.variables != "#":
-                raise Odd("a number is missing", begin)
+                raise SyntaxProblem("a number is missing", begin)
             self.operand()
             return None
         pattern = _NUMBER if self.rules.blanks == "anywhere" else CLOSED_NUMBER
@@ -72,10 +72,10 @@ class Cursor:
         if not SHAPE.fullmatch(digits):
             shown = digits.decode("latin-1")
             what = f"'{shown}' is not a number" if shown else "a number is missing"
-            raise Odd(what, begin)
+            raise SyntaxProblem(what, begin)
         value = float(digits)
         if not abs(value) <= LARGEST:
-            raise Odd(f"'{digits.decode()}' is beyond any machine", begin)
+            raise SyntaxProblem(f"'{digits.decode()}' is beyond any machine", begin)
         self.at = match.start() + len(match[0].rstrip(b" \t"))
         return value
 
@@ -88,7 +88,7 @@ class Cursor:
         elif byte == b"<":
             end = self.text.find(b">", self.at)
             if end < 0:
-                raise Odd("name is not closed", self.at)
+                raise SyntaxProblem("name is not closed", self.at)
             self.at = end + 1
         elif byte.isdigit():
             match = _UNSIGNED.match(self.text, self.at)
@@ -97,7 +97,7 @@ class Cursor:
         elif match := _OPERATOR_TEXT.match(self.text, self.at):
             name = match[1].replace(b" ", b"").replace(b"\t", b"").upper()
             if name not in _FUNCTIONS:
-                raise Odd("function is not known", self.at)
+                raise SyntaxProblem("function is not known", self.at)
             self.at = match.end()
             self.bracket()
             if name == b"ATAN" and self.skip() == b"/":
@@ -105,13 +105,13 @@ class Cursor:
                 self.skip()
                 self.bracket()
         else:
-            raise Odd("a number is missing", self.at)
+            raise SyntaxProblem("a number is missing", self.at)
 
     def bracket(self) -> None:
         """Pass over an expression in square brackets."""
         text, begin = self.text, self.at
         if text[begin : begin + 1] != b"[":
-            raise Odd("expression expected", begin)
+            raise SyntaxProblem("expression expected", begin)
         depth = 0
         for at in range(begin, len(text)):
             byte = text[at]
@@ -121,7 +121,7 @@ class Cursor:
             if depth == 0:
                 self.at = at + 1
                 return
-        raise Odd("expression is not closed", begin)
+        raise SyntaxProblem("expression is not closed", begin)
 
     def assignment(self) -> None:
         """Pass over ``#target = value``."""
@@ -133,7 +133,7 @@ class Cursor:
         self.assigns.append(name.decode("latin-1") if known else "")
         self.assigned.append(b"")
         if self.skip() != b"=":
-            raise Odd("assignment without =", self.at)
+            raise SyntaxProblem("assignment without =", self.at)
         self.at += 1
         begin = self.at
         self.number()

@@ -1,8 +1,8 @@
 """The quick reading of a chunk: every plain line at once, as arrays.
 
-Rule: when in doubt a line is odd. A plain line holds letters of a small vocabulary, each directly
-followed by a decimal number, with blanks between words and comments anywhere; G0 to G3 are its only
-codes. Whatever else stands on a line makes it odd and `tokenizer` reads it.
+Rule: when in doubt a line is read with care. A plain line holds letters of a small vocabulary, each
+directly followed by a decimal number, with blanks between words and comments anywhere; G0 to G3 are
+its only codes. Whatever else stands on a line makes it one for the careful `tokenizer`.
 
 Each byte is translated to a class; the bytes that are not part of a number (letters, blanks, line
 ends) are the joints, and between a letter and the next joint stands its number.
@@ -115,10 +115,10 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     translated = text.translate(_CLASS)
     classes = np.frombuffer(bytearray(translated), dtype=np.uint8)
     inner = classes[_PAD:-1]
-    odd_lines = []
+    careful_lines = []
     if any(mark in translated for mark in (b"\x04", b"\x05", b"\x06")):
         semicolon = dialect.text.semicolon == "comment"
-        odd_lines.append(_blank_comments(inner, text[_PAD:-1], semicolon))
+        careful_lines.append(_blank_comments(inner, text[_PAD:-1], semicolon))
 
     joint = np.flatnonzero(classes[:-1] != _NUMBER)[_PAD:]
     kind = classes[joint]
@@ -136,9 +136,9 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     if returns.any():
         bad[:-1] |= returns[:-1] & ~ends[1:]
     # A line end is a joint of its own line, but a number behind it stands on the next one.
-    odd_lines.append((line + ends)[bad])
+    careful_lines.append((line + ends)[bad])
     if inner[0] == _NUMBER:
-        odd_lines.append(line[:1])
+        careful_lines.append(line[:1])
 
     word = np.flatnonzero(is_letter & ~bad)
     letter, begin = kind[word], joint[word]
@@ -159,32 +159,34 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
         signed = source[begin[numbers] + 1] < ord(".")  # + and -
         dotted = source[begin[numbers] + 1] == ord(".")
         good[numbers] &= ~(follows | signed | dotted)
-    odd_lines.append(word_line[~good])
+    careful_lines.append(word_line[~good])
 
-    odd = np.zeros(len(line_end), dtype=np.bool_)
-    for lines in odd_lines:
-        odd[lines] = True
-    odd |= line_end - line_begin > dialect.text.line_limit
+    careful = np.zeros(len(line_end), dtype=np.bool_)
+    for lines in careful_lines:
+        careful[lines] = True
+    careful |= line_end - line_begin > dialect.text.line_limit
     # Bits add up to their union unless one occurs twice: then the sum has fewer ones than terms.
-    total = np.bincount(word_line, weights=_BIT_OF[letter], minlength=len(odd)).astype(np.uint32)
+    total = np.bincount(word_line, weights=_BIT_OF[letter], minlength=len(careful)).astype(
+        np.uint32
+    )
     ones = _ONES[total & 511] + _ONES[(total >> 9) & 511]
-    odd |= (ones != np.bincount(word_line, minlength=len(odd))) | (total >= 1 << 18)
+    careful |= (ones != np.bincount(word_line, minlength=len(careful))) | (total >= 1 << 18)
     own = set(dialect.letters) - set(dialect.increments) | set("GN")
     foreign = sum(bit for name, bit in BIT.items() if name not in own)
-    odd |= total & np.uint32(foreign) != 0
+    careful |= total & np.uint32(foreign) != 0
     crlf = source[line_end + (_PAD - 1)] == 0x0D
     crlf &= line_end > line_begin
     terminator = np.where(crlf, 2, 1).astype(np.uint8)
     if not complete:
         terminator[-1] = 0
-        odd[-1] |= crlf[-1]
-    total[odd] = 0
-    kept = np.flatnonzero(~odd[word_line])
+        careful[-1] |= crlf[-1]
+    total[careful] = 0
+    kept = np.flatnonzero(~careful[word_line])
     return Lines(
         begin=line_begin,
         end=line_end - crlf,
         terminator=terminator,
-        odd=odd,
+        careful=careful,
         letters=total,
         words=Words(
             data, letter[kept], value[kept], begin[kept] - _PAD, end[kept] - _PAD, word_line[kept]

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.text.block import Block, Name, Word
-from gcodejerk.nc.text.cursor import BLANKS, CLOSED_NUMBER, LARGEST, SHAPE, Cursor, Odd
+from gcodejerk.nc.text.cursor import BLANKS, CLOSED_NUMBER, LARGEST, SHAPE, Cursor, SyntaxProblem
 
 CHECKSUM = "*"
 """Name of a checksum among the names of a block."""
@@ -63,14 +63,14 @@ class _Line(Cursor):
             end = text.find(b")", begin)
             strict = self.rules.parentheses == "comment"
             if end < 0 and strict:
-                raise Odd("comment is not closed", begin)
+                raise SyntaxProblem("comment is not closed", begin)
             if strict and text.find(b"(", begin + 1, end) >= 0:
-                raise Odd("comment within a comment", text.find(b"(", begin + 1))
+                raise SyntaxProblem("comment within a comment", text.find(b"(", begin + 1))
             self.at = end + 1 if end >= 0 else len(text)
         else:
             self.at = len(text)
         if self.rules.python and _ACTIVE.match(text, begin + 1):
-            raise Odd("comment runs Python", begin)
+            raise SyntaxProblem("comment runs Python", begin)
         self.comments.append((begin, self.at))
 
     def flow(self) -> None:
@@ -86,7 +86,7 @@ class _Line(Cursor):
         self.o_word = match[0].decode().lower()
         self.at = match.end()
         if self.o_word and self.rules.o_word == "program":
-            raise Odd("text after the number of a program", match.start())
+            raise SyntaxProblem("text after the number of a program", match.start())
         while byte := self.skip():
             if byte in b"(;":
                 self.comment()
@@ -95,23 +95,23 @@ class _Line(Cursor):
                 self.bracket()
                 self.o_arguments.append(self.text[begin : self.at])
             else:
-                raise Odd("text after an O-word", self.at)
+                raise SyntaxProblem("text after an O-word", self.at)
 
     def word(self) -> None:
         """Take one word."""
         begin = self.at
         letter = self.text[begin : begin + 1].decode().upper()
         if letter == "N" and (self.words or self.comments or self.names):
-            raise Odd("N stands behind something else", begin)
+            raise SyntaxProblem("N stands behind something else", begin)
         match = _WORD.match(self.text, begin)
         function = ""
         if self.rules.hexadecimal and _HEXADECIMAL.match(self.text, begin):
-            raise Odd("0X begins a hexadecimal number", self.at)
+            raise SyntaxProblem("0X begins a hexadecimal number", self.at)
         if match and SHAPE.fullmatch(match[2]):  # the usual case, made quick
             self.at = match.end(2)
             value: float | None = float(match[2])
             if not -LARGEST <= value <= LARGEST:  # type: ignore[operator]
-                raise Odd(f"'{match[2].decode()}' is beyond any machine", begin + 1)
+                raise SyntaxProblem(f"'{match[2].decode()}' is beyond any machine", begin + 1)
         else:
             self.at = begin + 1
             if self.rules.equals and self._equals(letter):
@@ -128,7 +128,7 @@ class _Line(Cursor):
             else:
                 value = self.number()
         if letter == "N" and (value is None or not self.text[begin + 1 :].lstrip()[:1].isdigit()):
-            raise Odd("N without a plain number", begin)
+            raise SyntaxProblem("N without a plain number", begin)
         text = self.text[begin : self.at]
         whole = value is not None and b"." not in text
         self.words.append(Word(letter, value, begin, self.at, text, whole, function))
@@ -141,7 +141,7 @@ class _Line(Cursor):
         if self.text[after : after + 1] != b"=":
             return False
         if match[0] and letter not in "TSMDHR" and self.rules.variables == "R":
-            raise Odd("axis with a number: not known here", self.at)
+            raise SyntaxProblem("axis with a number: not known here", self.at)
         self.at = after + 1
         self.skip()
         return True
@@ -169,13 +169,13 @@ class _Line(Cursor):
         match = _TO_BLANK.match(self.text, self.at)
         assert match is not None
         if not match[0]:
-            raise Odd("a value is missing", self.at)
+            raise SyntaxProblem("a value is missing", self.at)
         self.at = match.end() - (match[0].endswith(b")") and match[0].count(b"(") == 0)
         return None
 
     def _close(self) -> None:
         if self.skip() != b")":
-            raise Odd("parenthesis is not closed", self.at)
+            raise SyntaxProblem("parenthesis is not closed", self.at)
         self.at += 1
 
     def name(self) -> bool:
@@ -221,7 +221,7 @@ class _Line(Cursor):
                 if depth == 0:
                     self.at = at + 1
                     return
-        raise Odd("parenthesis is not closed", begin)
+        raise SyntaxProblem("parenthesis is not closed", begin)
 
     def keyword(self) -> bool:
         """Take a keyword of program flow and all that follows it, if one stands here."""
@@ -253,13 +253,13 @@ class _Line(Cursor):
         """Take a ``%``, with a name where the dialect gives it one."""
         rules, text = self.rules, self.text
         if rules.percent == "error":
-            raise Odd("'%' has no meaning here", self.at)
+            raise SyntaxProblem("'%' has no meaning here", self.at)
         if rules.percent == "lone":
             if text.strip(b" \t") != b"%":
-                raise Odd("text on the line of %", self.at + 1)
+                raise SyntaxProblem("text on the line of %", self.at + 1)
             self.at = len(text)
         elif any(word.letter != "N" for word in self.words):
-            raise Odd("% behind other words", self.at)
+            raise SyntaxProblem("% behind other words", self.at)
         else:
             self.at = _TO_BLANK.match(text, self.at).end()  # type: ignore[union-attr]
         self.percent = True
@@ -282,7 +282,7 @@ class _Line(Cursor):
             self.comment()
         elif byte == b";" and rules.semicolon == "end":
             if _BLOCK.fullmatch(text, self.at + 1):
-                raise Odd("another block behind the end of the block", self.at + 1)
+                raise SyntaxProblem("another block behind the end of the block", self.at + 1)
             self.comments.append((self.at, len(text)))
             self.at = len(text)
         elif byte == b"#" and rules.variables == "#":
@@ -303,9 +303,9 @@ class _Line(Cursor):
         elif rules.end and text.startswith(rules.end, self.at):
             self.at += len(rules.end)
             if self.skip() not in (b"", b";"):
-                raise Odd("text behind the end of the block", self.at)
+                raise SyntaxProblem("text behind the end of the block", self.at)
         else:
-            raise Odd(f"{_shown(byte)} has no meaning here", self.at)
+            raise SyntaxProblem(f"{_shown(byte)} has no meaning here", self.at)
 
 
 @lru_cache(maxsize=16)
@@ -344,12 +344,12 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     try:
         if len(text) > limit and text.strip(b" \t") != b"%":
             line.skip()
-            raise Odd(f"line is longer than {limit} bytes", limit)
+            raise SyntaxProblem(f"line is longer than {limit} bytes", limit)
         while line.skip():
             mark = line.at
             line.rest()
-    except Odd as odd:
-        problem, column, rest = odd.problem, odd.at + 1, text[mark:]
+    except SyntaxProblem as found:
+        problem, column, rest = found.problem, found.at + 1, text[mark:]
     return Block(
         tuple(line.words),
         tuple(line.comments),

@@ -2,7 +2,7 @@
 
 Rule: nothing is decoded or copied out; a word is a letter, a number and a span of the source. Only
 plain lines have their words here, a plain line being one of numbers behind letters that need no
-second look (`lexer` says which). All other lines are marked `odd`.
+second look (`lexer` says which). All other lines are marked `careful`.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ class Lines:
     end: NDArray[np.int64]
     terminator: NDArray[np.uint8]
     """0 none, 1 LF, 2 CR LF."""
-    odd: NDArray[np.bool_]
+    careful: NDArray[np.bool_]
     """The line needs the careful tokenizer; it has no words here."""
     letters: NDArray[np.uint32]
-    """Which of PLAIN_LETTERS stand on the line; 0 on odd ones."""
+    """Which of PLAIN_LETTERS stand on the line; 0 on those."""
     words: Words
     _columns: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]] = field(default_factory=dict)
 

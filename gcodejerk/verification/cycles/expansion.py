@@ -55,7 +55,7 @@ def check_expansion(
     names: tuple[str, str] = ("<original>", "<expanded>"),
     most: int = 100,
 ) -> Verification:
-    r"""Compare a program with what became of it when its cycles were written out.
+    r"""Compare a program with the same program after its cycles were written out.
 
     Parameters
     ----------
@@ -89,20 +89,24 @@ def check_expansion(
     ('moves of a cycle', 5, 3)
     """
     begin = original.tell()
-    walk = _Walk(Window(expanded), find_dialect(dialect), Start() if start is None else start, most)
+    proof = _Proof(
+        Window(expanded), find_dialect(dialect), Start() if start is None else start, most
+    )
     for chunk in read_chunks(original, names[0]):
-        if not walk.take(chunk):
+        if not proof.take(chunk):
             break
     else:
-        walk.end()
+        proof.end()
     # Where the tool stands in front of a hole, and in which modes, has so far one reader's word.
     start = Start() if start is None else start
     original.seek(begin)
-    confirmed = confirm_contexts(original, dialect, start, walk.contexts, walk.found)
-    return Verification(walk.holes, walk.written, walk.kept, walk.found.sorted(), names, confirmed)
+    confirmed = confirm_contexts(original, dialect, start, proof.contexts, proof.found)
+    return Verification(
+        proof.holes, proof.written, proof.kept, proof.found.sorted(), names, confirmed
+    )
 
 
-class _Walk:
+class _Proof:
     """Side by side through both files."""
 
     def __init__(self, theirs: Window, dialect: Dialect, start: Start, most: int) -> None:
@@ -146,12 +150,12 @@ class _Walk:
         """Take one line of the original; whether the walk can go on."""
         state, reader = self.reader.state, self.reader
         here, motion, ended = list(state.position), state.motion, state.ended
-        odd, inside = reader.odd_count, reader.inside
+        problems, inside = reader.problem_count, reader.inside
         reader.read_line(text, begin, number, terminator)
         state = reader.state
         bare = text.removesuffix(b"\r")
         block = parse_block(bare, self.dialect)
-        sure = odd == reader.odd_count and not (inside or reader.inside)
+        sure = problems == reader.problem_count and not (inside or reader.inside)
         sure = sure and not (block.block_delete or block.assigns or block.o_word is not None)
         sure = sure and all(word.value is not None for word in block.words)
         if not ended:

@@ -20,8 +20,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.physics.conventional import rapid_time
-from gcodejerk.verification.physics.feeds import NOT_OWN, judge_feeds, rapid_limits
-from gcodejerk.verification.physics.independent import judge_axes
+from gcodejerk.verification.physics.feeds import NOT_OWN, check_feeds, rapid_limits
+from gcodejerk.verification.physics.independent import check_axes
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import Array, Index, Paths
 from gcodejerk.verification.physics.residual import leaves_more
@@ -147,7 +147,7 @@ def check_dynamics(paths: Paths, machine: Machine, stride: int, found: Findings)
     highest = np.maximum(np.minimum(blocks * stride + stride - 1, most), fewest)
     count = np.clip(usual, fewest, highest)
     clock = Clock.of(paths, count, stride, blocks // 2)
-    best: list[Complaint | None] = _judge(paths, machine, clock)
+    best: list[Complaint | None] = _check_points(paths, machine, clock)
     # Another duration may fit where the usual one does not: nothing says which was meant.
     for other in range(stride if stride > 1 else 0):
         for late in (blocks // 2, (blocks - 1) // 2):
@@ -160,7 +160,7 @@ def check_dynamics(paths: Paths, machine: Machine, stride: int, found: Findings)
                 continue
             part = _take(paths, bad)
             clock = Clock.of(part, guess[bad], stride, late[bad])
-            for k, complaint in zip(bad.tolist(), _judge(part, machine, clock), strict=True):
+            for k, complaint in zip(bad.tolist(), _check_points(part, machine, clock), strict=True):
                 if complaint is None:
                     best[k] = None
     for k, complaint in enumerate(best):
@@ -178,15 +178,15 @@ class Complaint:
     problem: str
 
 
-def _judge(paths: Paths, machine: Machine, clock: Clock) -> list[Complaint | None]:
+def _check_points(paths: Paths, machine: Machine, clock: Clock) -> list[Complaint | None]:
     """Look at each stream under one guess of its times."""
     out: list[Complaint | None] = [None] * len(paths.begin)
     t: Array = np.asarray(clock.moment * machine.interval, dtype=np.float64)
     independent = machine.positioning != "linear"
     for kind, rows, problem in (
-        *(judge_axes(paths, machine, t, *_own_times(paths, machine)) if independent else ()),
+        *(check_axes(paths, machine, t, *_own_times(paths, machine)) if independent else ()),
         *_limits(paths, machine, t),
-        *judge_feeds(paths, machine, t, limits_of(machine)),
+        *check_feeds(paths, machine, t, limits_of(machine)),
     ):
         bad = np.flatnonzero(rows)
         owner = paths.owner[bad]

@@ -39,7 +39,7 @@ Rows = NDArray[np.bool_]
 Verdicts = list[tuple[Kind, Rows, str]]
 
 
-def judge_feeds(paths: Paths, machine: Machine, t: Array, limits: Array) -> Verdicts:
+def check_feeds(paths: Paths, machine: Machine, t: Array, limits: Array) -> Verdicts:
     """Judge the F words of streams; nothing where there are none.
 
     Parameters
@@ -58,17 +58,17 @@ def judge_feeds(paths: Paths, machine: Machine, t: Array, limits: Array) -> Verd
     inner[paths.begin] = False
     if not np.isfinite(speed[inner]).any():
         return []
-    judge = _Judge(paths, machine, t, limits, speed, length)
+    check = _FeedCheck(paths, machine, t, limits, speed, length)
     out = [
         (Kind.FEED, inner & ~(paths.feed > 0.0), "F must be above zero"),
-        judge.mean(),
-        judge.most(),
+        check.mean(),
+        check.most(),
     ]
     if machine.positioning == "linear":
         # Symmetry first: it says more than that some motion or other would be possible.
-        out += [judge.conventional(), judge.mirror(), *judge.motion()]
+        out += [check.conventional(), check.mirror(), *check.motion()]
     else:
-        out.append(judge.bounds())
+        out.append(check.bounds())
     return out
 
 
@@ -88,7 +88,7 @@ def rapid_limits(paths: Paths, machine: Machine) -> Array:
     return out
 
 
-class _Judge:
+class _FeedCheck:
     """The tests; rows are those of the paths, a block belongs to the row in which it ends."""
 
     def __init__(

@@ -27,7 +27,7 @@ MIDDLE = (0.5, 1.5)
 """Share of half the time in which the mean moment of any other profile lies."""
 
 
-def judge_axes(
+def check_axes(
     paths: Paths, machine: Machine, t: Array, usual: Array, most: Array
 ) -> list[tuple[Kind, Rows, str]]:
     """Judge when each axis moves.

@@ -20,7 +20,7 @@ from gcodejerk.units import MM_PER_INCH
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.known import Facts
 from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
-from gcodejerk.verification.second_reading.tracking import Sighting, Tracker
+from gcodejerk.verification.second_reading.tracking import Observation, Tracker
 
 MARK = b"\xef\xbb\xbf"
 """Of UTF-8, in front of the first line."""
@@ -63,7 +63,7 @@ def confirm(
         return 0
     confirmed = 0
     lines = rapids.line[index].tolist()
-    for k, seen in sightings(original, find_dialect(dialect), start, lines):
+    for k, seen in observations(original, find_dialect(dialect), start, lines):
         i = index[k]
         problem = _disagreement(seen, rapids, i)
         if problem:
@@ -87,7 +87,7 @@ class Context:
     start: Sequence[float]
     """Positions in front of it. [mm, deg]"""
     modes: Mapping[str, Any]
-    """In force behind it, by the names of `Sighting.modes`."""
+    """In force behind it, by the names of `Observation.modes`."""
 
 
 def confirm_contexts(
@@ -119,7 +119,7 @@ def confirm_contexts(
     """
     confirmed = 0
     lines = [context.line for context in contexts]
-    for k, seen in sightings(original, find_dialect(dialect), start, lines):
+    for k, seen in observations(original, find_dialect(dialect), start, lines):
         context = contexts[k]
         problem, known = "", bool(seen.modes)
         for axis, here in enumerate(seen.start):
@@ -145,9 +145,9 @@ def confirm_contexts(
     return confirmed
 
 
-def sightings(
+def observations(
     original: BinaryIO, dialect: Dialect, start: Start, lines: list[int]
-) -> Iterator[tuple[int, Sighting]]:
+) -> Iterator[tuple[int, Observation]]:
     """What the second reading sees in these lines.
 
     Parameters
@@ -165,7 +165,7 @@ def sightings(
     ------
     k : int
         Index into `lines`.
-    seen : Sighting
+    seen : Observation
     """
     begin = original.tell()
     doubt = jumps_back(original, dialect)
@@ -189,7 +189,7 @@ def sightings(
                 tracker.run(run[0])
                 number, at = number + run[0].lines, run[1]
                 while line < number:
-                    yield following, Sighting(against="it moves with feed")
+                    yield following, Observation(against="it moves with feed")
                     line, following = next(wanted), following + 1
                 continue
             end = data.find(b"\n", at)
@@ -235,7 +235,7 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
     return tracker
 
 
-def _disagreement(seen: Sighting, rapids: Rapids, i: int) -> str:
+def _disagreement(seen: Observation, rapids: Rapids, i: int) -> str:
     """In what the two readings differ; empty where they do not."""
     if seen.against:
         return f"this rapid had to be left alone, since {seen.against}"
@@ -258,7 +258,7 @@ def _disagreement(seen: Sighting, rapids: Rapids, i: int) -> str:
     return _tolerances(seen, rapids, i)
 
 
-def _tolerances(seen: Sighting, rapids: Rapids, i: int) -> str:
+def _tolerances(seen: Observation, rapids: Rapids, i: int) -> str:
     """P and Q of G64, which may be absent."""
     if seen.modes["path"] is None or not rapids.path[i]:
         return ""
@@ -284,7 +284,7 @@ def _told(rapids: Rapids, i: int) -> dict[str, Any]:
     }
 
 
-def _is_known(seen: Sighting, rapids: Rapids, i: int) -> bool:
+def _is_known(seen: Observation, rapids: Rapids, i: int) -> bool:
     """Whether the second reading knows all that `nc` says of a rapid."""
     if not seen.sure:
         return False

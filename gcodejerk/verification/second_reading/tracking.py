@@ -33,7 +33,7 @@ _STOPS = (0, 1, 60)
 
 
 @dataclass(slots=True)
-class Sighting:
+class Observation:
     """A line as the second reading sees it; None and NaN where it does not know."""
 
     against: str | None = None
@@ -88,21 +88,21 @@ class Tracker(Codes):
     def _matters(self, whole: bool) -> bool:
         return whole and self.dialect.whole_numbers == "machine"
 
-    def follow(self, line: Line) -> Sighting:
+    def follow(self, line: Line) -> Observation:
         """Execute a line, and tell what it was."""
         if line.percent:
             self._percent(line)
-            return Sighting()
+            return Observation()
         if line.flow is not None:
             self._flow(line.flow)
-            return Sighting()
+            return Observation()
         if line.offsets and self.dialect.arithmetic.at_selection:
             self.systems = {}
         elif line.offsets:
             self.written()
         if line.understood and not line.words and not line.effects:
             self.started = self.started or not line.blank
-            return Sighting()
+            return Observation()
         self.begun = self.started = True
         if not line.deleted:
             return self._execute(line)
@@ -112,7 +112,7 @@ class Tracker(Codes):
             vars(self).update(vars(before))
         else:
             self.join(before)
-        return Sighting(against="the operator may skip it")
+        return Observation(against="the operator may skip it")
 
     def _percent(self, line: Line) -> None:
         if not line.understood:
@@ -142,18 +142,18 @@ class Tracker(Codes):
         self.doubt = self.doubt or keyword == "DO" or self.depth < 0
         self.unknown_call()
 
-    def _execute(self, line: Line) -> Sighting:
+    def _execute(self, line: Line) -> Observation:
         """Execute words, the modal ones in front of the motion."""
         dialect = self.dialect
         if line.understood and line.effects and _WRITES.issuperset(line.effects):
             for effect in line.effects:
                 self.write(effect, line)
-            return Sighting()
+            return Observation()
         if not line.understood or any(effect not in QUIET for effect in line.effects):
             return self._lost(line)
         if self.contour is not None:
             self._in_contour(line)
-            return Sighting()
+            return Observation()
         block = Sorted()
         if not block.sort(line, dialect, self.unit == INCH, self.facts.decimal_point):
             return self._lost(line)
@@ -166,7 +166,7 @@ class Tracker(Codes):
             seen.sure = False
         return seen
 
-    def _lost(self, line: Line) -> Sighting:
+    def _lost(self, line: Line) -> Observation:
         """A line that is not understood."""
         # M3 I: a letter without a number is no word
         fires = any(letter == "M" and number in (3, 4) for letter, number, _ in line.words)
@@ -174,7 +174,7 @@ class Tracker(Codes):
         if any(effect in ("transform", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
-        return Sighting()
+        return Observation()
 
     def _in_contour(self, line: Line) -> None:
         self.lose()
@@ -182,7 +182,7 @@ class Tracker(Codes):
         if any(letter == "N" and number == self.contour for letter, number, _ in line.words):
             self.contour = None
 
-    def _run_block(self, block: Sorted) -> Sighting:
+    def _run_block(self, block: Sorted) -> Observation:
         dialect, g, values = self.dialect, block.g, block.values
         effects = {code: dialect.effect(code) for code in g.values()}
         burnt = self.spindle != 5
@@ -214,7 +214,7 @@ class Tracker(Codes):
         for code, effect in effects.items():
             self.effect(effect, code, values)
         motion = g.get("motion")
-        seen = Sighting(against=against, axes=block.axes)
+        seen = Observation(against=against, axes=block.axes)
         if kinds & _MOVES or (dialect.one_command and not g and not block.m):
             if motion is not None:
                 self._motion(motion)
@@ -273,7 +273,7 @@ class Tracker(Codes):
         if code not in self.dialect.cycles:
             self.cycle = None
 
-    def _move(self, block: Sorted, kinds: set[Effect], seen: Sighting) -> None:
+    def _move(self, block: Sorted, kinds: set[Effect], seen: Observation) -> None:
         """Move the axes, or whatever the block makes of its axis words."""
         dialect, g, values = self.dialect, block.g, block.values
         seen.start = list(self.at)
@@ -322,7 +322,7 @@ class Tracker(Codes):
             self.lose("".join(a for k, a in enumerate(AXES) if block.axes >> k & 1))
         else:
             self._go(block)
-        self._judge(block, seen)
+        self._why_not(block, seen)
 
     def _go(self, block: Sorted) -> None:
         """To where the words say."""
@@ -338,7 +338,7 @@ class Tracker(Codes):
                     there = self.turn(k, there)
                 self.at[k] = NAN if distance is None else there
 
-    def _judge(self, block: Sorted, seen: Sighting) -> None:
+    def _why_not(self, block: Sorted, seen: Observation) -> None:
         """Whether the move was a rapid in a known frame."""
         compensation = self.g.get("compensation")
         if compensation != 400:
@@ -359,7 +359,7 @@ class Tracker(Codes):
         if self.depth or self.doubt:
             seen.against = None
 
-    def _barred(self, block: Sorted, seen: Sighting) -> str | None:
+    def _barred(self, block: Sorted, seen: Observation) -> str | None:
         """What else speaks against rewriting the move."""
         for name, on in self.bars.items():
             if on:

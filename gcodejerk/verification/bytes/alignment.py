@@ -24,7 +24,7 @@ _TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400")
 """How a stream may begin."""
 
 
-class Walk:
+class Alignment:
     """One walk through an original and what was made of it."""
 
     def __init__(
