@@ -1,8 +1,9 @@
 """Which block runs next: the main program in the order of the file, and what it enters.
 
 Rule: the file is read once, forwards. What may run more than once, or from elsewhere, is followed
-by `passes` (LinuxCNC's structures, which are collected until they are complete) or `calls`
-(subprograms that stand somewhere else in the file); where that is not possible, `Flow` forgets.
+by `flow.o_words` (LinuxCNC's structures, which are collected until they are complete) or
+`flow.subprograms` (those that stand somewhere else in the file); where that is not possible,
+`flow.branches` forgets.
 """
 
 from __future__ import annotations

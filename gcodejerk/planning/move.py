@@ -1,6 +1,6 @@
 """One move: the library's way to plan without a program.
 
-This module owns `Plan`, a view of one row of `plan.Plans` with its stream, in the words of a user.
+This module owns `Plan`, a view of one row of `plans.Plans` with its stream, in the words of a user.
 """
 
 from __future__ import annotations

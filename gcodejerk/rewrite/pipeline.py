@@ -1,7 +1,7 @@
 """The main job: a program in, the same program with its rapids re-timed out.
 
 This module owns the order of the steps: read, plan, write, verify. Files, names and renames are in
-`files.py`; here a program is an open binary file, whatever its size, and the output another.
+`batch.files`; here a program is an open binary file, whatever its size, and the output another.
 
 Rule 1: what is not a planned rapid's block is copied from the source, byte for byte.
 Rule 2: nothing is given back that `verify` has not accepted (unless the user switched it off).

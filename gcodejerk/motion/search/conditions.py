@@ -1,8 +1,8 @@
 r"""Conditions I and II as designs: the paper's other two families, at their best T1.
 
 This module owns the search for T1 in the families of four segments that are not symmetric. Their
-closed forms stand in `conditions.py`; here they are profiles like all others, so that they compete
-under the same limits and the same objective.
+closed forms stand in `motion.profiles.conditions`; here they are profiles like all others, so that
+they compete under the same limits and the same objective.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 r"""The convex programme behind the optimum: jerks of a move, its limits, and what it leaves.
 
 This module owns the programme and its solver. Which blocks and which frequencies it is asked for,
-`optimal.py` decides. Sought are jerks :math:`j_i`, constant within blocks of whole intervals, with
+`optimal` decides. Sought are jerks :math:`j_i`, constant within blocks of whole intervals, with
 
 * rest at both ends and the given length (linear equations),
 * :math:`|j| \le J`, :math:`|a| \le A` and :math:`0 \le v \le V` (linear inequalities; v is a

@@ -1,6 +1,6 @@
 """Running one block: the modal state moves on, and a rapid is entered with its reason.
 
-Rule: whoever decides which block runs next (`reader`, `passes`, `calls`) hands it over here, so
+Rule: whoever decides which block runs next (`nc.reader`, `nc.flow`) hands it over here, so
 that a block does the same wherever it is run from.
 """
 

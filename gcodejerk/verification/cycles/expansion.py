@@ -1,8 +1,8 @@
 """Proof that a program with its drilling cycles written out makes the moves that they call for.
 
 Both files are walked side by side, each block of the original against what stands in its place.
-What a cycle means, `cycles` says; nothing is shared with those who write cycles out (`nc.drilling`,
-`nc.series`, `nc.expansion`) but the reading of the original: its words, and what is in force there.
+What a cycle means, `holes` says; nothing is shared with the room that writes cycles out
+(`gcodejerk.cycles`) but the reading of the original: its words, and what is in force there.
 
 Rule: a series is written out whole or not at all; everything else is kept byte for byte.
 """

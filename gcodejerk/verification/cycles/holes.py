@@ -1,9 +1,9 @@
 """What drilling cycles mean, told a second time: the places that the tool visits for each hole.
 
-By this measure `verification.expansion` judges cycles that were written out. It follows the
-description of the cycles in LinuxCNC's manual and shares nothing with `nc.drilling`, `nc.series`
-and `nc.expansion`, which write them; the words of a block and what is in force there come from the
-reader, as everywhere in this package.
+By this measure `expansion` beside it judges cycles that were written out. It follows the
+description of the cycles in LinuxCNC's manual and shares nothing with the room `gcodejerk.cycles`,
+which writes them; the words of a block and what is in force there come from the reader, as
+everywhere in this package.
 
 Rule: every number is exact, and every place absolute where the program tells it; a place that it
 does not tell has an origin of its own, so that increments can be compared all the same.
