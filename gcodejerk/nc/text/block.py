@@ -1,6 +1,6 @@
 """One line of a program as the careful tokenizer sees it: words, comments, what is wrong with it.
 
-Rule: a block is what is written, not what it means. Meaning needs the modal state (`nc.interpreter.modal`).
+Rule: a block is what is written, not what it means. Meaning needs the modal state (`modal`).
 """
 
 from __future__ import annotations
