@@ -2,6 +2,9 @@
 
 `import gcodejerk` is cheap: each name below is loaded when it is first used.
 
+What is promised from one version to the next: the names in `__all__`, what `gcodejerk.testing` and
+`gcodejerk.emit.base` export, and `gcodejerk.nc.read_program`. Everything else may move.
+
 Examples
 --------
 >>> import gcodejerk
@@ -33,6 +36,7 @@ if TYPE_CHECKING:
     from gcodejerk.motion.maps import amplitude_map
     from gcodejerk.planning.move import Plan, plan_move
     from gcodejerk.rewrite.pipeline import Result, process
+    from gcodejerk.rewrite.rapid_result import RapidResult
     from gcodejerk.verification import Verification, verify
 
 _HOMES = {
@@ -45,6 +49,7 @@ _HOMES = {
     "gcodejerk.motion.maps": ("amplitude_map",),
     "gcodejerk.planning.move": ("Plan", "plan_move"),
     "gcodejerk.rewrite.pipeline": ("Result", "process"),
+    "gcodejerk.rewrite.rapid_result": ("RapidResult",),
     "gcodejerk.verification": ("Verification", "verify"),
 }  # fmt: skip
 
@@ -56,6 +61,7 @@ __all__ = [
     "Plan",
     "PlanError",
     "ProgramError",
+    "RapidResult",
     "Result",
     "Verification",
     "VerifyError",

@@ -50,12 +50,14 @@ def plan(
 ) -> None:
     """Plan one move: its profile, peaks and residuals, the conventional ones beside it."""
     from gcodejerk.batch.files import new_file
-    from gcodejerk.planning.move import plan_move
+    from gcodejerk.planning.move import not_planned, plan_move
     from gcodejerk.report.records import conventional_motion, dump, move_record, stream_csv
     from gcodejerk.report.tables import move_limit, move_tables
 
     described = load_machine(machine, None)
     planned = plan_move(_displacement(moves), described, profile, time=time, T1=t1)
+    if not planned.planned:
+        raise not_planned(planned.reason or "")
     record = move_record(planned)
     with ExitStack() as outputs:
         if csv is not None:

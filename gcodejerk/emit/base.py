@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import difflib
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
-from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,33 +51,44 @@ class Options:
     """In which the program is written, and the streams in it."""
 
 
-class Controller(Protocol):
-    """An emitter; `name` is its entry point's, `api` is 1."""
+class Controller(ABC):
+    """An emitter: what every one has, and what most leave as it is here.
 
-    name: str
-    api: int
-    in_place: bool
+    A controller of another package derives from this class, or from `emit.gcode.GcodeController`
+    where it writes G1 blocks, and is found by its entry point. `load_controller` says what is
+    missing.
+    """
+
+    name: str = ""
+    """That of its entry point."""
+    api: int = API
+    """Of this class, as it was when the emitter was written."""
+    in_place: bool = True
     """The streams replace blocks of the program; otherwise they are a file of their own."""
-    suffix: str
+    suffix: str = ""
     """Of the output's name; empty for that of the input."""
-    forms: tuple[Form, ...]
+    unblended: str = ""
+    """Axes between whose blocks the control stops: their rapids are left alone."""
+    forms: tuple[Form, ...] = ()
+    """What it can write; at least one."""
 
     def stride(self, interval: float) -> int:
         """Intervals from one written point to the next."""
-        ...
+        return 1
 
+    @abstractmethod
     def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """Steps and origins for all rapids of a program."""
-        ...
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What a user of these streams has to know."""
-        ...
+        return []
 
     def header(self, machine: Machine) -> bytes:
         """First lines of a file of its own; empty for streams in place."""
-        ...
+        return b""
 
+    @abstractmethod
     def render(
         self,
         batch: Batch,
@@ -106,7 +117,6 @@ class Controller(Protocol):
         list of bytes
             b texts, each with its line end.
         """
-        ...
 
 
 def controllers() -> dict[str, EntryPoint]:
@@ -153,7 +163,19 @@ def load_controller(name: str) -> Controller:
             f"controller {name!r} of {origin} has api {getattr(made, 'api', None)}, expected {API}",
             "install a version of it that fits this gcodejerk",
         )
-    return cast(Controller, made)
+    if not isinstance(made, Controller):
+        raise EmitError(
+            f"controller {name!r} of {origin} is a {type(made).__name__}, which is no "
+            "gcodejerk.emit.base.Controller",
+            "derive its class from that one",
+        )
+    if made.name != name or not made.forms:
+        lacks = f"calls itself {made.name!r}" if made.name != name else "has no forms"
+        raise EmitError(
+            f"controller {name!r} of {origin} {lacks}",
+            f"give its class name = {name!r} and at least one Form",
+        )
+    return made
 
 
 def decimal_step(resolution: float) -> tuple[int, int]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Form, Options, decimal_step, step_sizes
+from gcodejerk.emit.base import Controller, Form, Options, decimal_step, step_sizes
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
@@ -22,11 +22,10 @@ from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import FINE_DECIMALS, Batch, NumberFormat
 
 
-class CsvController:
+class CsvController(Controller):
     """Writes ``block,t,X,Y,Z`` (contract: one row per interval)."""
 
     name = "csv"
-    api = 1
     in_place = False
     suffix = ".csv"
     forms = (Form("stream", "measured", "read back and compared by the project's tests"),)

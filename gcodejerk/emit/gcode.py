@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Form, Options, axis_steps, step_sizes
+from gcodejerk.emit.base import Controller, Options, axis_steps, step_sizes
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
@@ -54,16 +54,8 @@ LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
 """By `Rapids.terminator`."""
 
 
-class GcodeController:
+class GcodeController(Controller):
     """Writes G1 blocks of 2 ms with end-point speeds; a control adds its name and its facts."""
-
-    name = ""
-    api = 1
-    in_place = True
-    suffix = ""
-    unblended = ""
-    """Axes between whose blocks the control stops: their rapids are left alone."""
-    forms: tuple[Form, ...] = ()
 
     def stride(self, interval: float) -> int:
         """About 2 ms."""
@@ -84,10 +76,6 @@ class GcodeController:
             for form in self.forms
             if form.confidence == "unverified" and plans.planned.any()
         ]
-
-    def header(self, machine: Machine) -> bytes:
-        """Nothing: the streams stand in the program."""
-        return b""
 
     def render(
         self,

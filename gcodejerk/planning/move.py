@@ -19,7 +19,7 @@ from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Batch, NumberFormat, make_streams
-from gcodejerk.reasons import CERTAIN, REASONS
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,12 +36,24 @@ class Plan:
         The plan as columns of one row.
     batch : Batch
         Its stream.
+    planned : bool
+        A stream would be written. Otherwise the controller makes the move by itself, as it does
+        today, and this is what it does, though a stream of it would break the machine's limits.
+    reason : str or None
+        Why the conventional profile stays where another was asked for.
     """
 
     machine: Machine
     displacement: dict[str, float]
     plans: Plans
     batch: Batch
+    planned: bool = True
+    reason: str | None = None
+
+    def __repr__(self) -> str:
+        moved = " ".join(f"{axis}{length:g}" for axis, length in self.displacement.items())
+        why = f" ({self.reason})" if self.reason else ""
+        return f"<Plan {moved}: {self.profile}{why}, {self.time:g} s on {self.machine.name!r}>"
 
     @property
     def time(self) -> float:
@@ -143,11 +155,13 @@ def plan_move(
     Returns
     -------
     Plan
+        Of the conventional profile, with the reason, where nothing better exists.
 
     Raises
     ------
     PlanError
-        An axis is unknown, nothing moves, or no profile keeps the limits.
+        An axis is unknown, nothing moves, or no profile keeps the limits in the time or with the T1
+        that was asked for.
 
     Examples
     --------
@@ -162,18 +176,28 @@ def plan_move(
     row = displacement_row(displacement, machine)
     check_time(time)
     plans = plan_moves(row, machine, profile, time=time, T1=T1)
-    if plans.reason[0] != CERTAIN:
-        reason = REASONS[plans.reason[0]]
-        raise PlanError(
-            f"the move is not planned: {reason}",
-            "a controller would make it by itself; see 'What is left alone' in the README",
-        )
+    why = None if plans.reason[0] == CERTAIN else REASONS[plans.reason[0]]
+    if why in (Reason.LIMITS, Reason.NOT_BETTER):
+        plans = plan_moves(row, machine, "conventional", as_today=True)
+    elif why is not None:
+        raise not_planned(why)
     step = np.ones(len(AXES))
     for described in machine.axes:
         step[AXES.index(described.name)] = described.resolution
     zero = np.zeros((1, len(AXES)))
     ((batch,),) = make_streams(plans, NumberFormat(zero, step[np.newaxis, :], zero), 1)
-    return Plan(machine, {a.upper(): float(x) for a, x in displacement.items()}, plans, batch)
+    named = {a.upper(): float(x) for a, x in displacement.items()}
+    stays = bool(batch.stays_conventional[0]) and plans.designed != "conventional"
+    reason = why or (Reason.NOT_BETTER if stays else None)
+    return Plan(machine, named, plans, batch, why is None, None if reason is None else str(reason))
+
+
+def not_planned(reason: str) -> PlanError:
+    """The refusal of a move that a controller makes better by itself, or that is none."""
+    return PlanError(
+        f"the move is not planned: {reason}",
+        "a controller would make it by itself; see 'What is left alone' in the README",
+    )
 
 
 def displacement_row(displacement: Mapping[str, float], machine: Machine) -> Array:

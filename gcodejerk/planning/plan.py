@@ -45,12 +45,14 @@ def plan_moves(
     displacement: Array,
     machine: Machine,
     profile: str | None = None,
+    *,
     reason: NDArray[np.uint8] | None = None,
     time: float | None = None,
     T1: float | None = None,
     progress: Progress | None = None,
     speed: Array | None = None,
     lone: NDArray[np.bool_] | None = None,
+    as_today: bool = False,
 ) -> Plans:
     """Plan moves, all of them together.
 
@@ -75,6 +77,9 @@ def plan_moves(
         [mm/s]
     lone : ndarray of bool, shape (n,), optional
         No other motion follows directly (`Axis.conventional`); all of them by default.
+    as_today : bool, optional
+        Profile `conventional` as the controller has it, also where a stream could not be written
+        within the limits: to look at, not to emit.
 
     Returns
     -------
@@ -107,9 +112,11 @@ def plan_moves(
             f"the time is {time:g} s, more than {MOST_INTERVALS} intervals ({longest:g} s)",
             "give a shorter one",
         )
-    return _Planner(
+    planner = _Planner(
         machine, profile, displacement, length, reason, time, T1, progress, speed, lone
-    ).run()
+    )
+    planner.as_today = as_today
+    return planner.run()
 
 
 def plan_rapids(
@@ -191,8 +198,8 @@ def plan_rapids(
         # Those keep the profile or save time; all others do nothing but keep modes still.
         _rule_out(reason, length > 0.0, Reason.NO_MODE)
     return plan_moves(
-        displacement, machine, profile, reason,
-        progress=progress, speed=rapids.speed, lone=rapids.lone,
+        displacement, machine, profile,
+        reason=reason, progress=progress, speed=rapids.speed, lone=rapids.lone,
     )  # fmt: skip
 
 
@@ -218,6 +225,7 @@ class _Planner:
         lone: NDArray[np.bool_] | None,
     ) -> None:
         self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
+        self.as_today = False
         self.displacement, self.length, self.reason = displacement, length, reason
         self.modes = Modes.of(machine)
         self.interval = machine.interval
@@ -261,6 +269,8 @@ class _Planner:
     def _conventional(self, counts: NDArray[np.int64]) -> tuple[Profiles, NDArray[np.bool_]]:
         """The controller's own profiles; a trapezoid cannot be written with finite jerk."""
         profiles = self.conventional
+        if self.as_today:
+            return profiles, np.ones(len(profiles), dtype=bool)
         if self.time is not None:
             profiles = profiles.stretched(counts * self.interval / profiles.total)
         return profiles, self._within_limits(profiles)

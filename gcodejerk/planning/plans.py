@@ -124,7 +124,7 @@ class Plans:
     stays_conventional : ndarray of bool, shape (l,)
         The profile is the conventional one, because none is better.
     designed : str
-        Name of the profile that all other profiles follow.
+        Name of all other profiles.
     """
 
     machine: Machine
@@ -145,15 +145,19 @@ class Plans:
     def __len__(self) -> int:
         return len(self.reason)
 
+    def __repr__(self) -> str:
+        planned = int(np.count_nonzero(self.planned))
+        return f"<Plans: {planned} of {len(self)} moves, {self.designed}>"
+
     @property
     def planned(self) -> NDArray[np.bool_]:
         """Which moves are planned, shape (n,)."""
         planned: NDArray[np.bool_] = self.reason == CERTAIN
         return planned
 
-    def profile(self, profile: int) -> str:
-        """Name of the profile that a profile follows."""
-        return "conventional" if self.stays_conventional[profile] else self.designed
+    def profile_name(self, entry: int) -> str:
+        """Name of one of the l profiles: what was designed, or conventional."""
+        return "conventional" if self.stays_conventional[entry] else self.designed
 
     def excited(self, move: int) -> list[int]:
         """The entries of the modes that a move excites."""

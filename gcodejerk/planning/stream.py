@@ -114,6 +114,9 @@ class Batch:
     def __len__(self) -> int:
         return len(self.moves)
 
+    def __repr__(self) -> str:
+        return f"<Batch: {len(self)} streams of up to {self.grid.knots.shape[1]} points>"
+
     def positions(self, row: int) -> tuple[Array, Array]:
         """Moments [s] and positions [mm], shape (k, 9), of one move as written; ends exact."""
         knots = self.grid.knots[row]

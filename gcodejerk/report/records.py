@@ -129,11 +129,11 @@ class Records:
         }
         if planned:
             of_move = plans.profiles_of(row)
-            stays_conventional = bool(self.stays_conventional[row])
+            stays = bool(self.stays_conventional[row])
             record |= {
                 "time": number(float(plans.counts[row]) * plans.machine.interval),
                 "extension": number(float(self.extension[row])),
-                "profile": "conventional" if stays_conventional else plans.profile(of_move.start),
+                "profile": "conventional" if stays else plans.profile_name(of_move.start),
                 "segments": self._segments(row, of_move),
                 "peak": self._peak(of_move),
                 "residual": self._residual(row),

@@ -1,8 +1,8 @@
 """Programs whose drilling cycles are written out: their proof, and their way back to the original.
 
 A program goes through the pipeline with its cycles written out (`cycles.expansion`); whoever reads
-the results has the original in hand. This module owns what connects the two: the proof that both make
-the same moves, and lines, rapids and differences in terms of the original.
+the results has the original in hand. This module owns what connects the two: the proof that both
+make the same moves, and lines, rapids and differences in terms of the original.
 
 Rule: how an expanded program came about proves nothing. `verification` compares it with the
 original by means of its own, and the processed program with it.

@@ -37,6 +37,7 @@ from gcodejerk.rewrite.expanded import (
     written_out,
 )
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
+from gcodejerk.rewrite.rapid_result import RapidResult, rapid_results
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.stamp import stamp_text
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
@@ -113,6 +114,17 @@ class Result:
     expansion: Expansion | None
     notes: tuple[str, ...]
     output: bytes | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return f"<Result {self.program.name}: {self.planned} of {len(self.plans)} rapids rewritten>"
+
+    @property
+    def rapids(self) -> tuple[RapidResult, ...]:
+        """Every rapid of the program, one record each, in the order of the file."""
+        return rapid_results(
+            self.program, self.plans, self.stays_conventional, self.residual,
+            self.conventional_residual,
+        )  # fmt: skip
 
     @property
     def planned(self) -> int:
@@ -288,8 +300,7 @@ def _process(
         machine,
         settings.profile,
         lambda done, total: report("planning", done, total),
-        # Controllers of other packages need not know of this.
-        getattr(emitter, "unblended", "") if emitter.in_place else "",
+        emitter.unblended if emitter.in_place else "",
         only_gains=True,
     )
     collected = Residuals(plans)

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit import API, base, controllers, load_controller
+from gcodejerk.emit.base import Controller, Form
+from gcodejerk.emit.gcode import GcodeController
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 
@@ -31,6 +33,11 @@ def test_an_unknown_controller_is_refused_with_the_nearest():
     assert "csv" in caught.value.remedy
 
 
+class Foreign(GcodeController):
+    name = "foreign"
+    forms = (Form("stream", "unverified", "nobody has tried it"),)
+
+
 def plug_in(monkeypatch, make):
     """Install one foreign emitter that is made by a function."""
     entry = SimpleNamespace(load=lambda: make, dist=SimpleNamespace(name="other", version="2.1"))
@@ -38,9 +45,26 @@ def plug_in(monkeypatch, make):
 
 
 def test_a_foreign_emitter_is_loaded_through_its_entry_point(monkeypatch):
-    made = SimpleNamespace(api=API)
-    plug_in(monkeypatch, lambda: made)
-    assert load_controller("foreign") is made
+    plug_in(monkeypatch, Foreign)
+    assert isinstance(load_controller("foreign"), Foreign)
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (
+            lambda: SimpleNamespace(api=API),
+            r"is a SimpleNamespace, which is no",
+        ),
+        (type("Nameless", (Foreign,), {"name": ""}), r"calls itself ''"),
+        (type("Formless", (Foreign,), {"forms": ()}), r"has no forms"),
+        (type("Mute", (Controller,), {}), r"cannot be loaded: TypeError: .*abstract.*render"),
+    ],
+)
+def test_what_an_emitter_lacks_is_told_when_it_is_loaded(monkeypatch, make, problem):
+    plug_in(monkeypatch, make)
+    with pytest.raises(EmitError, match=rf"'foreign' of other 2\.1 {problem}"):
+        load_controller("foreign")
 
 
 def test_an_emitter_for_another_version_is_refused_with_its_package(monkeypatch):

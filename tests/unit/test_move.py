@@ -160,11 +160,32 @@ def test_a_move_that_cannot_be_planned_is_refused_with_its_reason(row, arguments
     assert caught.value.remedy
 
 
-def test_a_move_that_no_profile_improves_is_refused_by_name():
+def test_a_move_that_no_profile_improves_stays_as_it_is_today_and_says_why():
     # 2.9 s of cruise and 0.2 s of ramps are whole periods of 17 Hz together: the trapezoid's null.
     machine = Machine.loads(
         "interval: 0.001\npositioning: linear\naxes:\n  X: {rapid: {velocity: 100, "
         "acceleration: 500}, limit: {acceleration: 1000}, modes: [{frequency: 17, damping: 0}]}\n"
     )
-    with pytest.raises(PlanError, match="no profile within the limits is better"):
-        plan_move({"X": 300.0}, machine)
+    plan = plan_move({"X": 300.0}, machine)
+    assert (plan.planned, plan.reason) == (False, "no profile within the limits is better")
+    assert (plan.profile, plan.conventional_time) == ("conventional", pytest.approx(3.2))
+    assert plan.time == pytest.approx(3.2)
+    # A trapezoid: 0.2 s up at 500 mm/s^2, 2.8 s at 100 mm/s, 0.2 s down.
+    t = plan.t
+    up, down = 250.0 * np.minimum(t, 0.2) ** 2, 250.0 * np.clip(t - 3.0, 0.0, 0.2) ** 2
+    exact = up + 100.0 * np.clip(t - 0.2, 0.0, 3.0) - down
+    np.testing.assert_allclose(plan.positions["X"], exact, atol=0.00051)
+    assert repr(plan) == (
+        "<Plan X300: conventional (no profile within the limits is better), 3.2 s on '<machine>'>"
+    )
+
+
+def test_a_move_that_the_limits_leave_no_room_for_stays_as_it_is_today():
+    machine = Machine.loads(
+        "interval: 0.001\npositioning: linear\naxes:\n  X: {rapid: {velocity: 100, "
+        "acceleration: 500}, limit: {jerk: 1000}, modes: [{frequency: 17, damping: 0}]}\n"
+    )
+    plan = plan_move({"X": 10.0}, machine)
+    assert (plan.planned, plan.reason) == (False, "limits cannot be met")
+    assert plan.profile == "conventional"
+    np.testing.assert_array_equal(plan.residual, plan.conventional_residual)

@@ -195,7 +195,7 @@ def test_where_the_conventional_law_is_still_already_it_stays():
     )
     plans = plan_moves(moves({"Z": four_jerk_segments(0.080, 1e5)}), machine)
     assert plans.stays_conventional.tolist() == [True]
-    assert plans.profile(0) == "conventional"
+    assert plans.profile_name(0) == "conventional"
     assert durations(plans.profiles, 0) == pytest.approx([0.02] * 4)
 
 

@@ -7,6 +7,7 @@ import pytest
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import read_program
+from gcodejerk.report.records import process_record
 from gcodejerk.rewrite.pipeline import Settings, process, process_file
 
 VMC = Machine.load(find_machine("vmc"))
@@ -130,3 +131,33 @@ def test_progress_goes_through_all_steps():
         "verifying",
     ]
     assert all(done <= total for _, done, total in seen)
+
+
+def test_a_result_has_one_record_for_each_rapid():
+    result = process(PROGRAM, VMC)
+    records = result.rapids
+    assert [r.line for r in records] == result.program.rapids.line.tolist()
+    assert sum(r.rewritten for r in records) == result.planned > 0
+    blocks = [""] * len(records)
+    report = process_record(result, VMC, None, blocks)["rapids"]
+    assert len(records) == len(report)
+    for mine, told in zip(records, report, strict=True):
+        for name in ("line", "reason", "profile"):
+            assert getattr(mine, name) == told[name]
+        assert mine.rewritten == (told["status"] == "planned")
+        if mine.rewritten:
+            assert mine.time == pytest.approx(told["time"], rel=1e-5)
+            left = max(entry["displacement"] for entry in told["residual"])
+            today = max(entry["conventional_displacement"] for entry in told["residual"])
+            assert mine.residual == pytest.approx(left, rel=1e-4)
+            assert mine.conventional_residual == pytest.approx(today, rel=1e-4)
+        else:
+            assert (mine.time, mine.residual) == (None, None)
+
+
+def test_results_are_shown_in_one_short_line():
+    result = process(PROGRAM, VMC, name="part.ngc")
+    count = len(result.plans)
+    assert repr(result) == f"<Result part.ngc: {result.planned} of {count} rapids rewritten>"
+    assert repr(result.plans) == f"<Plans: {result.planned} of {count} moves, condition3>"
+    assert len(repr(result.plans.profiles)) < 80

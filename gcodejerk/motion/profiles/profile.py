@@ -89,6 +89,9 @@ class Profiles:
     def __len__(self) -> int:
         return len(self.first) - 1
 
+    def __repr__(self) -> str:
+        return f"<Profiles: {len(self)} of {len(self.begin)} segments>"
+
     @property
     def total(self) -> Array:
         """Duration of each profile, T_SUM, shape (n,) [s]."""

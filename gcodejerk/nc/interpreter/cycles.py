@@ -2,8 +2,8 @@
 
 Rule: only the end matters here; what a cycle does on the way down is told in `cycles.drilling`. As
 in LinuxCNC, the tool goes to the hole, then to R, drills to Z, and comes back to R (G99) or to
-where the series of cycles began, if that is higher (G98). In G91, R counts from where the series began,
-Z from R, and every repeat (L) moves on by the same increments.
+where the series of cycles began, if that is higher (G98). In G91, R counts from where the series
+began, Z from R, and every repeat (L) moves on by the same increments.
 """
 
 from __future__ import annotations
