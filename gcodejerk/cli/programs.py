@@ -7,7 +7,6 @@ import os
 import sys
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,10 +14,7 @@ import typer
 from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
 
 if TYPE_CHECKING:
-    from gcodejerk.batch.inputs import Input
     from gcodejerk.batch.jobs import Done
-    from gcodejerk.machine import Machine
-    from gcodejerk.rewrite.pipeline import Settings
 
 
 def process(
@@ -79,26 +75,16 @@ def process(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors and notes")] = False,
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
-    from gcodejerk.batch.inputs import NameClashError, check_names, find_inputs
-    from gcodejerk.batch.jobs import Job, run_jobs
+    from gcodejerk.batch.inputs import find_inputs
+    from gcodejerk.batch.jobs import run_jobs
+    from gcodejerk.cli.outputs import Outputs
     from gcodejerk.rewrite.pipeline import Settings
 
-    if sum(map(bool, (output, output_dir, in_place))) > 1:
-        raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
-    if "-" in files and len(files) > 1:
-        raise typer.BadParameter("standard input (-) is one program: give it alone")
-    if in_place and "-" in files:
-        raise typer.BadParameter("--in-place needs a file, not standard input")
+    outputs = Outputs(output, output_dir, in_place, report)
+    outputs.check(files)
     found, problems = find_inputs(files, output_dir)
     many = len(found) + len(problems) > 1
-    report_dir = report if report is not None and report.endswith("/") else None
-    if output is not None or (report is not None and report_dir is None):
-        if many or any(map(os.path.isdir, files)):
-            raise typer.BadParameter(
-                "-o and --report FILE.json take one program; use --output-dir and --report DIR/"
-            )
-        if report is not None and report_dir is None and not report.endswith(".json"):
-            raise typer.BadParameter(f"--report {report}: a report is a .json file in this version")
+    outputs.check_single(many or any(map(os.path.isdir, files)))
     settings = Settings(
         controller=controller,
         form=form,
@@ -110,27 +96,10 @@ def process(
         expand_cycles=expand_cycles,
     )
     described = load_machine(machine, files[0])
-    suffix = _suffix(in_place, described, settings)
-    outputs = [_output(program, output, output_dir, in_place, suffix) for program in found]
-    try:
-        check_names([program.path for program in found], outputs)
-    except NameClashError as error:
-        raise typer.BadParameter(f"{error.problem}; {error.remedy}") from None
     mode = "check" if check else "diff" if diff else "write"
-    reports = [_report(program, report, report_dir) for program in found]
-    batch = [
-        Job(
-            program.path,
-            outputs[k],
-            reports[k],
-            mode,
-            in_place,
-            strict,
-            (*_parent(outputs[k], output_dir), *_parent(reports[k], report_dir)),
-        )
-        for k, program in enumerate(found)
-    ]
-    tally = _Tally(mode, quiet, aside=diff or "-" in outputs, many=many)
+    batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
+    aside = diff or any(job.output == "-" for job in batch)
+    tally = _Tally(mode, quiet, aside=aside, many=many)
     for problem in problems:
         tally.fail(str(problem))
     with progress(quiet) as show, closing(run_jobs(batch, described, settings, jobs, show)) as runs:
@@ -299,40 +268,3 @@ def _read_once(count: int) -> str:
         return ""
     whom = "the other rests" if count == 1 else f"the other {count} rest"
     return f"; {whom} on one reading alone, which the second could not follow"
-
-
-def _suffix(in_place: bool, machine: Machine, settings: Settings) -> str:
-    """Suffix of the outputs; empty: that of each program."""
-    from gcodejerk.emit import load_controller
-
-    suffix = load_controller(settings.controller or machine.controller).suffix
-    if suffix and in_place:
-        raise typer.BadParameter("--in-place: this controller's streams are a file of their own")
-    return suffix
-
-
-def _output(
-    program: Input, output: str | None, output_dir: str | None, in_place: bool, suffix: str
-) -> str:
-    """Where the result of a program goes."""
-    from gcodejerk.batch.inputs import output_name
-
-    if in_place:
-        return program.path
-    if output is not None:
-        return output
-    if program.path == "-":
-        return "-"
-    return output_name(program, output_dir, suffix)
-
-
-def _report(program: Input, report: str | None, report_dir: str | None) -> str | None:
-    """Where the report on a program goes."""
-    from gcodejerk.batch.inputs import report_name
-
-    return report if report_dir is None else report_name(program, report_dir)
-
-
-def _parent(name: str | None, wanted: str | None) -> tuple[str, ...]:
-    """The folder of an output, where it was named as one that may be made."""
-    return () if name is None or wanted is None else (str(Path(name).parent),)

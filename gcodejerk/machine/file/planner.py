@@ -37,41 +37,55 @@ def choose_planners(values: dict[str, Any], checker: Checker) -> dict[str, str]:
         Axis -> one of `PLANNERS`.
     """
     rapids = {a: axis["rapid"] for a, axis in values.get("axes", {}).items() if "rapid" in axis}
-    # A control that the file does not name has no habits: the limits alone say what it does.
-    own = WITHOUT_JERK.get(values.get("controller", "")) if checker.given(("controller",)) else None
     stated = {a: rapid["planner"] for a, rapid in rapids.items() if "planner" in rapid}
-    free = own is not None and not any("jerk" in rapid for rapid in rapids.values())
-    chosen = {}
-    for a, rapid in rapids.items():
-        plain = JERK_LIMITED if "jerk" in rapid else TRAPEZOIDAL
-        # One control moves all axes: what is said of one holds for those of which nothing is.
-        others = LINUXCNC if LINUXCNC in stated.values() else None
-        chosen[a] = stated.get(a, others or (own[0] if own and free and not stated else plain))
-        path = ("axes", a, "rapid", "planner")
-        if chosen[a] in (JERK_LIMITED, BELL) and "jerk" not in rapid and a in stated:
+    default = _default(values, rapids, stated, checker)
+    chosen = {
+        a: stated.get(a, default or (JERK_LIMITED if "jerk" in rapid else TRAPEZOIDAL))
+        for a, rapid in rapids.items()
+    }
+    for a in stated:
+        if chosen[a] in (JERK_LIMITED, BELL) and "jerk" not in rapids[a]:
             checker.problems.add(
-                checker.place(path),
+                checker.place(("axes", a, "rapid", "planner")),
                 f"axes.{a}.rapid.planner is {chosen[a]!r}, which needs axes.{a}.rapid.jerk",
                 "add the jerk, or say planner: trapezoidal",
             )
+    _check_alike(rapids, stated, checker)
+    return chosen
+
+
+def _default(
+    values: dict[str, Any], rapids: dict[str, Any], stated: dict[str, str], checker: Checker
+) -> str | None:
+    """The profile of axes of which nothing is said; None: what their own limits say."""
+    # One control moves all axes: what is said of one holds for those of which nothing is.
+    if LINUXCNC in stated.values():
+        return LINUXCNC
+    # A control that the file does not name has no habits: the limits alone say what it does.
+    own = WITHOUT_JERK.get(values.get("controller", "")) if checker.given(("controller",)) else None
+    free = not stated and not any("jerk" in rapid for rapid in rapids.values())
+    return own[0] if own is not None and free else None
+
+
+def _check_alike(rapids: dict[str, Any], stated: dict[str, str], checker: Checker) -> None:
+    """Refuse profiles that no single control makes."""
     kinds = {LINUXCNC: "1", BELL: "2"}
     first = next((a for a in AXES if a in stated), None)
-    for a in stated:
-        if first is not None and kinds.get(chosen[a]) != kinds.get(chosen[first]):
+    for a, planner in stated.items():
+        if first is not None and kinds.get(planner) != kinds.get(stated[first]):
             checker.problems.add(
                 checker.place(("axes", a, "rapid", "planner")),
-                f"axes.{a}.rapid.planner is {chosen[a]!r}, that of {first} is {chosen[first]!r}: "
+                f"axes.{a}.rapid.planner is {planner!r}, that of {first} is {stated[first]!r}: "
                 "one control makes the rapids of all axes",
                 "state the same planner for all axes",
             )
-        elif chosen[a] == BELL and set(rapids) - set(stated):
+        elif planner == BELL and set(rapids) - set(stated):
             other = min(set(rapids) - set(stated), key=AXES.index)
             checker.problems.add(
                 checker.place(("axes", other, "rapid")),
                 f"axes.{other}.rapid names no planner, axis {a} moves by {BELL!r}",
                 "state the same planner for all axes",
             )
-    return chosen
 
 
 def planner_warnings(

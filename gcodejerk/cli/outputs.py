@@ -1,0 +1,104 @@
+"""Where the outputs and reports of a run go, as the user said it: `process` only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from gcodejerk.batch.inputs import (
+    Input,
+    NameClashError,
+    check_names,
+    output_name,
+    report_name,
+)
+from gcodejerk.batch.jobs import Job
+from gcodejerk.emit import load_controller
+from gcodejerk.machine import Machine
+from gcodejerk.rewrite.pipeline import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """The options -o, --output-dir, --in-place and --report of one command."""
+
+    output: str | None
+    output_dir: str | None
+    in_place: bool
+    report: str | None
+
+    @property
+    def report_dir(self) -> str | None:
+        """The folder of the reports, where one was named."""
+        return self.report if self.report is not None and self.report.endswith("/") else None
+
+    def check(self, files: list[str]) -> None:
+        """Refuse options that contradict each other or the inputs, as wrong usage."""
+        if sum(map(bool, (self.output, self.output_dir, self.in_place))) > 1:
+            raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
+        if "-" in files and len(files) > 1:
+            raise typer.BadParameter("standard input (-) is one program: give it alone")
+        if self.in_place and "-" in files:
+            raise typer.BadParameter("--in-place needs a file, not standard input")
+
+    def check_single(self, many: bool) -> None:
+        """Refuse names of single files where many programs are given, and reports of no name."""
+        one_report = self.report if self.report_dir is None else None
+        if many and (self.output is not None or one_report is not None):
+            raise typer.BadParameter(
+                "-o and --report FILE.json take one program; use --output-dir and --report DIR/"
+            )
+        if one_report is not None and not one_report.endswith(".json"):
+            raise typer.BadParameter(
+                f"--report {one_report}: a report is a .json file in this version"
+            )
+
+    def jobs(
+        self, found: list[Input], machine: Machine, settings: Settings, *, mode: str, strict: bool
+    ) -> list[Job]:
+        """One job for each program; two outputs of one name are wrong usage."""
+        suffix = load_controller(settings.controller or machine.controller).suffix
+        if suffix and self.in_place:
+            raise typer.BadParameter(
+                "--in-place: this controller's streams are a file of their own"
+            )
+        outputs = [self._output(program, suffix) for program in found]
+        try:
+            check_names([program.path for program in found], outputs)
+        except NameClashError as error:
+            raise typer.BadParameter(f"{error.problem}; {error.remedy}") from None
+        reports = [self._report(program) for program in found]
+        return [
+            Job(
+                input=program.path,
+                output=output,
+                report=report,
+                mode=mode,
+                in_place=self.in_place,
+                strict=strict,
+                new_folders=(
+                    *_folder(output, self.output_dir),
+                    *_folder(report, self.report_dir),
+                ),
+            )
+            for program, output, report in zip(found, outputs, reports, strict=True)
+        ]
+
+    def _output(self, program: Input, suffix: str) -> str:
+        """Where the result of a program goes."""
+        if self.in_place:
+            return program.path
+        if self.output is not None:
+            return self.output
+        return "-" if program.path == "-" else output_name(program, self.output_dir, suffix)
+
+    def _report(self, program: Input) -> str | None:
+        """Where the report on a program goes."""
+        return self.report if self.report_dir is None else report_name(program, self.report_dir)
+
+
+def _folder(name: str | None, wanted: str | None) -> tuple[str, ...]:
+    """The folder of an output, where it was named as one that may be made."""
+    return () if name is None or wanted is None else (str(Path(name).parent),)
