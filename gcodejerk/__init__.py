@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from gcodejerk.motion.amplitudes import residual
     from gcodejerk.motion.maps import amplitude_map
     from gcodejerk.planning.move import Plan, plan_move
-    from gcodejerk.rewrite.pipeline import Result, process
-    from gcodejerk.rewrite.rapid_result import RapidResult
+    from gcodejerk.rewrite.pipeline import process
+    from gcodejerk.rewrite.result import RapidResult, Result
     from gcodejerk.verification import Verification, verify
 
 _HOMES = {
@@ -48,8 +48,8 @@ _HOMES = {
     "gcodejerk.motion.amplitudes": ("residual",),
     "gcodejerk.motion.maps": ("amplitude_map",),
     "gcodejerk.planning.move": ("Plan", "plan_move"),
-    "gcodejerk.rewrite.pipeline": ("Result", "process"),
-    "gcodejerk.rewrite.rapid_result": ("RapidResult",),
+    "gcodejerk.rewrite.pipeline": ("process",),
+    "gcodejerk.rewrite.result": ("RapidResult", "Result"),
     "gcodejerk.verification": ("Verification", "verify"),
 }  # fmt: skip
 

@@ -37,7 +37,8 @@ from gcodejerk.planning.designs import known_limits
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line, whole_line
-from gcodejerk.rewrite.pipeline import Progress, Result, Settings, process_file, silent
+from gcodejerk.rewrite.pipeline import Progress, Settings, process_file, silent
+from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import changed_error
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from typing import BinaryIO
 
-from gcodejerk.rewrite.pipeline import Result
+from gcodejerk.rewrite.result import Result
 
 
 def difference(source: BinaryIO, target: BinaryIO, result: Result) -> bytes:

@@ -26,7 +26,7 @@ from gcodejerk.planning.move import Plan
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left, settling_times
 from gcodejerk.reasons import REASONS
-from gcodejerk.rewrite.pipeline import Result
+from gcodejerk.rewrite.result import Result
 
 Record = dict[str, Any]
 DIGITS = 10

@@ -228,7 +228,7 @@ def hunks(
     Parameters
     ----------
     edits : ndarray of int, shape (k, 3)
-        Of the program that was processed; see `pipeline.Result`.
+        Of the program that was processed; see `result.Result`.
     rapids : Rapids
         Of that program.
     insert_at : int

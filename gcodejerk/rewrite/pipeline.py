@@ -11,24 +11,22 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
-from gcodejerk.cycles.expansion import Expansion
+from gcodejerk.cycles.expansion import Expansion, LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
-from gcodejerk.machine import DIALECT_OF_CONTROLLER, LINUXCNC, Machine
+from gcodejerk.machine import LINUXCNC, Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.plan import plan_rapids
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.settling import Left, left_alone
+from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
 from gcodejerk.rewrite.expanded import (
     hunks,
@@ -37,7 +35,8 @@ from gcodejerk.rewrite.expanded import (
     written_out,
 )
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
-from gcodejerk.rewrite.rapid_result import RapidResult, rapid_results
+from gcodejerk.rewrite.notes import operator_notes, program_notes
+from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.stamp import stamp_text
 from gcodejerk.verification import Verification, require, verify_csv, verify_files
@@ -60,87 +59,6 @@ class Settings:
     """Process a file that carries our stamp."""
     expand_cycles: bool = False
     """Write drilling cycles out as explicit moves first."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Result:
-    """The outcome of one program.
-
-    Attributes
-    ----------
-    program : Program
-        As it was read, with its rapids. Those of cycles that were written out carry the line and
-        the place of the cycle's block; several of them share one.
-    plans : Plans
-        Row i is rapid i.
-    controller : str
-        The emitter that wrote.
-    residual, conventional_residual : ndarray, shape (n, m)
-        Displacement envelopes of every rapid and mode, NaN where not planned. [mm]
-    stays_conventional : ndarray of bool, shape (n,)
-        The stream is the conventional profile: nothing better was found.
-    deviation : ndarray, shape (n,)
-        Under independent positioning, how far the path leaves the control's own, at most. [mm]
-    rest : Left
-        What rapids leave today that were left alone.
-    verification : Verification or None
-        None where it was switched off, or where nothing was written.
-    edits : ndarray of int, shape (k, 3)
-        Begin and end in the output of every stream, and the rapid that it replaces; -1 for the
-        stamp. Empty where the output is a file of its own. [bytes]
-    hunks : ndarray of int, shape (n, 5)
-        All that is not the source's, cycles included: see `expanded.hunks`.
-    expansion : Expansion or None
-        The outcome for the cycles; None where they were not to be written out.
-    notes : tuple of str
-        What the user has to know: of the program, and of the controller.
-    output : bytes or None
-        The output, where it was asked for in memory.
-    """
-
-    program: Program
-    plans: Plans
-    controller: str
-    profile: str
-    form: str
-    residual: Array
-    conventional_residual: Array
-    stays_conventional: NDArray[np.bool_]
-    deviation: Array
-    rest: Left
-    verification: Verification | None
-    edits: NDArray[np.int64]
-    hunks: NDArray[np.int64]
-    expansion: Expansion | None
-    notes: tuple[str, ...]
-    output: bytes | None = field(default=None, repr=False)
-
-    def __repr__(self) -> str:
-        return f"<Result {self.program.name}: {self.planned} of {len(self.plans)} rapids rewritten>"
-
-    @property
-    def rapids(self) -> tuple[RapidResult, ...]:
-        """Every rapid of the program, one record each, in the order of the file."""
-        return rapid_results(
-            self.program, self.plans, self.stays_conventional, self.residual,
-            self.conventional_residual,
-        )  # fmt: skip
-
-    @property
-    def planned(self) -> int:
-        """Number of rapids that were rewritten."""
-        return int(np.count_nonzero(self.plans.planned))
-
-    @property
-    def left(self) -> int:
-        """Number of rapids that were left alone."""
-        return len(self.plans) - self.planned
-
-    @property
-    def read_once(self) -> int:
-        """Rewritten rapids of which the second reading of the program does not know all."""
-        found = self.verification
-        return 0 if found is None else found.rewritten - found.confirmed
 
 
 def process(
@@ -204,7 +122,7 @@ def process(
     )
     target = io.BytesIO()
     result = process_file(io.BytesIO(data), target, machine, settings, name)
-    return _with_output(result, target.getvalue())
+    return replace(result, output=target.getvalue())
 
 
 def process_file(
@@ -272,6 +190,55 @@ def _process(
 ) -> Result:
     """Process a program; the source is that with its cycles written out, if they are."""
     lines = None if expansion is None else expansion.map
+    program = _read(source, machine, settings, name, report, lines)
+    plans = _plan(source, program, machine, settings, emitter, report)
+    writer = Rewriter(
+        source, target, program, emitter,
+        Options(settings.comments, find_dialect(program.dialect)),
+        stamp_text(machine, _chosen(machine, settings, emitter)),
+    )  # fmt: skip
+    collected, deviation = _write(writer, plans, machine, report)
+    verification = None
+    if target is not None and settings.verify:
+        report("verifying", 0, 1)
+        verification = _verified(source, target, machine, settings, program, emitter, lines)
+        report("verifying", 1, 1)
+    edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
+    differences = hunks(edits, program.rapids, program.insert_at, lines)
+    program = in_original(program, expansion)
+    return Result(
+        program=program,
+        plans=plans,
+        controller=emitter.name,
+        profile=settings.profile or machine.design.profile,
+        form=settings.form,
+        residual=collected.residual,
+        conventional_residual=collected.conventional,
+        stays_conventional=collected.stays_conventional,
+        deviation=deviation,
+        rest=left_alone(program.rapids, plans),
+        verification=verification,
+        edits=edits,
+        hunks=differences,
+        expansion=expansion,
+        notes=(
+            *operator_notes(emitter, machine, plans),
+            *program_notes(program, expansion, emitter),
+            *dogleg_notes(plans, deviation),
+            *emitter.notes(program.rapids, plans),
+        ),
+    )
+
+
+def _read(
+    source: BinaryIO,
+    machine: Machine,
+    settings: Settings,
+    name: str,
+    report: Progress,
+    lines: LineMap | None,
+) -> Program:
+    """The program, refused where it is none, or one that was processed before."""
     source.seek(0, io.SEEK_END)
     size = source.tell()
     source.seek(0)
@@ -291,11 +258,23 @@ def _process(
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
         )
+    return program
+
+
+def _plan(
+    source: BinaryIO,
+    program: Program,
+    machine: Machine,
+    settings: Settings,
+    emitter: Controller,
+    report: Progress,
+) -> Plans:
+    """All rapids of the program that are certain, and that the control could read as streams."""
     rapids = program.rapids
     if emitter.in_place:
         dialect = find_dialect(program.dialect)
         rapids = replace(rapids, reason=reasons_to_leave(program, source, machine, dialect))
-    plans = plan_rapids(
+    return plan_rapids(
         rapids,
         machine,
         settings.profile,
@@ -303,18 +282,27 @@ def _process(
         emitter.unblended if emitter.in_place else "",
         only_gains=True,
     )
-    collected = Residuals(plans)
-    deviation = np.zeros(len(plans))
+
+
+def _chosen(machine: Machine, settings: Settings, emitter: Controller) -> list[str]:
+    """The user's choices that shape the output, for the stamp."""
     chosen = [emitter.name, settings.form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
-    chosen += [f"dialect {settings.dialect}"] if settings.dialect is not None else []
-    options = Options(settings.comments, find_dialect(program.dialect))
-    writer = Rewriter(source, target, program, emitter, options, stamp_text(machine, chosen))
+    return chosen + ([f"dialect {settings.dialect}"] if settings.dialect is not None else [])
+
+
+def _write(
+    writer: Rewriter, plans: Plans, machine: Machine, report: Progress
+) -> tuple[Residuals, Array]:
+    """Write all streams; what they leave, and how far each path is from the control's own [mm]."""
+    emitter, dialect = writer.emitter, writer.options.dialect
+    collected = Residuals(plans)
+    deviation = np.zeros(len(plans))
     writer.write_header(machine)
     done = 0
     for window in make_streams(
         plans,
-        emitter.number_format(program.rapids, machine, options.dialect),
+        emitter.number_format(writer.program.rapids, machine, dialect),
         emitter.stride(machine.interval),
     ):
         for batch in window:
@@ -324,69 +312,7 @@ def _process(
         done += sum(map(len, window))
         report("writing", done, int(np.count_nonzero(plans.planned)))
     writer.finish()
-    verification = None
-    if target is not None and settings.verify:
-        report("verifying", 0, 1)
-        try:
-            verification = _verified(source, target, machine, settings, program, emitter.in_place)
-            require(lines_in_original(verification, lines))
-        except (ProgramError, VerifyError):
-            if digest_of(source) != program.digest:
-                raise changed_error(name) from None
-            raise
-        report("verifying", 1, 1)
-    edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
-    differences = hunks(edits, program.rapids, program.insert_at, lines)
-    program = in_original(program, expansion)
-    findings = (*program.findings, *(() if expansion is None else expansion.findings))
-    notes = [_finding(finding.line, finding.message) for finding in findings]
-    home = DIALECT_OF_CONTROLLER.get(emitter.name)
-    if emitter.in_place and home is not None and not program.dialect.startswith(home):
-        notes.append(
-            f"the program is read as {program.dialect}, controller {emitter.name} reads {home}: "
-            "how the program's control follows its streams was not measured"
-        )
-    notes += dogleg_notes(plans, deviation)
-    return Result(
-        program=program,
-        plans=plans,
-        controller=emitter.name,
-        profile=settings.profile or machine.design.profile,
-        form=settings.form,
-        residual=collected.residual,
-        conventional_residual=collected.conventional,
-        stays_conventional=collected.stays_conventional,
-        deviation=deviation,
-        rest=left_alone(program.rapids, plans),
-        verification=verification,
-        edits=edits,
-        hunks=differences,
-        expansion=expansion,
-        notes=(
-            *_operator_notes(emitter, machine, plans),
-            *notes,
-            *emitter.notes(program.rapids, plans),
-        ),
-    )
-
-
-def _operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[str]:
-    """What comes first: for whoever stands at the machine, then for whoever reads the figures."""
-    notes = []
-    if emitter.in_place and plans.planned.any():
-        notes.append(at_the_machine(emitter.name))
-    if not plans.modes.modes:
-        notes.append(NO_MODES)
-    elif plans.planned.any():
-        notes.append(ABSOLUTE)
-    if machine.warnings:
-        first = machine.warnings[0]
-        more = f", and {len(machine.warnings) - 1} more" if len(machine.warnings) > 1 else ""
-        notes.append(
-            f"the machine file is doubtful: {first.place}: {first.problem}{more}; see "
-            "`gcodejerk machine check`"
-        )
-    return notes
+    return collected, deviation
 
 
 def _verified(
@@ -395,35 +321,33 @@ def _verified(
     machine: Machine,
     settings: Settings,
     program: Program,
-    in_place: bool,
+    emitter: Controller,
+    lines: LineMap | None,
 ) -> Verification:
-    """Read an output back."""
+    """Read an output back; whatever is wrong with it is raised, in lines of the original."""
     source.seek(0)
     target.seek(0)
-    prove = verify_files if in_place else verify_csv
+    prove = verify_files if emitter.in_place else verify_csv
     design = replace(machine.design, profile=settings.profile or machine.design.profile)
-    return prove(
-        source,
-        target,
-        replace(machine, design=design),
-        names=(program.name, f"the output for {program.name}"),
-        dialect=program.dialect,
-        start=machine.program_start(),
-    )
-
-
-def _with_output(result: Result, output: bytes) -> Result:
-    """The result with its output."""
-    return replace(result, output=output)
+    try:
+        found = prove(
+            source,
+            target,
+            replace(machine, design=design),
+            names=(program.name, f"the output for {program.name}"),
+            dialect=program.dialect,
+            start=machine.program_start(),
+        )
+        require(lines_in_original(found, lines))
+    except (ProgramError, VerifyError):
+        if digest_of(source) != program.digest:
+            raise changed_error(program.name) from None
+        raise
+    return found
 
 
 def silent(step: str, done: int, total: int) -> None:
     """Progress that nobody watches."""
-
-
-def _finding(line: int | None, message: str) -> str:
-    """A finding as a line of text."""
-    return message if line is None else f"line {line}: {message}"
 
 
 def _check_form(emitter: Controller, form: str) -> None:

@@ -1,0 +1,47 @@
+"""What the user has to be told of one program: the machine, the figures, the program itself."""
+
+from __future__ import annotations
+
+from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
+from gcodejerk.cycles.expansion import Expansion
+from gcodejerk.emit import Controller
+from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
+from gcodejerk.nc import Program
+from gcodejerk.planning.plans import Plans
+
+
+def operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[str]:
+    """What comes first: for whoever stands at the machine, then for whoever reads the figures."""
+    notes = []
+    if emitter.in_place and plans.planned.any():
+        notes.append(at_the_machine(emitter.name))
+    if not plans.modes.modes:
+        notes.append(NO_MODES)
+    elif plans.planned.any():
+        notes.append(ABSOLUTE)
+    if machine.warnings:
+        first = machine.warnings[0]
+        more = f", and {len(machine.warnings) - 1} more" if len(machine.warnings) > 1 else ""
+        notes.append(
+            f"the machine file is doubtful: {first.place}: {first.problem}{more}; see "
+            "`gcodejerk machine check`"
+        )
+    return notes
+
+
+def program_notes(program: Program, expansion: Expansion | None, emitter: Controller) -> list[str]:
+    """What was found in the program, and what its dialect means for the control."""
+    findings = (*program.findings, *(() if expansion is None else expansion.findings))
+    notes = [_finding(finding.line, finding.message) for finding in findings]
+    home = DIALECT_OF_CONTROLLER.get(emitter.name)
+    if emitter.in_place and home is not None and not program.dialect.startswith(home):
+        notes.append(
+            f"the program is read as {program.dialect}, controller {emitter.name} reads {home}: "
+            "how the program's control follows its streams was not measured"
+        )
+    return notes
+
+
+def _finding(line: int | None, message: str) -> str:
+    """A finding as a line of text."""
+    return message if line is None else f"line {line}: {message}"

@@ -1,0 +1,172 @@
+"""The outcome of one program: what was written, what it leaves, and each rapid as a record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.axes import AXES
+from gcodejerk.cycles.expansion import Expansion
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.nc import Program
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.settling import Left
+from gcodejerk.reasons import CERTAIN, REASONS
+from gcodejerk.verification import Verification
+
+
+@dataclass(frozen=True, slots=True)
+class RapidResult:
+    """What was done with one rapid."""
+
+    line: int
+    """Of its block in the program, counted from 1."""
+    rewritten: bool
+    reason: str | None
+    """Why it was left alone; None where it was rewritten."""
+    displacement: dict[str, float]
+    """What each axis moves; empty where that is not known. [mm] or [deg]"""
+    profile: str | None
+    """Name of the profile that is written; None where it was left alone."""
+    time: float | None
+    """T_SUM, None where it was left alone. [s]"""
+    conventional_time: float | None
+    """What the controller's own G0 takes, None where that is not known. [s]"""
+    residual: float | None
+    """The largest displacement that a mode keeps, None where it was left alone. [mm]"""
+    conventional_residual: float | None
+    """The same of the controller's own G0. [mm]"""
+
+
+def rapid_results(
+    program: Program,
+    plans: Plans,
+    stays_conventional: NDArray[np.bool_],
+    residual: Array,
+    conventional: Array,
+) -> tuple[RapidResult, ...]:
+    """Every rapid of a program, in the order of the file.
+
+    Parameters
+    ----------
+    program : Program
+        n rapids.
+    plans : Plans
+        Row i is rapid i.
+    stays_conventional : ndarray of bool, shape (n,)
+        The stream is the conventional profile.
+    residual, conventional : ndarray, shape (n, m)
+        Displacement of each mode, NaN where not planned. [mm]
+
+    Returns
+    -------
+    tuple of RapidResult, length n
+    """
+    interval = plans.machine.interval
+    # A spectrum's oscillators count together, as in reports.
+    worst, today = (
+        np.max(plans.modes.grouped(each), axis=1, initial=0.0) for each in (residual, conventional)
+    )
+    out = []
+    for row, line in enumerate(program.rapids.line.tolist()):
+        rewritten = bool(plans.reason[row] == CERTAIN)
+        usual = float(plans.conventional_time[row])
+        moved = np.flatnonzero(plans.displacement[row]).tolist()
+        stays = bool(stays_conventional[row])
+        out.append(
+            RapidResult(
+                line=line,
+                rewritten=rewritten,
+                reason=None if rewritten else str(REASONS[plans.reason[row]]),
+                displacement={AXES[k]: float(plans.displacement[row, k]) for k in moved},
+                profile=("conventional" if stays else plans.designed) if rewritten else None,
+                time=float(plans.counts[row]) * interval if rewritten else None,
+                conventional_time=usual if usual > 0.0 else None,
+                residual=float(worst[row]) if rewritten else None,
+                conventional_residual=float(today[row]) if rewritten else None,
+            )
+        )
+    return tuple(out)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """The outcome of one program.
+
+    Attributes
+    ----------
+    program : Program
+        As it was read, with its rapids. Those of cycles that were written out carry the line and
+        the place of the cycle's block; several of them share one.
+    plans : Plans
+        Row i is rapid i.
+    controller : str
+        The emitter that wrote.
+    residual, conventional_residual : ndarray, shape (n, m)
+        Displacement envelopes of every rapid and mode, NaN where not planned. [mm]
+    stays_conventional : ndarray of bool, shape (n,)
+        The stream is the conventional profile: nothing better was found.
+    deviation : ndarray, shape (n,)
+        Under independent positioning, how far the path leaves the control's own, at most. [mm]
+    rest : Left
+        What rapids leave today that were left alone.
+    verification : Verification or None
+        None where it was switched off, or where nothing was written.
+    edits : ndarray of int, shape (k, 3)
+        Begin and end in the output of every stream, and the rapid that it replaces; -1 for the
+        stamp. Empty where the output is a file of its own. [bytes]
+    hunks : ndarray of int, shape (n, 5)
+        All that is not the source's, cycles included: see `expanded.hunks`.
+    expansion : Expansion or None
+        The outcome for the cycles; None where they were not to be written out.
+    notes : tuple of str
+        What the user has to know: of the program, and of the controller.
+    output : bytes or None
+        The output, where it was asked for in memory.
+    """
+
+    program: Program
+    plans: Plans
+    controller: str
+    profile: str
+    form: str
+    residual: Array
+    conventional_residual: Array
+    stays_conventional: NDArray[np.bool_]
+    deviation: Array
+    rest: Left
+    verification: Verification | None
+    edits: NDArray[np.int64]
+    hunks: NDArray[np.int64]
+    expansion: Expansion | None
+    notes: tuple[str, ...]
+    output: bytes | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return f"<Result {self.program.name}: {self.planned} of {len(self.plans)} rapids rewritten>"
+
+    @property
+    def rapids(self) -> tuple[RapidResult, ...]:
+        """Every rapid of the program, one record each, in the order of the file."""
+        return rapid_results(
+            self.program, self.plans, self.stays_conventional, self.residual,
+            self.conventional_residual,
+        )  # fmt: skip
+
+    @property
+    def planned(self) -> int:
+        """Number of rapids that were rewritten."""
+        return int(np.count_nonzero(self.plans.planned))
+
+    @property
+    def left(self) -> int:
+        """Number of rapids that were left alone."""
+        return len(self.plans) - self.planned
+
+    @property
+    def read_once(self) -> int:
+        """Rewritten rapids of which the second reading of the program does not know all."""
+        found = self.verification
+        return 0 if found is None else found.rewritten - found.confirmed
