@@ -12,11 +12,12 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
-import sys
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, TypeVar
+
+from gcodejerk.batch.signals import exit_on
 
 In = TypeVar("In")
 Out = TypeVar("Out")
@@ -133,7 +134,7 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
 def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
     """What a worker does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
+    exit_on(signal.SIGTERM)
     with contextlib.suppress(EOFError, OSError):
         while True:
             pipe.send(function(pipe.recv()))

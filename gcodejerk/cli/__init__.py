@@ -16,6 +16,7 @@ from typing import Annotated
 import typer
 
 from gcodejerk._version import __version__
+from gcodejerk.batch.signals import exit_on
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.programs import inspect, process, verify
@@ -67,14 +68,10 @@ def main() -> None:
 
 def _end_in_order() -> None:
     """Asked to end, put temporary files away first; show whatever name a file has."""
-
-    def end(number: int, frame: object) -> None:
-        sys.exit(128 + number)
-
     for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP, and nohup ignores it
         asked = getattr(signal, name, None)
         if asked is not None and signal.getsignal(asked) == signal.SIG_DFL:
-            signal.signal(asked, end)
+            exit_on(asked)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
