@@ -5,7 +5,7 @@ one axis is late is another path, though every point of it is between the ends. 
 
 - an axis stands at its end from the longest time on that its own rapid may take;
 - the mean moment of its motion, :math:`\int (1 - x/D)\,dt`, which any delay moves by itself, is
-  half of its own time where the profile's profiles are symmetric, and in the middle half where not.
+  half of its own time where the profile is symmetric, and in the middle half where not.
 
 Rule: times are those of each axis alone, from the limits of its rapid.
 """
@@ -71,5 +71,5 @@ def check_axes(
         off = (mean < 0.5 * low * usual[:, a] - error) | (mean > 0.5 * high * most[:, a] + error)
         rows = np.zeros(len(t), dtype=np.bool_)
         rows[paths.begin[moves & off] + 1] = True
-        out.append((Kind.TIME, rows, f"{AXES[a]} moves earlier or later than by its own law"))
+        out.append((Kind.TIME, rows, f"{AXES[a]} moves earlier or later than by its own profile"))
     return out
