@@ -27,6 +27,35 @@ def pytest_addoption(parser):
     )
 
 
+QUICK = (
+    *("unit/test_nc_program.py", "unit/test_nc_o_words.py", "unit/test_nc_tokenizer.py"),
+    *("unit/test_nc_dialects.py", "unit/test_nc_expressions.py", "unit/test_nc_subprograms.py"),
+    *("unit/test_cycles_expansion.py", "unit/test_cycles_drilling.py"),
+    *(
+        "unit/test_motion_residual.py",
+        "unit/test_motion_condition3.py",
+        "unit/test_motion_cascade.py",
+    ),
+    *("unit/test_motion_maps.py", "unit/test_motion_sampling.py", "unit/test_motion_symmetric.py"),
+    *("unit/test_machine_loader.py", "unit/test_machine_model.py", "unit/test_machine_schema.py"),
+    *("unit/test_plan.py", "unit/test_move.py", "unit/test_stream.py", "unit/test_designs.py"),
+    *("unit/test_emit_base.py", "unit/test_emit_linuxcnc.py", "unit/test_emit_csv.py"),
+    *("unit/test_verify.py", "unit/test_verify_cycles.py", "unit/test_order_of_words.py"),
+    *("unit/test_rewrite_pipeline.py", "unit/test_rewrite_expanded.py", "unit/test_report.py"),
+    *("unit/test_batch_inputs.py", "unit/test_cli_map.py", "unit/test_cli_outputs.py"),
+    *("unit/test_amplitude_map.py", "unit/test_layers.py", "golden/test_golden.py"),
+)
+"""Modules of the quick tests, below this folder: some of every room."""
+NOT_QUICK = ("test_what_does_not_end", "test_measured_spectra", "test_a_series_runs_on_over_chunks")
+"""Beginnings of names of their tests that take seconds."""
+
+
+def pytest_itemcollected(item):
+    module = item.path.as_posix().rpartition("/tests/")[2]
+    if module in QUICK and not item.name.startswith(NOT_QUICK):
+        item.add_marker("quick")
+
+
 def pytest_collection_modifyitems(config, items):
     if not config.getoption("--long"):
         return

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.axes import AXES
+from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, Start, read_program
 from gcodejerk.nc.dialects import DIALECTS
 from gcodejerk.testing.cycles import cycle_programs
@@ -229,7 +230,42 @@ def test_what_is_not_followed_is_neither_confirmed_nor_refused(lines):
     assert judge(data, "linuxcnc", start, moved, [1]) == ([], 0)
 
 
-SHARED = Path(__file__).resolve().parents[2].parent / "shared"
+TESTS = Path(__file__).resolve().parents[1]
+OWN = sorted(path.parent.name for path in TESTS.glob("golden/*/in.ngc"))
+
+
+@pytest.mark.parametrize("case", OWN)
+def test_the_second_reading_agrees_on_whole_programs(case):
+    """Real files are not everywhere; the programs beside the golden outputs are."""
+    machine = Machine.load(TESTS / "golden" / case / "machine.yaml")
+    data, start = (TESTS / "golden" / case / "in.ngc").read_bytes(), machine.program_start()
+    rapids = read(data, machine.dialect, start)
+    violations, confirmed = judge(data, machine.dialect, start, rapids)
+    assert violations == []
+    certain = np.flatnonzero(rapids.reason == CERTAIN)
+    assert (confirmed > 0) == (len(certain) > 0)
+    noticed = 0
+    for i in certain:
+        wrong = read(data, machine.dialect, start)
+        named = next(k for k in range(len(AXES)) if rapids.words[i] >> k & 1)
+        wrong.target[i, named] += 1e-3
+        violations, _ = judge(data, machine.dialect, start, wrong)
+        assert {v.original_line for v in violations} <= {rapids.line[i]}
+        noticed += bool(violations)
+    assert noticed >= confirmed
+
+
+def test_programs_of_several_dialects_have_rapids_that_are_certain():
+    dialects = set()
+    for case in OWN:
+        machine = Machine.load(TESTS / "golden" / case / "machine.yaml")
+        data = (TESTS / "golden" / case / "in.ngc").read_bytes()
+        if CERTAIN in read(data, machine.dialect, machine.program_start()).reason:
+            dialects.add(machine.dialect)
+    assert len(dialects) >= 7
+
+
+SHARED = TESTS.parents[1] / "shared"
 """Dialect of each real file, by a piece of its name."""
 REAL = {
     **{"hosts/nc/*__fanuc*": "fanuc", "hosts/nc/*__grbl*": "grbl", "hosts/nc/*__marlin*": "marlin"},

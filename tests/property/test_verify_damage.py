@@ -22,7 +22,7 @@ from gcodejerk.verification import verify
 
 SETTINGS = settings(
     deadline=None,
-    max_examples=1,
+    max_examples=2,
     # Which damage was missed matters, not the smallest program for it.
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
     suppress_health_check=list(HealthCheck),
@@ -234,6 +234,20 @@ def _before(t, p, line):
     return t.cut(first, line + end, t.lines[first])
 
 
+def _doubled(t, p):
+    """A point twice; at the slow ends a block without way is less than the rounding of points."""
+    feeds = [float(t.lines[n].rpartition(b"F")[2]) for run in t.runs() if p in run for n in run]
+    slow = float(t.lines[p].rpartition(b"F")[2]) < 0.25 * max(feeds)
+    return None if slow else t.cut(p, t.lines[p], t.lines[p])
+
+
+def _rapid_before(t, p):
+    """G0 in front of a stream; right behind another stream it says what is in force."""
+    first = next(run[0] for run in t.runs() if p in run)
+    comment = max(n for n in t.comments if n < first)
+    return None if comment - 1 in t.tails else _before(t, p, b"G0")
+
+
 def _moved_stop(t, p):
     """The exact stop of a last point, on the first one instead."""
     for run in t.runs():
@@ -269,7 +283,7 @@ DAMAGE = {
     "decimal point of a word lost": _whole,
     "digit of a point lost": lambda t, p, e: t.sub(p, rb"([XYZ]-?[0-9]*[1-9])\.", rb"\g<1>0."),
     "point dropped": lambda t, p, e: t.cut(p),
-    "point doubled": lambda t, p, e: t.cut(p, t.lines[p], t.lines[p]),
+    "point doubled": lambda t, p, e: _doubled(t, p),
     "points swapped": lambda t, p, e: _swap(t, p),
     "points from another stream": lambda t, p, e: _instead(t),
     "streams exchanged": lambda t, p, e: _exchange(t),
@@ -327,7 +341,7 @@ DAMAGE = {
     "tolerance in front": lambda t, p, e: _before(t, p, b"G64 P5"),
     "F in front": lambda t, p, e: _before(t, p, b"F500.0"),
     "negative F in front": lambda t, p, e: _before(t, p, b"F-1"),
-    "G0 in front": lambda t, p, e: _before(t, p, b"G0"),
+    "G0 in front": lambda t, p, e: _rapid_before(t, p),
     "standstill twice": lambda t, p, e: _of(t, t.heads(), STANDSTILL, rb"\1\1"),
     "standstill lost": lambda t, p, e: _of(t, t.heads(), STANDSTILL, b""),
     "standstill longer": lambda t, p, e: _of(t, t.heads(), rb"G4 ([PF])", rb"G4 \g<1>9"),

@@ -85,9 +85,10 @@ def test_every_output_is_accepted_whatever_law_todays_rapids_follow(planner, dat
     assert (time <= most * (1.0 + 1e-9) + 1e-9).all()
 
 
-@CALM
-@given(machines(axes="XYZ"), programs())
-def test_every_table_is_accepted(machine, data):
+@pytest.mark.parametrize("part", range(2))  # for as many cores
+@settings(parent=CALM, max_examples=20)
+@given(machine=machines(axes="XYZ"), data=programs())
+def test_every_table_is_accepted(part, machine, data):
     machine = ready(machine)
     result = outputs(data, machine, "csv")
     assume(result is not None)

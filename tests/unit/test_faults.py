@@ -84,12 +84,26 @@ gcodejerk.cli.main()
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-@pytest.mark.parametrize("old", [None, OLD])
-def test_killed_before_any_call_to_the_system_it_leaves_no_half_file(folder, number, old):
+STRIDE = 4
+"""Calls from one kill to the next; the long run kills before each."""
+
+
+@pytest.mark.parametrize(
+    ("number", "old", "first"),
+    [
+        (signal.SIGKILL, OLD, 1),
+        (signal.SIGTERM, OLD, 2),
+        (signal.SIGKILL, None, 3),
+        (signal.SIGTERM, None, 4),
+    ],
+)
+def test_killed_before_any_call_to_the_system_it_leaves_no_half_file(
+    folder, number, old, first, request
+):
     Path("part.nc").write_bytes(SMALL)
     arguments = ["process", "part.nc", "-m", "vmc", "--report", "part.json"]
-    for moment in range(1, 30):
+    moments = range(1, 40) if request.config.getoption("--long") else range(first, 40, STRIDE)
+    for moment in moments:
         for left in set(names()) - {"part.nc"}:
             os.unlink(left)
         if old is not None:

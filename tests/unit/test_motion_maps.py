@@ -33,6 +33,48 @@ def test_every_point_is_the_closed_form(condition, damping):
     np.testing.assert_allclose(found[there], expected, rtol=1e-10, atol=1e-9)
 
 
+def simulated(condition, length, T1, T, frequency, damping, steps=400):
+    """Amplitude that an oscillator has after the move, stepped through it by Runge and Kutta.
+
+    Shares no code with the package: both halves of the move are triangles of acceleration that
+    change the speed by 1, and all is scaled by the way that this makes.
+    """
+    other = T / 2 - T1
+    t1, t2, t3, t4 = {"I": (T1, T1, other, other), "II": (T1, other, T1, other)}.get(
+        condition, (T1, other, other, T1)
+    )
+    heights = (0.0, 2 / (t1 + t2), 0.0, -2 / (t3 + t4), 0.0)
+    omega = 2 * np.pi * frequency
+    way = speed = x = v = np.zeros_like(T1)
+
+    def change(x, v, a):
+        return v, -a - 2 * damping * omega * v - omega**2 * x
+
+    for k, duration in enumerate((t1, t2, t3, t4)):
+        begin, end, h = heights[k], heights[k + 1], duration / steps
+        for n in range(steps):
+            a, b, c = (begin + (end - begin) * (n + part) / steps for part in (0.0, 0.5, 1.0))
+            x1, v1 = change(x, v, a)
+            x2, v2 = change(x + h / 2 * x1, v + h / 2 * v1, b)
+            x3, v3 = change(x + h / 2 * x2, v + h / 2 * v2, b)
+            x4, v4 = change(x + h * x3, v + h * v3, c)
+            x, v = x + h / 6 * (x1 + 2 * x2 + 2 * x3 + x4), v + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+            way, speed = way + h * speed + h**2 * (2 * a + c) / 6, speed + h * (a + c) / 2
+    x, v = x * length / way, v * length / way
+    damped = omega * np.sqrt(1 - damping**2)
+    return omega**2 * np.hypot(x, (v + damping * omega * x) / damped)
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize("damping", [0.0, 0.03])
+def test_a_point_is_what_a_simulated_oscillator_keeps(condition, damping):
+    T1, T = np.array([0.7, 3.0, 8.0, 11.0, 17.0]) * MS, np.array([37.0, 52.0, 90.0]) * MS
+    found = amplitude_map(0.37, T1, T, 43.0, damping, condition)
+    column, row = (part.ravel() for part in np.meshgrid(T1, T))
+    expected = simulated(condition, 0.37, column, row, 43.0, damping)
+    np.testing.assert_allclose(found.ravel(), expected, rtol=1e-6, atol=1e-3)
+
+
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_the_order_of_the_axes_is_the_users(condition):
     T1, T = np.array([7.0, 1.0, 3.0]) * MS, np.array([50.0, 20.0, 35.0]) * MS

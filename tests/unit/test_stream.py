@@ -117,6 +117,7 @@ def test_the_conventional_residual_is_that_of_the_controller_s_samples():
     displacement = drawn_moves(12, seed=6)
     batch = one_batch(displacement, INDEPENDENT)
     plans, modes = batch.plans, batch.plans.modes
+    assert np.count_nonzero(~batch.stays_conventional) >= 6
     for row in range(12):
         profiles = list(plans.profiles_of(row))
         counts = [int(np.ceil(plans.conventional.total[k] / 0.001 - 1e-6)) for k in profiles]

@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import entry_points
 from itertools import product
 from typing import BinaryIO
@@ -43,13 +44,19 @@ class Stamp:
 
 
 def choices_hash(
-    machine: Machine, controller: str, profile: str, expand_cycles: bool, dialect: str | None
+    settings_hash: str, controller: str, profile: str, expand_cycles: bool, dialect: str | None
 ) -> str:
-    """Eight hex digits of a machine file's settings and a user's choices."""
+    """Eight hex digits of the hash of a machine file's settings and a user's choices."""
     chosen = [controller, FORM, profile, *([EXPANDED] if expand_cycles else [])]
     chosen += [] if dialect is None else [f"dialect {dialect}"]
-    text = " ".join((machine.settings_hash, *chosen)).encode()
+    text = " ".join((settings_hash, *chosen)).encode()
     return hashlib.blake2b(text, digest_size=4).hexdigest()
+
+
+@cache
+def _controllers() -> tuple[str, ...]:
+    """Names of all that are installed: the same as long as a process lives."""
+    return tuple(entry.name for entry in entry_points(group="gcodejerk.controllers"))
 
 
 def read_stamp(processed: BinaryIO, machine: Machine) -> Stamp | None:
@@ -73,13 +80,12 @@ def read_stamp(processed: BinaryIO, machine: Machine) -> Stamp | None:
     if match is None:
         return None
     found = match[1].decode()
-    names = dict.fromkeys(
-        (machine.controller, *(entry.name for entry in entry_points(group="gcodejerk.controllers")))
-    )
+    names = dict.fromkeys((machine.controller, *_controllers()))
     profiles = dict.fromkeys((machine.design.profile, *PROFILES))
+    settings_hash = machine.settings_hash
     for dialect, expand, name, profile in product(
         (None, *DIALECTS, "auto"), (False, True), names, profiles
     ):
-        if choices_hash(machine, name, profile, expand, dialect) == found:
+        if choices_hash(settings_hash, name, profile, expand, dialect) == found:
             return Stamp(found, True, name, profile, dialect, expand)
     return Stamp(found)
