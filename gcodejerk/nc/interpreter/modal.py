@@ -1,9 +1,9 @@
 """The modal state of a program: every group, the position, and how words change them.
 
-Rule 1: all modal state lives in `State`, and a word changes it here, in the modules that `Executor`
-hands it to (`frames`, `cycles`, `flow`), or nowhere. A second place that remembers G91 is a second
-opinion about where the tool is. (`runs.py` computes whole runs of plain lines as arrays; a
-differential test holds it to this file on every column.)
+Rule 1: all modal state lives in `State`, and a word changes it here, in the modules that `Phases`
+hands it to (`effects`, `frames`, `cycles`, `moves`, `mcodes`), or nowhere. A second place that
+remembers G91 is a second opinion about where the tool is. (`runs.py` computes whole runs of plain
+lines as arrays; a differential test holds it to this file on every column.)
 
 Rule 2: this file knows no machine. It says what the program asked for.
 
