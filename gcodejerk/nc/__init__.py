@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from gcodejerk.nc.dialects import AUTO, DIALECTS, find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.interpreter.rapids import CERTAIN, REASONS, Rapids
+from gcodejerk.nc.interpreter.rapids import Rapids
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.program import Program, parse_block, read_program, trace
 from gcodejerk.nc.text.block import Block, Name, Word
+from gcodejerk.reasons import CERTAIN, REASONS
 from gcodejerk.start import Start
 
 __all__ = [

@@ -20,14 +20,14 @@ from gcodejerk.nc.flow.structures import Collector, Node
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.interpreter.beams import darkness
 from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, MODES, State
-from gcodejerk.nc.interpreter.rapids import REASONS, USES_FEED, RapidLog, Rapids
+from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.interpreter.runner import Finding, Runner
 from gcodejerk.nc.interpreter.runs import can_run, run_plain
 from gcodejerk.nc.text.block import Line
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK
 from gcodejerk.nc.text.tokenizer import parse_line
 from gcodejerk.nc.text.words import Lines
-from gcodejerk.reasons import Reason
+from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.start import Start
 
 _FILE_NAME = re.compile(rb"[ \t]*[A-Za-z_][\w-]*\.[A-Za-z]{1,5}[ \t]*(?:\([^()]*\)[ \t]*)?")

@@ -179,7 +179,7 @@ _POSITIONS = Table(((_LETTERS, _LENGTH),), _AXIS_NAMES, tuple(AXES))
 
 
 _PLANNER = Key("planner", Choice(PLANNERS),
-    "Which profile the controller's own G0 follows. linuxcnc-2.9: trapezoidal velocity, with half of "
+    "Which profile the control's own G0 follows. linuxcnc-2.9: trapezoidal velocity, with half of "
     "the acceleration (MAX_ACCELERATION) where no other motion follows; trapezoidal; jerk-limited; "
     "bell: a trapezoid of velocity averaged over acceleration/jerk. Left out: linuxcnc-2.9 with "
     "controller: linuxcnc and no jerk; else jerk-limited with a jerk, trapezoidal without.",

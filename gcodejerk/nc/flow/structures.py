@@ -96,27 +96,39 @@ class Collector:
     def _o_word(self, word: str, name: str, line: Line) -> Node | None:
         """Take an O-word."""
         top = self._stack[-1] if self._stack else None
-        mine = top is not None and top.name == name
         condition = line.block.o_arguments[0] if line.block.o_arguments else None
         if word in _JUMPS:
             self._append(Node(word, name, line))
-        elif top is not None and mine and word in ("else", "elseif"):
-            if top.kind != "if" or top.branches[-1][0] is None:
-                raise ValueError
-            top.branches.append((condition if word == "elseif" else None, []))
-        elif top is not None and mine and word == "while" and top.kind == "do":
-            top.branches[0] = (condition, top.body)
-            return self._close(line)
-        elif top is not None and mine and word == "end" + top.kind:
-            return self._close(line)
-        elif word in _OPENS and (word != "sub" or top is None) and len(self._stack) < DEEPEST:
-            node = Node(word, name, line, [(condition, [])])
-            if top is not None:
-                self._append(node)
-            self._stack.append(node)
-        else:
-            raise ValueError
+            return None
+        if top is not None and top.name == name:
+            if word in ("else", "elseif"):
+                self._branch(top, condition if word == "elseif" else None)
+                return None
+            if word == "while" and top.kind == "do":
+                top.branches[0] = (condition, top.body)
+                return self._close(line)
+            if word == "end" + top.kind:
+                return self._close(line)
+        self._open(Node(word, name, line, [(condition, [])]))
         return None
+
+    @staticmethod
+    def _branch(top: Node, condition: bytes | None) -> None:
+        """Begin another branch of an ``if``; none follows its ``else``."""
+        if top.kind != "if" or top.branches[-1][0] is None:
+            raise ValueError
+        top.branches.append((condition, []))
+
+    def _open(self, node: Node) -> None:
+        """Begin a structure."""
+        nested = bool(self._stack)
+        if node.kind not in _OPENS or (node.kind == "sub" and nested):
+            raise ValueError
+        if len(self._stack) >= DEEPEST:
+            raise ValueError
+        if nested:
+            self._append(node)
+        self._stack.append(node)
 
     def _append(self, node: Node) -> None:
         self._stack[-1].branches[-1][1].append(node)

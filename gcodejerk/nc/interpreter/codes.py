@@ -13,7 +13,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.interpreter.modal import NAN
 from gcodejerk.nc.interpreter.variables import before_block, word_value
-from gcodejerk.nc.text.block import Block, Name
+from gcodejerk.nc.text.block import Block, Name, Word
 
 _LENGTHS = frozenset("XYZABCUVWR")
 """Addresses whose numbers say where a block ends, and may need a decimal point."""
@@ -84,71 +84,96 @@ def sort_words(
     -------
     Codes
     """
-    codes = Codes()
-    values = codes.values
-    whole: list[str] = []
+    sorter = _Sorter(block, dialect, inch=inch, variables=variables)
+    codes = sorter.codes
     for word in block.words:
-        value = word.value
-        letter = word.letter
-        if value is None:
-            codes.expression = True
-            if letter in "GM" or letter in dialect.calls:
-                codes.reject(word.text)
-                continue
-            rules = dialect.arithmetic
-            known = before_block(block, variables, rules)
-            value = word_value(word, known, rules, inch and not _states_units(block, dialect))
-        if letter == "G":
-            code = round(value * 10.0)
-            group = dialect.groups.get(code) if abs(value * 10.0 - code) < 1e-3 else None
-            if group is None:
-                codes.reject(word.text)
-            elif group not in codes.g:
-                codes.g[group] = code
-            elif 800 in (code, codes.g[group]):
-                codes.g[group] = max(codes.g[group], code) if code != 800 else codes.g[group]
-                if codes.g[group] == 800:
-                    codes.g[group] = code
-            else:
-                codes.fault = True
-                codes.g[group] = code
-        elif letter == "M":
-            number = round(value)
-            m_group = dialect.m_groups.get(number) if number == value else None
-            if m_group is None:
-                if dialect.other_m == "unknown" or number != value:
-                    codes.reject(word.text)
-            elif m_group in _GROUPED_M and any(dialect.m_groups.get(m) == m_group for m in codes.m):
-                codes.fault = True
-            codes.m.append(number)
-        elif letter in dialect.calls:
+        value = sorter.computed(word) if word.value is None else word.value
+        if value is None or word.letter in dialect.calls:
             codes.reject(word.text)
-        elif letter in dialect.increments:
-            axis = dialect.increments[letter]
-            if axis in codes.increments or axis in values:
-                codes.fault = True
-            codes.increments[axis] = value
-            if word.whole and value:
-                whole.append(letter)
-        elif letter != "N":
-            if letter in values or letter in codes.increments:
-                codes.fault = True
-                value = NAN
-            values[letter] = value
-            if word.whole and value and letter in _LENGTHS:
-                whole.append(letter)
-            if letter == "F":
-                codes.feed_whole = word.whole and dialect.whole_numbers == "machine"
-            if word.function:
-                codes.functions[letter] = word.function
-    if block.assigns:
-        codes.expression = True
+        elif word.letter == "G":
+            sorter.g_code(word, value)
+        elif word.letter == "M":
+            sorter.m_code(word, value)
+        elif word.letter in dialect.increments:
+            sorter.increment(word, value)
+        elif word.letter != "N":
+            sorter.number(word, value)
+    codes.expression = codes.expression or bool(block.assigns)
     codes.names = list(block.names)
     if dialect.one_command and codes.g and (codes.m or len(codes.g) > 1):
         codes.fault = True
-    if whole and dialect.whole_numbers == "machine":
-        _whole_numbers(codes, whole, dialect, inch, decimal_point)
+    if sorter.whole and dialect.whole_numbers == "machine":
+        _whole_numbers(codes, sorter.whole, dialect, inch, decimal_point)
     return codes
+
+
+class _Sorter:
+    """Puts the words of a block where they belong, one by one."""
+
+    def __init__(
+        self, block: Block, dialect: Dialect, *, inch: bool, variables: Mapping[str, float]
+    ) -> None:
+        self.codes = Codes()
+        self.whole: list[str] = []
+        """Letters whose number has no decimal point, where it may need one."""
+        self._block, self._dialect = block, dialect
+        self._inch, self._variables = inch, variables
+
+    def computed(self, word: Word) -> float | None:
+        """The number of a word that is an expression; None where it is that of a code."""
+        self.codes.expression = True
+        if word.letter in "GM" or word.letter in self._dialect.calls:
+            return None
+        rules = self._dialect.arithmetic
+        known = before_block(self._block, self._variables, rules)
+        inch = self._inch and not _states_units(self._block, self._dialect)
+        return word_value(word, known, rules, inch)
+
+    def g_code(self, word: Word, value: float) -> None:
+        """A G word; beside G80, another code of its group is the one that counts."""
+        g, code = self.codes.g, round(value * 10.0)
+        group = self._dialect.groups.get(code) if abs(value * 10.0 - code) < 1e-3 else None
+        if group is None:
+            self.codes.reject(word.text)
+        elif group not in g or g[group] == 800:
+            g[group] = code
+        elif code != 800:
+            self.codes.fault = True
+            g[group] = code
+
+    def m_code(self, word: Word, value: float) -> None:
+        """An M word."""
+        codes, groups, number = self.codes, self._dialect.m_groups, round(value)
+        group = groups.get(number) if number == value else None
+        if group is None:
+            if self._dialect.other_m == "unknown" or number != value:
+                codes.reject(word.text)
+        elif group in _GROUPED_M and any(groups.get(m) == group for m in codes.m):
+            codes.fault = True
+        codes.m.append(number)
+
+    def increment(self, word: Word, value: float) -> None:
+        """A word that is always an increment of an axis: U, V, W, H of a lathe."""
+        codes, axis = self.codes, self._dialect.increments[word.letter]
+        if axis in codes.increments or axis in codes.values:
+            codes.fault = True
+        codes.increments[axis] = value
+        if word.whole and value:
+            self.whole.append(word.letter)
+
+    def number(self, word: Word, value: float) -> None:
+        """Any other word."""
+        codes, letter = self.codes, word.letter
+        if letter in codes.values or letter in codes.increments:
+            codes.fault = True
+            value = NAN
+        codes.values[letter] = value
+        if word.whole and value and letter in _LENGTHS:
+            self.whole.append(letter)
+        if letter == "F":
+            codes.feed_whole = word.whole and self._dialect.whole_numbers == "machine"
+        if word.function:
+            codes.functions[letter] = word.function
 
 
 def _states_units(block: Block, dialect: Dialect) -> bool:

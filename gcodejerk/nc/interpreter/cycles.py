@@ -48,46 +48,65 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
         state.put("cycle_level", NAN)
         return True
     plane = PLANES[state.plane]
-    first, second, along = (AXES.index(axis) for axis in plane)
-    series = state.cycle is not None
-    sticky = state.cycle if state.cycle is not None and state.cycle[0] == code else None
-    if sticky is None and not ("R" in values and plane[2] in values):
-        begins = state.cycle is not None or state.motion not in (code, None)
-        if begins and rules.missing == "error":
-            return False
-        sticky = (code, NAN, NAN)  # in force since somewhere that we could not follow
-    depth = values.get(plane[2], sticky[1] if sticky else NAN)
-    clearance = values.get("R", sticky[2] if sticky else NAN)
+    along = AXES.index(plane[2])
+    cycle = _cycle_in_force(state, code, values, rules)
     repeats = next((values[letter] for letter in rules.repeats if letter in values), 1.0)
-    if repeats <= 0 or any(axis in values for axis in AXES if axis not in plane):
+    beside = any(axis in values for axis in AXES if axis not in plane)
+    if cycle is None or repeats <= 0 or beside:
         return False
-    state.put("cycle", (code, depth, clearance))
-
-    if not series:
+    if state.cycle is None:
         state.put("cycle_level", state.position[along])
-    level = state.cycle_level
+    state.put("cycle", cycle)
     scale = state.scale(along)
-    r, bottom = clearance * scale, depth * scale
+    r, bottom = cycle[2] * scale, cycle[1] * scale
     if state.distance == 910:
-        r, bottom = r + level, r + level + bottom
+        r, bottom = r + state.cycle_level, r + state.cycle_level + bottom
     elif state.distance is None:
         r = bottom = NAN
     if r < bottom:
         return False
+    end = _end(state, r, rules)
+    for letter in plane[:2]:
+        if letter in values:
+            _go_to_hole(state, AXES.index(letter), values[letter], repeats)
+    state.move(along, end)
+    return True
+
+
+def _cycle_in_force(
+    state: State, code: int, values: Mapping[str, float], rules: Drilling
+) -> tuple[int, float, float] | None:
+    """Code, depth and R behind a block, which may leave words out; None where it may not."""
+    assert state.plane is not None
+    along = PLANES[state.plane][2]
+    if state.cycle is not None and state.cycle[0] == code:
+        _, depth, clearance = state.cycle
+    else:
+        begins = state.cycle is not None or state.motion not in (code, None)
+        if not ("R" in values and along in values) and begins and rules.missing == "error":
+            return None
+        depth = clearance = NAN  # else in force since somewhere that we could not follow
+    return code, values.get(along, depth), values.get("R", clearance)
+
+
+def _end(state: State, r: float, rules: Drilling) -> float:
+    """Where the tool comes back to along the drilling axis: R, or the level of the series."""
+    level = state.cycle_level
     # max() with a NaN would return either operand
     above = NAN if level != level or r != r else max(level, r)
     if rules.own_group and not r <= level:
         above = NAN  # not stated: where such a control returns to from an R above its level
-    known = above == r or state.retract is not None
-    end = NAN if not known else r if state.retract == 990 else above
-    for axis in (first, second):
-        if AXES[axis] in values:
-            value = values[AXES[axis]] * state.scale(axis)
-            if state.distance == 900:
-                state.move(axis, value)
-            elif state.distance == 910:
-                state.move(axis, state.position[axis] + repeats * value)
-            else:
-                state.move(axis, NAN)
-    state.move(along, end)
-    return True
+    if above != r and state.retract is None:
+        return NAN
+    return r if state.retract == 990 else above
+
+
+def _go_to_hole(state: State, axis: int, number: float, repeats: float) -> None:
+    """Go to the last hole of a block along one axis of the plane."""
+    value = number * state.scale(axis)
+    if state.distance == 900:
+        state.move(axis, value)
+    elif state.distance == 910:
+        state.move(axis, state.position[axis] + repeats * value)
+    else:
+        state.move(axis, NAN)

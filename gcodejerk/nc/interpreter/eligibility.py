@@ -159,20 +159,15 @@ def why_left_alone(
     bar = next((name for name, on in state.bars.items() if on is not False), None)
     if bar is not None:
         return BARS[bar]
-    return _judge_move(codes, step, state, dialect)
+    return _check_move(codes, step, state, dialect)
 
 
-def _judge_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Reason | None:
+def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Reason | None:
     """Find the reasons that lie in the move itself."""
     named = [k for k in range(len(AXES)) if step.words >> k & 1]
-    moves = unknown = False
-    for axis in named:
-        a, b = step.start[axis], step.end[axis]
-        if math.isnan(a) or math.isnan(b):
-            unknown = True
-        elif a != b:
-            moves = True
-    if not moves and not unknown:
+    ends = [(step.start[k], step.end[k]) for k in named]
+    unknown = any(math.isnan(a) or math.isnan(b) for a, b in ends)
+    if not unknown and all(a == b for a, b in ends):
         return Reason.NO_MOTION
     if state.distance is None:
         return Reason.DISTANCE_MODE_UNKNOWN
@@ -180,23 +175,33 @@ def _judge_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
         return Reason.UNITS_UNKNOWN
     if unknown:
         return Reason.START_UNKNOWN
+    mixed = len({AXES[k] in LINEAR for k in named if step.start[k] != step.end[k]}) > 1
+    return _check_known_move(codes, step, state, dialect, mixed=mixed)
+
+
+def _check_known_move(
+    codes: Codes, step: Step, state: State, dialect: Dialect, *, mixed: bool
+) -> Reason | None:
+    """Find what forbids to replace a move of which both ends are known."""
     if dialect.lengths_only and state.feed_unit != state.unit:
         return Reason.FEED_UNIT
     if dialect.path_has_to_be_stated and state.path is None:
         return Reason.PATH_UNKNOWN
     if step.way_unknown:
         return Reason.ROTARY_WAY
-    # Where the table does not say what a letter is for, nobody knows what it does to a rapid.
-    others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
-    if (
-        any(code not in dialect.harmless for code in codes.g.values())
-        or not dialect.before_m | dialect.after_m >= set(codes.m)
-        or others
-        or codes.names
-        or codes.functions
-    ):
+    if _other_words(codes, dialect):
         return Reason.OTHER_WORDS
-    moving = {AXES[k] in LINEAR for k in named if step.start[k] != step.end[k]}
-    if len(moving) > 1 and not dialect.feed_of_mixed:
+    if mixed and not dialect.feed_of_mixed:
         return Reason.MIXED_AXES
     return None
+
+
+def _other_words(codes: Codes, dialect: Dialect) -> bool:
+    """Whether words stand in the block that act neither before nor after its motion for certain."""
+    # Where the table does not say what a letter is for, nobody knows what it does to a rapid.
+    others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
+    return (
+        any(code not in dialect.harmless for code in codes.g.values())
+        or not dialect.before_m | dialect.after_m >= set(codes.m)
+        or bool(others or codes.names or codes.functions)
+    )

@@ -21,6 +21,17 @@ from gcodejerk.units import MM_PER_INCH
 def initial_state(dialect: Dialect, start: Start) -> State:
     """Make the state in which a program starts."""
     state = State()
+    _set_defaults(state, dialect)
+    _set_frames(state, start)
+    if start.startup:
+        _run_startup(state, dialect, start)
+    for axis, letter in enumerate(AXES):
+        state.position[axis] = start.positions.get(letter, NAN)
+    return state
+
+
+def _set_defaults(state: State, dialect: Dialect) -> None:
+    """Put the dialect's documented modes in force."""
     for group, code in dialect.defaults.items():
         if (name := GROUP_FIELDS.get(group)) is not None:
             setattr(state, name, code)
@@ -38,6 +49,10 @@ def initial_state(dialect: Dialect, start: Start) -> State:
     units = dialect.defaults.get("units")
     state.unit = None if units is None else MM_PER_INCH if dialect.units[units] else 1.0
     state.unit_stated = units is not None
+
+
+def _set_frames(state: State, start: Start) -> None:
+    """Take what the machine file says of axes and work systems."""
     state.wraps = tuple(start.wraps.get(axis) for axis in AXES)
     state.diameter = state.turns = start.diameter
     for system, offsets in start.offsets.items():
@@ -49,29 +64,29 @@ def initial_state(dialect: Dialect, start: Start) -> State:
         state.g92 = [0.0] * len(AXES)
     if state.system is not None:
         state.g5x = list(state.offsets.get(state.system, state.g5x))
-    if start.startup:
-        block = parse_line(start.startup.encode("latin-1", "replace"), dialect)
-        each = [Block(words=(word,)) for word in block.words]
-        if block.problem is not None:
-            raise ProgramError(
-                f"startup codes: {block.problem}",
-                "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
-                Place("startup", 1, block.column, start.startup),
-            )
-        executor = Executor(dialect, state, start)
-        steps = [executor.run(line) for line in (each if dialect.one_command else [block])]
-        if any(step.fault or step.unknown for step in steps):
-            raise ProgramError(
-                f"startup codes: the dialect {dialect.name} refuses {start.startup!r}",
-                "give codes that it has, and that may stand together",
-                Place("startup", 1, None, start.startup),
-            )
-        state.feed_unit = state.unit  # what holds at the start is the control's own unit
-        if "tool length" in _groups_of(block, dialect):
-            state.tool = [0.0] * len(AXES)
-    for axis, letter in enumerate(AXES):
-        state.position[axis] = start.positions.get(letter, NAN)
-    return state
+
+
+def _run_startup(state: State, dialect: Dialect, start: Start) -> None:
+    """Execute the codes that the machine file says are in force when a program starts."""
+    block = parse_line(start.startup.encode("latin-1", "replace"), dialect)
+    if block.problem is not None:
+        raise ProgramError(
+            f"startup codes: {block.problem}",
+            "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
+            Place("startup", 1, block.column, start.startup),
+        )
+    executor = Executor(dialect, state, start)
+    each = [Block(words=(word,)) for word in block.words]
+    steps = [executor.run(line) for line in (each if dialect.one_command else [block])]
+    if any(step.fault or step.unknown for step in steps):
+        raise ProgramError(
+            f"startup codes: the dialect {dialect.name} refuses {start.startup!r}",
+            "give codes that it has, and that may stand together",
+            Place("startup", 1, None, start.startup),
+        )
+    state.feed_unit = state.unit  # what holds at the start is the control's own unit
+    if "tool length" in _groups_of(block, dialect):
+        state.tool = [0.0] * len(AXES)
 
 
 def _groups_of(block: Block, dialect: Dialect) -> set[str]:

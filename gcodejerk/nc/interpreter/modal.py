@@ -1,9 +1,9 @@
 """The modal state of a program: every group, the position, and how words change them.
 
-Rule 1: all modal state lives in `State`, and a word changes it here, in the modules that `Executor`
-hands it to (`frames`, `cycles`, `moves`), or nowhere. A second place that remembers G91 is a second
-opinion about where the tool is. (`runs.py` computes whole runs of plain lines as arrays; a
-differential test holds it to this file on every column.)
+Rule 1: all modal state lives in `State`, and a word changes it here, in the modules that `Phases`
+hands it to (`effects`, `frames`, `cycles`, `moves`, `mcodes`), or nowhere. A second place that
+remembers G91 is a second opinion about where the tool is. (`runs.py` computes whole runs of plain
+lines as arrays; a differential test holds it to this file on every column.)
 
 Rule 2: this file knows no machine. It says what the program asked for.
 
@@ -332,25 +332,28 @@ def join(before: State, after: State) -> State:
     joined.touched = after.touched
     for field in FIELDS:
         a, b = getattr(before, field.name), getattr(after, field.name)
-        if field.kind == "constant" or _equal(field, a, b):
-            continue
-        if field.kind == "once":
-            joined.put(field.name, a or b)
-        elif field.kind == "named":
-            names = a.keys() | b.keys()
-            both = {name: (a.get(name, False), b.get(name, False)) for name in names}
-            joined.put(field.name, {n: x if x == y else None for n, (x, y) in both.items()})
-        elif field.name == "position":
-            for axis, (x, y) in enumerate(zip(a, b, strict=True)):
-                if not same(x, y):
-                    joined.move(axis, NAN)
-        elif field.kind == "axes":
-            joined.put(field.name, [x if x == y else NAN for x, y in zip(a, b, strict=True)])
-        elif field.name == "variables":
-            for name in [name for name, value in a.items() if b.get(name) != value]:
-                joined.set_variable(name, NAN)
-        elif field.kind == "table":
-            joined.offsets = {key: x for key, x in a.items() if b.get(key) == x}
-        else:
-            joined.lose(field.name)
+        if field.kind != "constant" and not _equal(field, a, b):
+            _join(joined, field, a, b)
     return joined
+
+
+def _join(joined: State, field: Field, a: Any, b: Any) -> None:
+    """Keep of one field what two states have in common; they differ in it."""
+    if field.kind == "once":
+        joined.put(field.name, a or b)
+    elif field.kind == "named":
+        both = {name: (a.get(name, False), b.get(name, False)) for name in a.keys() | b.keys()}
+        joined.put(field.name, {n: x if x == y else None for n, (x, y) in both.items()})
+    elif field.name == "position":
+        for axis, (x, y) in enumerate(zip(a, b, strict=True)):
+            if not same(x, y):
+                joined.move(axis, NAN)
+    elif field.kind == "axes":
+        joined.put(field.name, [x if x == y else NAN for x, y in zip(a, b, strict=True)])
+    elif field.name == "variables":
+        for name in [name for name, value in a.items() if b.get(name) != value]:
+            joined.set_variable(name, NAN)
+    elif field.kind == "table":
+        joined.offsets = {key: x for key, x in a.items() if b.get(key) == x}
+    else:
+        joined.lose(field.name)

@@ -19,7 +19,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.nc.interpreter.rapids import CERTAIN, Rapids
+from gcodejerk.nc.interpreter.rapids import Rapids
+from gcodejerk.reasons import CERTAIN
 
 WINDOW = 512
 """Bytes behind a rapid that are looked at first, and how far at most. [bytes]"""

@@ -13,17 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.interpreter.modal import State
-from gcodejerk.nc.interpreter.visits import Visits
-from gcodejerk.reasons import Reason
+from gcodejerk.nc.interpreter.visits import Row, Visits
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
-REASONS = tuple(Reason)
-CERTAIN = 255
-"""Entry of `Rapids.reason` for a rapid whose start, end and path are known."""
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
 FEED_UNKNOWN = _INDEX[Reason.FEED_UNKNOWN]
-EXACT = (61, 62)
-"""Path modes (G61, G61.1) in which no motion blends with the next."""
 NO_FEED, USES_FEED, GIVES_FEED = 0, 1, 2
 """What a block means for an F word in front of it: nothing, it may be used, it is replaced."""
 
@@ -99,26 +93,9 @@ _TYPES: dict[str, tuple[type, int]] = {
 }
 
 
-def common_columns(state: State) -> dict[str, object]:
-    """Fill the columns that depend on the modal state alone."""
-    unknown: list[float] = [state.shift(axis) for axis in range(len(AXES))]
-    return {
-        "inch": state.unit is not None and state.unit != 1.0,
-        "incremental": state.distance == 910,
-        "diameter": bool(state.diameter),
-        "distance_stated": state.distance_stated,
-        "feed_mode": state.feed_mode or 0,
-        "feed_mode_stated": state.feed_mode_stated,
-        "path": state.path or 0,
-        "path_p": state.path_p,
-        "path_q": state.path_q,
-        "lone": state.path not in EXACT,
-        "offset": unknown,
-        "feed_whole": bool(state.feed_whole),
-        "speed": np.nan,
-        "turned": 0,
-        "beam": state.spindle != 5,
-    }
+def _column(rows: list[Row], name: str, dtype: type) -> NDArray[Any]:
+    """Collect one column of rows."""
+    return np.array([getattr(row, name) for row in rows], dtype=dtype)
 
 
 class RapidLog:
@@ -126,7 +103,7 @@ class RapidLog:
 
     def __init__(self) -> None:
         self._parts: dict[str, list[NDArray[np.generic]]] = {name: [] for name in _TYPES}
-        self._rows: list[dict[str, object]] = []
+        self._rows: list[Row] = []
         self._needed: list[NDArray[np.bool_]] = []
         self._waiting = 0
         self.count = 0
@@ -145,19 +122,18 @@ class RapidLog:
             self._needed.append(np.full(self._waiting, event == USES_FEED))
             self._waiting = 0
 
-    def add(self, reason: Reason | None, row: dict[str, object]) -> None:
+    def add(self, reason: Reason | None, row: Row) -> None:
         """Add one rapid."""
-        row["reason"] = CERTAIN if reason is None else _INDEX[reason]
+        row.reason = CERTAIN if reason is None else _INDEX[reason]
         self._rows.append(row)
         self._waiting += 1
         self.count += 1
         if len(self._rows) >= 4096:
             self._flush()
 
-    def visit(self, line: int, reason: Reason | None, row: dict[str, object]) -> None:
+    def visit(self, line: int, reason: Reason | None, row: Row) -> None:
         """Take one pass over the block of a rapid that may run more than once."""
-        row["reason"] = CERTAIN if reason is None else _INDEX[reason]
-        row["feed_needed"] = False
+        row.reason = CERTAIN if reason is None else _INDEX[reason]
         self.visits.add(line, row)
 
     def add_many(
@@ -198,7 +174,7 @@ class RapidLog:
         for name in self._parts:
             if name != "feed_needed":
                 dtype, _ = _TYPES[name]
-                self._parts[name].append(np.array([row[name] for row in self._rows], dtype=dtype))
+                self._parts[name].append(_column(self._rows, name, dtype))
         self._rows = []
 
     def _merge_visits(self, columns: dict[str, NDArray[Any]]) -> None:
@@ -208,7 +184,7 @@ class RapidLog:
         kept = ~np.isin(columns["line"], np.array(list(self.visits.rows), dtype=np.int64))
         rows = self.visits.finish()
         for name, (dtype, width) in _TYPES.items():
-            visited: NDArray[Any] = np.array([row[name] for row in rows], dtype=dtype)
+            visited: NDArray[Any] = _column(rows, name, dtype)
             if width:
                 visited = visited.reshape(len(rows), width)
             columns[name] = np.concatenate([columns[name][kept], visited])

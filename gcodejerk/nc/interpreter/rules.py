@@ -13,6 +13,8 @@ from gcodejerk.nc.interpreter.modal import State
 _AXIS_USERS = frozenset({"return", "table", "local", "set"})
 """Effects that take the axis words of the block, so that no motion may be stated beside them."""
 _OFF = frozenset({400, None})
+_REFUSED = -1
+"""In the place of a motion code: the control refuses the block."""
 
 
 def takes_axes(codes: Codes) -> bool:
@@ -28,53 +30,52 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     values, g = codes.values, codes.g
     if values.get("F", 0.0) < 0.0 or values.get("S", 0.0) < 0.0:
         return False
-    axes = bool(codes.moved())
-    if dialect.strict:
-        motion = _strict_motion(codes, state, dialect, axes)
-        if motion is None:
-            return False
-        if motion < 0:
-            motion = None
-    else:
-        # The block of a dwell, or of a return, may name a motion that it does not make.
-        taken = any(dialect.effect(code) in ("words", "return", "set") for code in g.values())
-        motion = None if taken else g.get("motion", state.motion)
-        if dialect.effect(g.get("non-modal")) == "machine" and axes and motion not in (0, 10):
-            return False
-    drawn = dialect.strict or axes or arc_words(values, state)
-    plane = g.get("plane", state.plane) if dialect.centres_of_plane else None
-    if motion in dialect.arcs and drawn and not _arc_complete(values, plane):
+    motion = (_strict_motion if dialect.strict else _lenient_motion)(codes, state, dialect)
+    if motion == _REFUSED:
         return False
-    inverse = (
-        dialect.feed_modes.get(g["feed mode"]) == 93 if "feed mode" in g else state.feed_mode == 93
-    )
-    if motion not in (None, 0, 800) and inverse and axes and "F" not in values:
+    axes = bool(codes.moved())
+    if motion in dialect.arcs and (dialect.strict or axes or arc_words(values, state)):
+        plane = g.get("plane", state.plane) if dialect.centres_of_plane else None
+        if not _arc_complete(values, plane):
+            return False
+    mode = dialect.feed_modes.get(g["feed mode"]) if "feed mode" in g else state.feed_mode
+    if mode == 93 and motion not in (None, 0, 800) and axes and "F" not in values:
         return False
     return _words_used(codes, motion, state, dialect)
 
 
-def _strict_motion(codes: Codes, state: State, dialect: Dialect, axes: bool) -> int | None:
-    """Motion code that the block's axis words are for, -1 for none, None where it is refused."""
-    values, g = codes.values, codes.g
-    motion, effect = g.get("motion"), dialect.effect(g.get("non-modal"))
+def _lenient_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
+    """Motion code that the axis words are for on a control that is not strict; None for none."""
+    effects = {dialect.effect(code) for code in codes.g.values()}
+    # The block of a dwell, or of a return, may name a motion that it does not make.
+    taken = not effects.isdisjoint(("words", "return", "set"))
+    motion = None if taken else codes.g.get("motion", state.motion)
+    machine = dialect.effect(codes.g.get("non-modal")) == "machine"
+    return _REFUSED if machine and codes.moved() and motion not in (0, 10) else motion
+
+
+def _strict_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
+    """Motion code that the axis words are for on a strict control; None for none."""
+    motion, axes = codes.g.get("motion"), bool(codes.moved())
+    effect = dialect.effect(codes.g.get("non-modal"))
     if effect in _AXIS_USERS or (axes and takes_axes(codes)):
-        if motion not in (None, 800) or (effect in ("local", "set") and not axes):
-            return None
-        motion = None
-    elif motion is None and (axes or arc_words(values, state)):
-        motion = state.motion
-        if motion == 800:
-            return None
-    elif (motion not in (None, 0, 10, *dialect.arcs, 800) and not axes) or (motion == 800 and axes):
-        return None
-    if effect == "machine" and not (
-        axes
-        and motion in (0, 10)
-        and state.compensation in _OFF
-        and g.get("distance", state.distance) != 910
-    ):
-        return None
-    return -1 if motion is None else motion
+        bare = effect in ("local", "set") and not axes
+        motion = _REFUSED if bare or motion not in (None, 800) else None
+    elif motion is None and (axes or arc_words(codes.values, state)):
+        motion = _REFUSED if state.motion == 800 else state.motion
+    elif motion == 800:
+        motion = _REFUSED if axes else motion
+    elif motion not in (None, 0, 10, *dialect.arcs) and not axes:
+        motion = _REFUSED
+    if effect == "machine" and not (axes and _takes_machine_position(codes, motion, state)):
+        return _REFUSED
+    return motion
+
+
+def _takes_machine_position(codes: Codes, motion: int | None, state: State) -> bool:
+    """Whether G53 may stand beside this motion, in these modes."""
+    absolute = codes.g.get("distance", state.distance) != 910
+    return motion in (0, 10) and state.compensation in _OFF and absolute
 
 
 def _words_used(codes: Codes, motion: int | None, state: State, dialect: Dialect) -> bool:

@@ -15,7 +15,8 @@ from gcodejerk.nc.interpreter.eligibility import Call, Step
 from gcodejerk.nc.interpreter.execute import Executor
 from gcodejerk.nc.interpreter.initial import initial_state
 from gcodejerk.nc.interpreter.modal import NAN, State, join
-from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog, common_columns
+from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
+from gcodejerk.nc.interpreter.visits import Row
 from gcodejerk.nc.text.block import Line
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
@@ -63,7 +64,7 @@ class Runner:
     def state(self, state: State) -> None:
         self.executor.state = state
 
-    def run(self, line: Line, uncertain: bool = False, visit: bool = False) -> State | None:
+    def run(self, line: Line, *, uncertain: bool = False, visit: bool = False) -> State | None:
         """Execute a block and enter what it did.
 
         Parameters
@@ -84,15 +85,8 @@ class Runner:
         executor, block = self.executor, line.block
         before = executor.state.copy() if block.block_delete else None
         step = executor.run(block)
-        if visit and line.number in self.log.visits.rows:
-            pass  # said on the first pass
-        elif step.fault and block.problem is None:
-            self.add_problem(line, "the controller would refuse this combination of words")
-        elif step.unknown:
-            name = self.dialect.name
-            self.add_problem(
-                line, f"{step.unknown} is a code that the dialect {name} does not know"
-            )
+        if not (visit and line.number in self.log.visits.rows):  # else said on the first pass
+            self._name_problem(step, line)
         if not ((before is not None or uncertain) and step.feed_event == GIVES_FEED):
             self.log.feed_event(step.feed_event)
         self.log.habits |= step.habit
@@ -100,18 +94,28 @@ class Runner:
         if step.leaves:
             self.left()
         if step.rapid:
-            self._rapid(step, line, uncertain, visit)
+            self._rapid(step, line, uncertain=uncertain, visit=visit)
         elif visit:
             self.log.visits.add(line.number, None)
-        goes_on = self._call(step, line, before is not None)
+        goes_on = self._call(step, line, may_skip=before is not None) and not step.ends
         after = executor.state
         if self.observe is not None and visit:
             self.observe(line, after if before is None else join(before, after))
         if before is not None:
-            executor.state = before if step.ends or not goes_on else join(before, after)
-        return after if step.ends or not goes_on else None
+            executor.state = join(before, after) if goes_on else before
+        return None if goes_on else after
 
-    def _call(self, step: Step, line: Line, may_skip: bool) -> bool:
+    def _name_problem(self, step: Step, line: Line) -> None:
+        """Tell the user of a block that the control refuses, or of a code nobody knows."""
+        if step.fault and line.block.problem is None:
+            self.add_problem(line, "the controller would refuse this combination of words")
+        elif step.unknown:
+            name = self.dialect.name
+            self.add_problem(
+                line, f"{step.unknown} is a code that the dialect {name} does not know"
+            )
+
+    def _call(self, step: Step, line: Line, *, may_skip: bool) -> bool:
         """Run what the block calls; whether the program goes on."""
         if step.call is None:
             return True
@@ -123,7 +127,7 @@ class Runner:
             self.log.feed_event(USES_FEED)
         return goes_on
 
-    def _rapid(self, step: Step, line: Line, uncertain: bool, visit: bool) -> None:
+    def _rapid(self, step: Step, line: Line, *, uncertain: bool, visit: bool) -> None:
         """Enter a rapid."""
         state, reason = self.state, step.reason
         if uncertain and reason not in (Reason.AFTER_END, Reason.BLOCK_DELETE):
@@ -135,20 +139,13 @@ class Runner:
                 reason = Reason.FEED_UNKNOWN
         if reason is None:
             self.ask(line.number)
-        row = common_columns(state)
-        row.update(
-            line=line.number,
-            begin=line.begin,
-            end=line.begin + len(line.text),
-            terminator=line.terminator,
-            start=step.start,
-            target=step.end,
-            turned=step.turned,
-            beam=step.beam,
-            words=step.words,
-            feed=state.feed,
-            speed=speed,
-        )
+        row = Row.of(state)
+        row.line, row.terminator = line.number, line.terminator
+        row.begin, row.end = line.begin, line.begin + len(line.text)
+        row.start, row.target = step.start, step.end
+        row.turned, row.words = step.turned, step.words
+        row.beam = step.beam
+        row.feed, row.speed = state.feed, speed
         if visit:
             self.log.visit(line.number, reason, row)
         else:

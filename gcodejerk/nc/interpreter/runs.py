@@ -7,6 +7,9 @@ word without a use, no F in G93), the run ends in front of it and the careful wa
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,16 +17,10 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LINEAR, PLANES, Dialect
 from gcodejerk.nc.interpreter.eligibility import BARS
 from gcodejerk.nc.interpreter.modal import State
-from gcodejerk.nc.interpreter.rapids import (
-    CERTAIN,
-    GIVES_FEED,
-    REASONS,
-    USES_FEED,
-    RapidLog,
-    common_columns,
-)
+from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
+from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines
-from gcodejerk.reasons import Reason
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 Column = tuple[NDArray[np.int64], NDArray[np.float64]]
 
@@ -144,7 +141,7 @@ def run_plain(
 
     start, target = _positions(state, lines, first, last, rapid)
     history = np.concatenate([[state.feed], feed_values])
-    columns = common_columns(state)
+    columns: dict[str, Any] = asdict(ModeColumns.of(state))
     row = rapid + first
     columns.update(
         line=row + place[0],

@@ -8,19 +8,80 @@ unknown in its row.
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.interpreter.modal import NAN, same
+from gcodejerk.nc.interpreter.modal import NAN, State, same
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
-Row = dict[str, Any]
+EXACT = (61, 62)
+"""Path modes (G61, G61.1) in which no motion blends with the next."""
 SUBPROGRAM = REASONS.index(Reason.SUBPROGRAM)
 NEAR = 1e-9
 """Sums of increments differ in their last digits from pass to pass. [mm, deg]"""
-_ALIKE = ("words", "inch", "incremental", "diameter", "feed_mode", "path", "path_p", "path_q")
+_ALIKE = (
+    *("reason", "words", "inch", "incremental", "diameter", "feed_mode"),
+    *("path", "path_p", "path_q", "speed"),
+)
 """What a stream relies on besides its start and end."""
-_STATED = ("distance_stated", "feed_mode_stated", "feed_whole")
+
+
+@dataclass(slots=True)
+class ModeColumns:
+    """What the modal state alone says of a rapid, by the columns of `rapids.Rapids`."""
+
+    inch: bool
+    incremental: bool
+    diameter: bool
+    distance_stated: bool
+    feed_mode: int
+    feed_mode_stated: bool
+    path: int
+    path_p: float
+    path_q: float
+    lone: bool
+    offset: list[float]
+    feed_whole: bool
+    beam: bool
+    speed: float = NAN
+    turned: int = 0
+
+    @classmethod
+    def of(cls, state: State) -> Self:
+        """Fill the columns in; what a block adds is set by whoever runs it."""
+        return cls(
+            inch=state.unit is not None and state.unit != 1.0,
+            incremental=state.distance == 910,
+            diameter=bool(state.diameter),
+            distance_stated=state.distance_stated,
+            feed_mode=state.feed_mode or 0,
+            feed_mode_stated=state.feed_mode_stated,
+            path=state.path or 0,
+            path_p=state.path_p,
+            path_q=state.path_q,
+            lone=state.path not in EXACT,
+            offset=[state.shift(axis) for axis in range(len(AXES))],
+            feed_whole=bool(state.feed_whole),
+            beam=state.spindle != 5,
+        )
+
+
+@dataclass(slots=True)
+class Row(ModeColumns):
+    """One rapid, by the columns of `rapids.Rapids`."""
+
+    line: int = 0
+    begin: int = 0
+    end: int = 0
+    terminator: int = 0
+    start: list[float] = field(default_factory=list)
+    target: list[float] = field(default_factory=list)
+    words: int = 0
+    reason: int = CERTAIN
+    feed: float = NAN
+    feed_needed: bool = False
 
 
 class Visits:
@@ -47,7 +108,7 @@ class Visits:
             for line in self._waiting:
                 row = self.rows[line]
                 if row is not None:
-                    row["feed_needed"] = True
+                    row.feed_needed = True
         self._waiting.clear()
 
     def spoil(self, first: int, last: int) -> None:
@@ -64,8 +125,8 @@ class Visits:
                 until = max(until, spoiled[at][1])
                 at += 1
             if row is not None:
-                if row["reason"] == CERTAIN and line <= until:
-                    row["reason"] = SUBPROGRAM
+                if row.reason == CERTAIN and line <= until:
+                    row.reason = SUBPROGRAM
                 found.append(row)
         return found
 
@@ -74,27 +135,30 @@ def _merge(a: Row | None, b: Row | None) -> Row | None:
     """Join what two passes say."""
     if a is None or b is None:
         row = a or b
-        return None if row is None else {**row, "reason": SUBPROGRAM}
-    row = dict(a)
-    row["feed_needed"] = a["feed_needed"] or b["feed_needed"]
-    alike = a["reason"] == b["reason"] and all(same(a[name], b[name]) for name in _ALIKE)
-    alike &= same(a["speed"], b["speed"])
-    for name in ("start", "target", "offset"):
-        row[name] = [
-            x if x == y or abs(x - y) < NEAR else NAN for x, y in zip(a[name], b[name], strict=True)
-        ]
-    for name in _STATED:
-        row[name] = a[name] and b[name]
-    row["turned"] |= b["turned"]
-    row["beam"] = a["beam"] or b["beam"]
-    if not same(a["feed"], b["feed"]) or a["feed_whole"] != b["feed_whole"]:
-        row["feed"] = NAN
-    known = all(
-        row[name][axis] == row[name][axis]
-        for name in ("start", "target")
-        for axis in range(len(AXES))
-        if row["words"] >> axis & 1
+        return None if row is None else replace(row, reason=SUBPROGRAM)
+    row = replace(
+        a,
+        start=_near(a.start, b.start),
+        target=_near(a.target, b.target),
+        offset=_near(a.offset, b.offset),
+        feed_needed=a.feed_needed or b.feed_needed,
+        distance_stated=a.distance_stated and b.distance_stated,
+        feed_mode_stated=a.feed_mode_stated and b.feed_mode_stated,
+        feed_whole=a.feed_whole and b.feed_whole,
+        turned=a.turned | b.turned,
+        beam=a.beam or b.beam,
     )
-    if not alike or (a["reason"] == CERTAIN and not known):
-        row["reason"] = SUBPROGRAM
+    if not same(a.feed, b.feed) or a.feed_whole != b.feed_whole:
+        row.feed = NAN
+    named = [axis for axis in range(len(AXES)) if row.words >> axis & 1]
+    places = [place for axis in named for place in (row.start[axis], row.target[axis])]
+    known = not any(map(math.isnan, places))
+    alike = all(same(getattr(a, name), getattr(b, name)) for name in _ALIKE)
+    if not alike or (a.reason == CERTAIN and not known):
+        row.reason = SUBPROGRAM
     return row
+
+
+def _near(a: list[float], b: list[float]) -> list[float]:
+    """Keep the places that are the same; NaN for the others."""
+    return [x if x == y or abs(x - y) < NEAR else NAN for x, y in zip(a, b, strict=True)]

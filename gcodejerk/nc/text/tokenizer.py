@@ -266,32 +266,52 @@ class _Line(Cursor):
 
     def rest(self) -> None:
         """Take what stands here, until nothing is left."""
-        rules, text = self.rules, self.text
-        byte = text[self.at : self.at + 1]
+        rules = self.rules
+        byte = self.text[self.at : self.at + 1]
         if byte.isalpha() or (byte == b"_" and rules.names):
-            leads = all(word.letter == "N" for word in self.words) and not self.names
-            if byte in b"Oo" and leads and rules.o_word != "error":
-                self.flow()
-            elif not (rules.keywords and self.keyword()) and not (rules.names and self.name()):
-                self.word()
-        elif (
-            (byte == b"(" and rules.parentheses != "code")
-            or (byte == b";" and rules.semicolon == "comment")
-            or (rules.slashes and text.startswith(b"//", self.at))
-        ):
+            self._letter(byte)
+        elif self._comment_begins(byte):
             self.comment()
         elif byte == b";" and rules.semicolon == "end":
-            if _BLOCK.fullmatch(text, self.at + 1):
-                raise SyntaxProblem("another block behind the end of the block", self.at + 1)
-            self.comments.append((self.at, len(text)))
-            self.at = len(text)
+            self._block_end()
         elif byte == b"#" and rules.variables == "#":
             self.assignment()
         elif byte == b"/" and self.delete_mark():
             pass
         elif byte == b"%":
             self.percent_mark()
-        elif byte == b"$" and "$" in self.dialect.names:
+        elif not self._rare(byte):
+            raise SyntaxProblem(f"{_shown(byte)} has no meaning here", self.at)
+
+    def _letter(self, byte: bytes) -> None:
+        """Take an O-word, a keyword, a word with a name, or a word."""
+        rules = self.rules
+        leads = all(word.letter == "N" for word in self.words) and not self.names
+        if byte in b"Oo" and leads and rules.o_word != "error":
+            self.flow()
+        elif not (rules.keywords and self.keyword()) and not (rules.names and self.name()):
+            self.word()
+
+    def _comment_begins(self, byte: bytes) -> bool:
+        """Whether a comment begins here."""
+        rules = self.rules
+        return (
+            (byte == b"(" and rules.parentheses != "code")
+            or (byte == b";" and rules.semicolon == "comment")
+            or (rules.slashes and self.text.startswith(b"//", self.at))
+        )
+
+    def _block_end(self) -> None:
+        """Pass over a ``;`` that ends the block, and over text behind it that is none."""
+        if _BLOCK.fullmatch(self.text, self.at + 1):
+            raise SyntaxProblem("another block behind the end of the block", self.at + 1)
+        self.comments.append((self.at, len(self.text)))
+        self.at = len(self.text)
+
+    def _rare(self, byte: bytes) -> bool:
+        """Take what few dialects have: system data, ``:1000``, a checksum, an end of block."""
+        rules, text = self.rules, self.text
+        if byte == b"$" and "$" in self.dialect.names:
             end = _TO_COMMENT.match(text, self.at).end()  # type: ignore[union-attr]
             self.names.append(Name("$", text[self.at : end]))
             self.at = end
@@ -305,7 +325,8 @@ class _Line(Cursor):
             if self.skip() not in (b"", b";"):
                 raise SyntaxProblem("text behind the end of the block", self.at)
         else:
-            raise SyntaxProblem(f"{_shown(byte)} has no meaning here", self.at)
+            return False
+        return True
 
 
 @lru_cache(maxsize=16)

@@ -1,0 +1,331 @@
+"""What the words of a block do to the modal state, one phase after another.
+
+Rule: the order is fixed and stands in `Phases.act`, top to bottom, whatever the order on the line
+(LinuxCNC manual, "G-code order of execution"). Each phase says which words it takes, and why it
+stands where it does.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.dialect import Dialect, Effect
+from gcodejerk.nc.interpreter import frames
+from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
+from gcodejerk.nc.interpreter.codes import Codes
+from gcodejerk.nc.interpreter.cycles import begin_cycle, run_cycle
+from gcodejerk.nc.interpreter.effects import Effects
+from gcodejerk.nc.interpreter.eligibility import Step
+from gcodejerk.nc.interpreter.mcodes import run_m_code
+from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, State
+from gcodejerk.nc.interpreter.moves import (
+    go_straight,
+    go_to_machine_position,
+    go_to_stored_point,
+    plane_axes,
+)
+from gcodejerk.nc.interpreter.rapids import GIVES_FEED, NO_FEED, USES_FEED
+from gcodejerk.nc.interpreter.rules import arc_words, takes_axes
+from gcodejerk.start import Start
+from gcodejerk.units import MM_PER_INCH
+
+_TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
+"""Effects of a code beside which the axis words of the block are no straight move."""
+_NAME_TAKES_WORDS: frozenset[Effect] = (_TAKES_WORDS - {"flow"}) | {"frames", "transform"}
+"""The same of a name; one of flow that goes on to the next block leaves the words to the motion."""
+_TAKES_AXES: frozenset[Effect] = frozenset({"table", "local", "set", "frames", "data"})
+"""Effects of a non-modal code that the axis words belong to."""
+_ENDS = frozenset({2, 17, 30, 99})
+_STOPS = frozenset({0, 1, 60})
+
+
+class Phases(Effects):
+    """Executes the words of blocks on a state."""
+
+    def __init__(self, dialect: Dialect, state: State, start: Start) -> None:
+        super().__init__(dialect, state, start)
+        self._stays = start.resume == "same" or (start.resume is None and dialect.same_after_stop)
+        """Behind M0 and M1 the axes stand where they stood."""
+        self._contour: float | None = None
+        """N of the block that ends a contour, which a cycle runs by itself."""
+
+    def act(self, codes: Codes, step: Step) -> None:
+        """Execute the words of a block, in the fixed order."""
+        if codes.unknown or not self._goes_on(codes, step):
+            self.state.forget()
+            step.feed_event = USES_FEED
+            return
+        self._feed_mode(codes)
+        self._feed(codes, step)
+        self._m_codes(codes, step)
+        self._tool_words(codes)
+        self._modal_groups(codes)
+        self._units(codes)
+        self._g_effects(codes, step)
+        self._names(codes, step)
+        self._path(codes)
+        self._motion(codes, step)
+        self._beams(codes, step)
+        step.end = self.state.position.copy()
+        self._stop(codes, step)
+
+    def _feed_mode(self, codes: Codes) -> None:
+        """G93, G94, G95: in front of F, since another mode makes the old F meaningless."""
+        state, code = self.state, codes.g.get("feed mode")
+        if code is None:
+            return
+        mode = self.dialect.feed_modes.get(code)
+        if mode != state.feed_mode:
+            state.put("feed", NAN)
+        state.put("feed_mode", mode)
+        state.put("feed_mode_stated", True)
+
+    def _feed(self, codes: Codes, step: Step) -> None:
+        """F, where it is a feed: in a dwell it may be a time."""
+        if "F" not in codes.values or self._dwells(codes):
+            return
+        feed = codes.values["F"]
+        self.state.put("feed", feed)
+        self.state.put("feed_whole", codes.feed_whole)
+        if feed == feed:
+            step.feed_event = GIVES_FEED
+
+    def _m_codes(self, codes: Codes, step: Step) -> None:
+        """M codes but stops: a program that is not followed leaves nothing of what stood before."""
+        state, dialect = self.state, self.dialect
+        for m in codes.m:
+            if run_m_code(state, m, dialect, step):
+                self._leave(step)
+            if m in dialect.m_bars:
+                on = _switched(codes.values.get("P", 1.0))
+                state.put("bars", {**state.bars, dialect.m_bars[m]: on})
+
+    def _tool_words(self, codes: Codes) -> None:
+        """T, D and the like where they move the tool or its frame; G43 comes with the codes."""
+        state, dialect, values = self.state, self.dialect, codes.values
+        if dialect.tool_word_moves and "T" in values:
+            state.forget_positions()
+        if dialect.length_word in values and "tool length" not in codes.g:
+            frames.tool_length(state, 0, values, {}, dialect)
+        if not dialect.tool_frame.isdisjoint(values):
+            state.lose("tool")
+            state.forget_positions()
+            frames.end_bar(state, "tool data written")
+
+    def _modal_groups(self, codes: Codes) -> None:
+        """G codes whose number is the mode, transforms and bars: before the words they change."""
+        state, g, dialect = self.state, codes.g, self.dialect
+        if state.cycle is not None and g.get("distance", state.distance) != state.distance:
+            # R and Z that stay in force across G90/G91 are read anew in a way not documented
+            self._lose_depths()
+        for group, code in g.items():
+            if (name := GROUP_FIELDS.get(group)) is not None and group != "motion":
+                state.put(name, code)
+            if code in dialect.transforms:
+                self._transform(*dialect.transforms[code])
+            if code in dialect.bars:
+                name, begins = dialect.bars[code]
+                on = _switched(codes.values.get("P", 0.0)) if begins == "P" else begins
+                state.put("bars", {**state.bars, name: on})
+        if "distance" in g:
+            state.put("distance_stated", True)
+
+    def _units(self, codes: Codes) -> None:
+        """G20, G21: behind F, which was written in the unit of its own block."""
+        state, code = self.state, codes.g.get("units")
+        if code is None:
+            return
+        unit = MM_PER_INCH if self.dialect.units[code] else 1.0
+        feed_unit = state.feed_unit if code in self.dialect.lengths_only else unit
+        # G21 F100 at the top: the F is meant in mm. Should the control have started in inches and
+        # read it so, restoring F100 is the slower of the two; with G20 F10 it would be the faster.
+        slower = unit == 1.0 or not self.dialect.feed_before_units
+        beside_feed = "F" in codes.values and state.feed_unit is None and slower
+        if feed_unit != state.feed_unit and not beside_feed:
+            state.put("feed", NAN)
+        state.put("feed_unit", feed_unit)
+        if unit != state.unit:
+            for name in ("path_p", "path_q"):
+                state.put(name, NAN)
+            if state.cycle is not None:
+                self._lose_depths()
+        state.put("unit", unit)
+        state.put("unit_stated", True)
+
+    def _g_effects(self, codes: Codes, step: Step) -> None:
+        """What G codes do besides: tool length, work system, diameters; in the unit just stated."""
+        for code in codes.g.values():
+            self._effect(self.dialect.effect(code), code, codes.values, step)
+
+    def _names(self, codes: Codes, step: Step) -> None:
+        """Words with a name (TRANS, MCALL, FGROUP): they change what the codes have selected."""
+        effects = [self._named(name) for name in codes.names]
+        if "modal cycle" in effects:
+            # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
+            step.leaves = len(effects) > 1
+            self._modal_cycle(begins=step.leaves)
+            return
+        for effect in effects:
+            if effect == "flow":
+                continue
+            if effect == "feed override":
+                self.state.put("bars", {**self.state.bars, effect: True})
+            if effect == "feed group":
+                self._feed_group(codes.names)
+            self._effect(effect, 0, codes.values, step)
+
+    def _path(self, codes: Codes) -> None:
+        """G61, G64 P Q: behind the units, which forget tolerances."""
+        state, code = self.state, codes.g.get("path")
+        if code is None:
+            return
+        continuous = code == 640
+        state.put("path", self.dialect.paths.get(code))
+        state.put("path_p", codes.values.get("P", NAN) if continuous else NAN)
+        state.put("path_q", codes.values.get("Q", NAN) if continuous else NAN)
+
+    def _motion(self, codes: Codes, step: Step) -> None:
+        """Axis words: a motion, unless a dwell, a cycle or a macro takes them for itself."""
+        if not self._takes_words(codes):
+            self._move(codes, step)
+            return
+        g, dialect = codes.g, self.dialect
+        self._select_motion(codes)
+        contour = g.get("non-modal") in dialect.contours
+        self._contour = codes.values.get("Q") if contour else None
+        if dialect.one_command and not g and step.words and not codes.m:
+            # Words without a command: a build may take them for one.
+            self.state.forget_positions()
+
+    def _beams(self, codes: Codes, step: Step) -> None:
+        """Note what tells a laser from a mill, with the motion and the spindle as they are now."""
+        feeds = bool(step.words) and self.state.motion != self.dialect.rapid
+        step.habit = shows_habits(codes, self.state, feeds, self.dialect)
+        step.outputs = uses_outputs(codes)
+
+    def _stop(self, codes: Codes, step: Step) -> None:
+        """M0, M1, M2, M30 and their kin: behind the motion of their block."""
+        for m in codes.m:
+            if self.dialect.m_groups.get(m) != "stop":
+                continue
+            if m in _ENDS:
+                step.ends = True
+            elif m in _STOPS and not self._stays:
+                # Meanwhile somebody may have moved the axes by hand.
+                self.state.forget_positions()
+
+    def _dwells(self, codes: Codes) -> bool:
+        """Whether a code takes all words of the block for itself, F among them."""
+        dialect = self.dialect
+        return any(dialect.effect(code) == "words" for code in codes.g.values()) or (
+            dialect.one_command and not codes.g
+        )
+
+    def _takes_words(self, codes: Codes) -> bool:
+        """Whether the axis words of the block are no straight move."""
+        return (
+            self._dwells(codes)
+            or any(self.dialect.effect(code) in _TAKES_WORDS for code in codes.g.values())
+            or any(self._named(name) in _NAME_TAKES_WORDS for name in codes.names)
+        )
+
+    def _lose_depths(self) -> None:
+        """Forget Z, R and the level of the cycle in force."""
+        assert self.state.cycle is not None
+        self.state.put("cycle", (self.state.cycle[0], NAN, NAN))
+        self.state.put("cycle_level", NAN)
+
+    def _move(self, codes: Codes, step: Step) -> None:
+        """Execute the motion, or what takes its axis words away."""
+        state, dialect = self.state, self.dialect
+        step.start = state.position.copy()  # behind a tool change or a new frame, before the move
+        if not dialect.strict:
+            self._select_motion(codes)
+        if self._axes_taken(codes, step):
+            return
+        if dialect.strict:
+            self._select_motion(codes)
+        cycle = self._cycle(codes.g)
+        if not step.words and not arc_words(codes.values, state):
+            if cycle is not None and "cycle" in codes.g:
+                begin_cycle(state, cycle, codes.values)
+            return
+        if state.motion is None and cycle is None:
+            state.forget_positions()
+            state.put("cycle", None)
+            step.feed_event = USES_FEED
+            return
+        at_feed = state.motion != dialect.rapid or dialect.feed_on_rapids or cycle is not None
+        if at_feed and step.feed_event == NO_FEED:
+            step.feed_event = USES_FEED
+        if cycle is not None:
+            self._drill(cycle, codes, step)
+        else:
+            self._go(codes, step)
+
+    def _axes_taken(self, codes: Codes, step: Step) -> bool:
+        """Execute a non-modal code; whether it, or G43.1, leaves no axis words to the motion."""
+        effect = self.dialect.effect(codes.g.get("non-modal"))
+        if effect == "return":
+            step.rapid = True
+            go_to_stored_point(self.state, codes, self.dialect)
+            return True
+        if effect == "set":
+            frames.set_names(self.state, codes, self.dialect)
+        else:
+            frames.change(self.state, effect, codes.values, self.lengths)
+        return effect in _TAKES_AXES or (step.words != 0 and takes_axes(codes))
+
+    def _drill(self, cycle: int, codes: Codes, step: Step) -> None:
+        """Run a canned cycle at the block's position."""
+        state, drilling = self.state, self.dialect.drilling
+        step.rapid = step.cycle = True
+        beside = "cycle" in codes.g and "motion" in codes.g
+        if beside or codes.increments or not run_cycle(state, cycle, codes.values, drilling):
+            step.fault = True
+            state.forget_positions()
+            state.put("cycle", None)
+            if drilling.own_group:
+                state.lose("cycle")  # refused or not (K0): positions may drill from here on
+
+    def _go(self, codes: Codes, step: Step) -> None:
+        """Go to where the axis words say, as far as the frame tells where that is."""
+        state, dialect, motion = self.state, self.dialect, self.state.motion
+        step.rapid = motion == dialect.rapid
+        if dialect.effect(codes.g.get("non-modal")) == "machine":
+            go_to_machine_position(state, codes.values)
+        elif motion in dialect.redrawn or motion is None:
+            state.forget_positions(plane_axes(state))
+            state.forget_positions(AXES.index(axis) for axis in codes.moved())
+        else:
+            go_straight(state, codes, step)
+        if state.compensation != 400:
+            state.forget_positions(plane_axes(state))
+        if any(on is not False for on in state.transforms.values()):
+            state.forget_positions()
+
+    def _select_motion(self, codes: Codes) -> None:
+        """Put the motion code of the block in force, if it states one."""
+        code = codes.g.get("motion")
+        if code is None:
+            return
+        self.state.put("motion", code)
+        if code not in self.dialect.cycles:
+            self.state.put("cycle", None)
+
+    def _cycle(self, g: dict[str, int]) -> int | None:
+        """Code of the canned cycle that the block's positions belong to."""
+        state, drilling = self.state, self.dialect.drilling
+        if not drilling.own_group:
+            return state.motion if state.motion in drilling.codes else None
+        code = g.get("cycle")
+        if code is None:
+            return None if state.cycle is None else state.cycle[0]
+        if code in drilling.codes:
+            return code
+        state.put("cycle", None)
+        return None
+
+
+def _switched(number: float) -> bool | None:
+    """Whether a P that switches something turns it on; None where P is not known."""
+    return None if number != number else number != 0.0
