@@ -77,6 +77,13 @@ def test_every_passage_of_the_guide_is_from_our_own_code(path, passage):
     assert passage in (ROOT / path).read_text()
 
 
+def test_the_quick_tests_are_there():
+    source = (ROOT / "tests" / "conftest.py").read_text()
+    quick = re.search(r"(?s)\nQUICK = (\(.*?\n\))\n", source)[1]
+    for name in eval(quick, {}):
+        assert (ROOT / "tests" / name).exists(), name
+
+
 def test_the_guide_and_the_readme_give_the_same_command_for_the_tests():
     readme = (ROOT / "README.md").read_text()
     command = re.search(r"<!-- command: tests -->\n```console\n\$ (.*)\n", readme)[1]
