@@ -168,8 +168,10 @@ def test_real_programs_make_the_same_moves_with_their_cycles_written_out(tmp_pat
     for k, path in enumerate(paths):
         program = path.read_bytes()
         text, found = written(program)
+        if not found.written:
+            continue
         before, refusal = calls(program, tmp_path / f"a{k}.ngc")
-        if refusal or not found.written:
+        if refusal:
             continue
         after, refused = calls(text, tmp_path / f"b{k}.ngc")
         assert not refused, (path, refused)

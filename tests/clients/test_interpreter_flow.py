@@ -44,7 +44,7 @@ def interpret(path):
     command = ["/usr/bin/python3", str(HERE / "oracle.py"), str(path), "--startup", STARTUP]
     try:
         done = subprocess.run(
-            [*command, "--tool-table", str(table)], capture_output=True, text=True, timeout=10
+            [*command, "--tool-table", str(table)], capture_output=True, text=True, timeout=5
         )
     except subprocess.TimeoutExpired:
         return [], "endless"
@@ -187,14 +187,19 @@ def write(folder, k, lines):
 
 
 # without shrinking: each try costs many runs of the interpreter
+@pytest.mark.parametrize("part", range(2))  # for as many cores
 @settings(
-    max_examples=6,
+    max_examples=2,
     deadline=None,
     phases=[Phase.generate],
     suppress_health_check=list(HealthCheck),
 )
-@given(st.lists(st.tuples(flows(), st.tuples(*[st.integers(-2, 4)] * 3)), min_size=12, max_size=12))
-def test_drawn_flow_is_read_as_the_interpreter_runs_it(tmp_path_factory, drawn):
+@given(
+    drawn=st.lists(
+        st.tuples(flows(), st.tuples(*[st.integers(-2, 4)] * 3)), min_size=12, max_size=12
+    )
+)
+def test_drawn_flow_is_read_as_the_interpreter_runs_it(tmp_path_factory, part, drawn):
     folder = tmp_path_factory.mktemp("flow")
     paths, programs = [], []
     for k, (lines, hidden) in enumerate(drawn):
@@ -231,7 +236,7 @@ def ends(moves, spans):
     phases=[Phase.generate],
     suppress_health_check=list(HealthCheck),
 )
-@given(st.lists(flows(), min_size=12, max_size=12))
+@given(drawn=st.lists(flows(), min_size=12, max_size=12))
 def test_drawn_flow_moves_alike_before_and_after(tmp_path_factory, drawn):
     folder = tmp_path_factory.mktemp("processed")
     machine = Machine.load(find_machine("vmc"))
