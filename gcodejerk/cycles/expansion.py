@@ -1,8 +1,8 @@
 """Drilling cycles written out: a program in, the same program with explicit moves out.
 
-This module owns the walk through the file and the map from the lines of the result to those of the
-original. Whether a series of cycles is certain, and what its blocks become, is told by `series`;
-what a cycle does, by `drilling`.
+This module owns the walk through the file. Whether a series of cycles is certain, and what its
+blocks become, is told by `series`; what a cycle does, by `drilling`; where the lines of the result
+come from, by `line_map`.
 
 Rule 1: the file is walked twice, first to judge every series, then to write; so no series is held
 in memory, however long it is.
@@ -15,14 +15,15 @@ import hashlib
 import re
 from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.cycles.drilling import DRILLING
+from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.cycles.series import (
+    LeftAlone,
     Moment,
     PathWords,
     Series,
@@ -39,7 +40,6 @@ from gcodejerk.cycles.series import (
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.interpreter.rapids import Rapids
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.program import read_chunk
 from gcodejerk.nc.reader import Reader
@@ -57,61 +57,6 @@ ROOM = 16
 """Characters by which a line may become longer than the block: its code, blanks, a sign, a dot."""
 _SHOWN = 20
 """Series left alone that get a finding of their own."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LineMap:
-    """Where the blocks that were written out stand, in the result and in the original.
-
-    Entry i of every array is block i, in the order of the file.
-    """
-
-    line: NDArray[np.int64]
-    """First line of the moves written for the block; counted from 1, like all lines."""
-    lines: NDArray[np.int64]
-    begin: NDArray[np.int64]
-    """It is the result's bytes begin:end, line ends included."""
-    end: NDArray[np.int64]
-    original_line: NDArray[np.int64]
-    original_begin: NDArray[np.int64]
-    """The block is the original's bytes begin:end, without its line end."""
-    original_end: NDArray[np.int64]
-    original_terminator: NDArray[np.int64]
-    """As `Rapids.terminator`."""
-
-    def __len__(self) -> int:
-        return len(self.line)
-
-    def lines_of(self, lines: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Lines of the original that lines of the result come from."""
-        if not len(self):
-            return lines
-        k = np.searchsorted(self.line, lines, side="right") - 1
-        behind = lines - (self.line[k] + self.lines[k]) + 1
-        mapped = self.original_line[k] + np.maximum(behind, 0)
-        return np.where(k < 0, lines, mapped).astype(np.int64)
-
-    def line_of(self, line: int | None) -> int | None:
-        """The same for one line; None stays None."""
-        return None if line is None else int(self.lines_of(np.array([line]))[0])
-
-    def rapids_of(self, rapids: Rapids) -> Rapids:
-        """The rapids with the places of their blocks in the original; several may share one."""
-        if not len(self) or not len(rapids):
-            return rapids
-        k = np.searchsorted(self.begin, rapids.begin, side="right") - 1
-        inside = (k >= 0) & (rapids.begin < self.end[k])
-        ends = np.array([0, 1, 2, 1])[self.original_terminator]
-        shift = np.where(k < 0, 0, self.original_end[k] + ends[k] - self.end[k])
-        return replace(
-            rapids,
-            line=self.lines_of(rapids.line),
-            begin=np.where(inside, self.original_begin[k], rapids.begin + shift),
-            end=np.where(inside, self.original_end[k], rapids.end + shift),
-            terminator=np.where(inside, self.original_terminator[k], rapids.terminator).astype(
-                np.uint8
-            ),
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -226,6 +171,19 @@ def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
     return tuple(found)
 
 
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a block stands in the file."""
+
+    begin: int
+    end: int
+    """It is the bytes begin:end, without its line end."""
+    number: int
+    returns: int
+    """CRs and LFs of its line end, 0 or 1 each."""
+    terminator: int
+
+
 class _Expander(Reader):
     """Reads a program, and judges or writes its series on the way."""
 
@@ -255,7 +213,8 @@ class _Expander(Reader):
         self.spindle: int | None = None
         self.path: PathWords | None = None
         if start.startup:
-            self._note(parse_line(start.startup.encode("latin-1", "replace"), dialect), True, 0)
+            startup = parse_line(start.startup.encode("latin-1", "replace"), dialect)
+            self._note(startup, 0, sure=True)
         self.newline = b"\n"
         self._chunk = Chunk(b"", 0, 1)
         self._at = 0
@@ -288,7 +247,7 @@ class _Expander(Reader):
             super().read_line(text, begin, number, terminator)
             if noted:
                 sure = faults == self.problem_count and not inside
-                self._note(parse_line(bare, self.dialect), sure, number)
+                self._note(parse_line(bare, self.dialect), number, sure=sure)
             return
         block = parse_line(bare, self.dialect)
         before, faults, inside = list(self.state.position), self.problem_count, self.inside
@@ -304,7 +263,7 @@ class _Expander(Reader):
             if self.dialect.cycles & {*g_codes(block)}:
                 self.verdicts.append(_Verdict(number, why, number))
             return
-        self._note(block, why is None, number)
+        self._note(block, number, sure=why is None)
         if self.rules.borrows_dwell & {*g_codes(block)}:
             states = any(word.letter == self.rules.dwell for word in block.words)
             if not states and not (self.series is not None and self.series.dwells):
@@ -316,7 +275,7 @@ class _Expander(Reader):
             self.series = begin_series(number, moment)
             if motion in self.dialect.cycles:
                 why = str(Reason.START_UNKNOWN)  # a cycle from before the program
-        place = (begin, begin + len(bare), number, len(text) - len(bare), terminator)
+        place = _Place(begin, begin + len(bare), number, len(text) - len(bare), terminator)
         self._follow(self.series, block, bare, moment, why, place)
 
     def _follow(
@@ -326,19 +285,19 @@ class _Expander(Reader):
         text: bytes,
         moment: Moment,
         why: str | None,
-        place: tuple[int, int, int, int, int],
+        place: _Place,
     ) -> None:
         """One line of a series."""
         state, cycles = self.state, self.dialect.cycles
         if why is not None:
-            self._give_up(series, why, place[2])
+            self._give_up(series, why, place.number)
             if state.motion not in cycles:
                 self._close(series)
             return
         if state.ended:
             # M2 resets the motion, so whether its block makes a hole is not seen afterwards.
             if any(word.letter in "XYZABCUVW" for word in block.words):
-                self._give_up(series, str(Reason.OTHER_WORDS), place[2])
+                self._give_up(series, str(Reason.OTHER_WORDS), place.number)
             self._close(series)
         elif drills(block, state, cycles):
             self.holes += 1
@@ -347,10 +306,10 @@ class _Expander(Reader):
         elif state.motion not in cycles:
             own = any(self.dialect.groups.get(code) == "motion" for code in g_codes(block))
             if not own:
-                self._give_up(series, str(Reason.NOT_UNDERSTOOD), place[2])
+                self._give_up(series, str(Reason.NOT_UNDERSTOOD), place.number)
             self._close(series)
         elif not passes(block):
-            series.broken = f"something else stands between the holes (line {place[2]})"
+            series.broken = f"something else stands between the holes (line {place.number})"
 
     def _drill(
         self,
@@ -358,7 +317,7 @@ class _Expander(Reader):
         block: Block,
         text: bytes,
         moment: Moment,
-        place: tuple[int, int, int, int, int],
+        place: _Place,
     ) -> None:
         """A block that makes a hole: judge it, or write what it was judged to be."""
         if series.reason is not None:
@@ -366,27 +325,30 @@ class _Expander(Reader):
         reason = why_left_alone(series, moment, block, self.rules)
         if len(text) > self.dialect.text.line_limit - ROOM:
             reason = reason or "the block is too long"
-        call = reason or call_of(series, moment, block, self.rules)
-        if isinstance(call, str):
-            self._give_up(series, call, place[2])
+        if reason is not None:
+            self._give_up(series, reason, place.number)
+            return
+        call = call_of(series, moment, block, self.rules)
+        if isinstance(call, LeftAlone):
+            self._give_up(series, call.reason, place.number)
             return
         if self.known is None or self.target is None:
             return
         verdict = self.known[len(self.verdicts)]
         if verdict.reason is not None or verdict.line != series.line:
             return
-        begin, end, number, returns, terminator = place
-        self._copy(begin)
-        last = b"\r" * returns + b"\n" * terminator
-        line_end = last if terminator else self.newline
+        number = place.number
+        self._copy(place.begin)
+        last = b"\r" * place.returns + b"\n" * place.terminator
+        line_end = last if place.terminator else self.newline
         lines = write_block(text, block, call, moment, self.comments)
         new = line_end.join(lines) + last if lines else b""
-        kind = (0, 1, 3, 2)[2 * returns + terminator]
+        kind = (0, 1, 3, 2)[2 * place.returns + place.terminator]
         self.places.extend((number + self._added, len(lines), self._out, self._out + len(new)))
-        self.places.extend((number, begin, end, kind))
+        self.places.extend((number, place.begin, place.end, kind))
         self._put(new)
         self._added += len(lines) - 1
-        self._at = end + len(last)
+        self._at = place.end + len(last)
 
     def _give_up(self, series: Series, reason: str, line: int) -> None:
         """Leave a series to the controller; the first reason counts."""
@@ -410,7 +372,7 @@ class _Expander(Reader):
             self.verdicts[index] = _Verdict(self.verdicts[index].line, reason, line)
         self.dwell_series = []
 
-    def _note(self, block: Block, sure: bool, line: int) -> None:
+    def _note(self, block: Block, line: int, *, sure: bool) -> None:
         """Follow the spindle, the words of G64, and calls of what may hold any cycle."""
         sure = sure and doubt(block) is None
         if block.o_word is not None:
@@ -421,12 +383,15 @@ class _Expander(Reader):
             if word.letter == "M" and word.value not in (0, 1, 7, 8, 9, 48, 49):
                 self.spindle = int(word.value) if sure and word.value in (3.0, 4.0) else None
         if any(code in (610, 611, 640) for code in g_codes(block)):
-            words = (
-                [(w.letter, decimal(w)) for w in block.words if w.letter in "PQ"] if sure else []
-            )
-            sure = sure and (self.state.unit is not None or not words)
-            known = sure and all(number >= 0 for _, number in words)
-            self.path = PathWords(tuple(words), self.state.unit) if known else None
+            self.path = self._path_words(block) if sure else None
+
+    def _path_words(self, block: Block) -> PathWords | None:
+        """The tolerances that a block states; None where it is not certain what they say."""
+        words = tuple((w.letter, decimal(w)) for w in block.words if w.letter in "PQ")
+        unit = self.state.unit
+        if (unit is None and words) or any(number < 0 for _, number in words):
+            return None
+        return PathWords(words, unit)
 
     def _copy(self, end: int) -> None:
         """Copy the original up to an offset within the chunk."""

@@ -28,6 +28,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.cycles.drilling import (
     MOST_MOVES,
     Call,
+    Cycle,
     DrillingRules,
     Kind,
     Out,
@@ -214,30 +215,24 @@ def _stops(moment: Moment) -> bool:
     return moment.state.path not in _EXACT and (moment.state.path != 64 or moment.path is None)
 
 
-def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) -> Call | str:
+@dataclass(frozen=True, slots=True)
+class LeftAlone:
+    """A block of a cycle that the controller has to run itself."""
+
+    reason: str
+
+
+def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) -> Call | LeftAlone:
     """One block of a series as a call of its cycle, or why it is none; the series goes on."""
     state = moment.state
     code = state.motion or 0
-    along = PLANES[state.plane or 170][2]
     cycle = rules.cycles[code]
     given = {w.letter: decimal(w) for w in block.words if w.letter not in "GMN"}
-    sticky = dict(series.sticky or {}) if series.code == code else {}
-    # The first block of a cycle states everything; later ones what changes.
-    for letter, key in (
-        (along, "bottom"),
-        ("R", "r"),
-        (rules.peck, "peck"),
-        (rules.dwell, "dwell"),
-    ):
-        if letter in given:
-            sticky[key] = given[letter]
+    before = series.sticky or {} if series.code == code else {}
+    sticky = _sticky(before, given, PLANES[state.plane or 170][2], rules)
     repeats = given.get(rules.repeats, Decimal(1))
-    missing = {"bottom", "r"} | ({"dwell"} if cycle.dwells else set())
-    missing |= {"peck"} if cycle.pecks is not Pecks.NONE else set()
-    if missing - sticky.keys() or repeats != int(repeats) or repeats < 1:
-        return str(Reason.NOT_UNDERSTOOD)
-    if sticky.get("dwell", Decimal(0)) < 0 or ("peck" in missing and sticky["peck"] <= 0):
-        return str(Reason.NOT_UNDERSTOOD)
+    if repeats != int(repeats) or repeats < 1 or not _is_complete(sticky, cycle):
+        return LeftAlone(str(Reason.NOT_UNDERSTOOD))
     assert series.level is not None
     assert series.at is not None
     r, bottom = sticky["r"], sticky["bottom"]
@@ -249,13 +244,12 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
         binary = lifted, lifted + binary[1]
     clearance = rules.clearance[state.unit != 1.0]
     if clearance is None and cycle.pecks is not Pecks.NONE:
-        return "the clearance of its pecks is a parameter of the machine"
+        return LeftAlone("the clearance of its pecks is a parameter of the machine")
     if bottom > r:
-        return str(Reason.NOT_UNDERSTOOD)
-    if state.retract is None and series.level > r:
-        return "G98 or G99 is not stated"
-    if cycle.out is Out.STOPPED and moment.spindle is None:
-        return "the direction of the spindle is not known"
+        return LeftAlone(str(Reason.NOT_UNDERSTOOD))
+    missing = _not_stated(moment, cycle, lifts=series.level > r)
+    if missing is not None:
+        return LeftAlone(missing)
     call = Call(
         cycle=cycle,
         start=series.at,
@@ -270,9 +264,36 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
         binary=binary,
     )
     if most_moves(call) > MOST_MOVES:
-        return f"one block makes more than {MOST_MOVES} moves"
+        return LeftAlone(f"one block makes more than {MOST_MOVES} moves")
     series.code, series.sticky, series.at = code, sticky, end_of(call)
     return call
+
+
+def _not_stated(moment: Moment, cycle: Cycle, *, lifts: bool) -> str | None:
+    """What the program has not said that the way out needs; `lifts`: G98 leads higher than R."""
+    if moment.state.retract is None and lifts:
+        return "G98 or G99 is not stated"
+    if cycle.out is Out.STOPPED and moment.spindle is None:
+        return "the direction of the spindle is not known"
+    return None
+
+
+def _sticky(
+    before: dict[str, Decimal], given: dict[str, Decimal], along: str, rules: DrillingRules
+) -> dict[str, Decimal]:
+    """What is in force of a cycle: its first block states everything, later ones what changes."""
+    letters = {"bottom": along, "r": "R", "peck": rules.peck, "dwell": rules.dwell}
+    return before | {key: given[letter] for key, letter in letters.items() if letter in given}
+
+
+def _is_complete(sticky: dict[str, Decimal], cycle: Cycle) -> bool:
+    """Whether everything that a cycle needs is stated, and can be meant."""
+    pecks = cycle.pecks is not Pecks.NONE
+    applies = {"bottom": True, "r": True, "dwell": cycle.dwells, "peck": pecks}
+    needed = {key for key, is_needed in applies.items() if is_needed}
+    if needed - sticky.keys() or sticky.get("dwell", Decimal(0)) < 0:
+        return False
+    return not pecks or sticky["peck"] > 0
 
 
 def decimal(word: Word) -> Decimal:
@@ -337,17 +358,9 @@ def write_block(
 
 def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
     """The moves of a call as blocks."""
-    state = moment.state
-    plane = PLANES[state.plane or 170]
-    incremental = state.distance == 910
-    hole = [w for w in block.words if w.letter in plane[:2]]
-    hole_words = [b"".join(w.text.split()).upper() for w in hole]
-    if incremental:
-        going = any(w.value for w in hole)
-    else:
-        # An unknown position is a NaN, which differs from everything.
-        axes = [AXES.index(w.letter) for w in hole]
-        going = any(moment.before[axis] != state.position[axis] for axis in axes)
+    incremental = moment.state.distance == 910
+    along = PLANES[moment.state.plane or 170][2].encode()
+    hole_words, going = _to_hole(block, moment)
     lines, at = [], call.start
     for move in drill(call):
         if move.kind is Kind.DWELL:
@@ -357,14 +370,25 @@ def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
         else:
             words = list(hole_words) if move.kind is Kind.HOLE and going else []
             if move.to != at:
-                number = move.to - at if incremental else move.to
-                words.append(plane[2].encode() + plain(number))
+                words.append(along + plain(move.to - at if incremental else move.to))
             if words:
                 lines.append(b" ".join([b"G1" if move.kind is Kind.FEED else b"G0", *words]))
             if move.kind is Kind.HOLE:
                 going = going and incremental  # absolute repeats stay where they are
         at = move.to
     return lines
+
+
+def _to_hole(block: Block, moment: Moment) -> tuple[list[bytes], bool]:
+    """The words of a block that lead to its hole, and whether they lead anywhere."""
+    plane = PLANES[moment.state.plane or 170]
+    hole = [w for w in block.words if w.letter in plane[:2]]
+    words = [b"".join(w.text.split()).upper() for w in hole]
+    if moment.state.distance == 910:
+        return words, any(w.value for w in hole)
+    # An unknown position is a NaN, which differs from everything.
+    axes = [AXES.index(w.letter) for w in hole]
+    return words, any(moment.before[axis] != moment.state.position[axis] for axis in axes)
 
 
 def _with_stops(moves: list[bytes]) -> list[bytes]:

@@ -29,12 +29,8 @@ def condition_amplitude(
 
     Parameters
     ----------
-    condition : str
-        I, II or III.
-    length : array_like
-        Of the move; it broadcasts with what follows. [mm]
-    T1, T_SUM : array_like
-        Duration of the first segment and of the move. [s]
+    condition, length, T1, T_SUM
+        As for `gcodejerk.motion.profiles.conditions.condition_segments`.
     frequency, damping : array_like
         Undamped natural frequency [Hz] and damping ratio [-] of the mode.
 
@@ -98,12 +94,8 @@ def undamped_amplitude(
 
     Parameters
     ----------
-    condition : str
-        I, II or III.
-    length : array_like
-        Of the move; it broadcasts with what follows. [mm]
-    T1, T_SUM : array_like
-        Duration of the first segment and of the move. [s]
+    condition, length, T1, T_SUM
+        As for `gcodejerk.motion.profiles.conditions.condition_segments`.
     frequency : array_like
         Natural frequency of the mode. [Hz]
 

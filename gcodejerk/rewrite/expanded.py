@@ -19,7 +19,8 @@ from typing import BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.cycles.expansion import Expansion, LineMap, expand
+from gcodejerk.cycles.expansion import Expansion, expand
+from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
 from gcodejerk.verification import Verification, Violation, require, verify_files

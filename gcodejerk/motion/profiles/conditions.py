@@ -113,12 +113,8 @@ def condition_accelerations(
 
     Parameters
     ----------
-    condition : str
-        I, II or III.
-    length : array_like
-        Of the move; it broadcasts with the times. [mm]
-    T1, T_SUM : array_like
-        Duration of the first segment and of the move. [s]
+    condition, length, T1, T_SUM
+        As for `condition_segments`.
 
     Returns
     -------
@@ -242,12 +238,8 @@ def condition_peaks(condition: str, length: ArrayLike, T1: ArrayLike, T_SUM: Arr
 
     Parameters
     ----------
-    condition : str
-        I, II or III.
-    length : array_like
-        Of the move; it broadcasts with the times. [mm]
-    T1, T_SUM : array_like
-        Duration of the first segment and of the move. [s]
+    condition, length, T1, T_SUM
+        As for `condition_segments`.
 
     Returns
     -------
@@ -278,12 +270,8 @@ def limit_use(
 
     Parameters
     ----------
-    condition : str
-        I, II or III.
-    length : array_like
-        Of the move; it broadcasts with the times. [mm]
-    T1, T_SUM : array_like
-        Duration of the first segment and of the move. [s]
+    condition, length, T1, T_SUM
+        As for `condition_segments`.
     limit : Peaks
         The most that each may be; infinite where there is no limit.
 

@@ -69,38 +69,22 @@ class Allowed:
     @classmethod
     def of(cls, rapids: Rapids, i: int, block: Block, dialect: Dialect, follows: bool) -> Allowed:
         """List it for rapid i; `follows` says that the line before is a stream too."""
-        path, mode = int(rapids.path[i]), int(rapids.feed_mode[i])
-        exact = path in (61, 62)
-        per_minute, through = dialect.feed_code(94), dialect.path_code(64)
-        may: set[int | None] = {per_minute} if mode != 94 else set()
-        may |= set() if rapids.feed_mode_stated[i] else {per_minute}
-        may |= {through} if exact else set()
-        if not rapids.distance_stated[i] and dialect.groups.get(900) == "distance":
-            may |= {900}
-        nine = dialect.exact_stop
-        exact_here = any(
-            w.letter == "G" and nine is not None and w.value == nine / 10 for w in block.words
-        )
-        ending = dialect.path_code(path) if exact else None
-        if ending is None and (exact_here or dialect.stops_after_rapid):
-            ending = nine
+        mode = int(rapids.feed_mode[i])
+        exact = int(rapids.path[i]) in (61, 62)
         code = dialect.feed_code(mode)
         step = rapids.target[i] - rapids.start[i]
+        m_words = [word for word in block.words if word.letter == "M"]
         return cls(
             standstill=not (follows or exact),
-            setup=frozenset(c for c in may if c is not None),
-            ending=ending,
+            setup=_setup_codes(rapids, i, dialect, exact=exact),
+            ending=_ending_code(rapids, i, block, dialect, exact=exact),
             tail=frozenset({0} | ({code} if mode != 94 and code is not None else set())),
             feed=mode != 93 and not math.isnan(float(rapids.feed[i])),
-            behind=tuple(
-                ("M", float(w.value))
-                for w in block.words
-                if w.letter == "M" and w.value in dialect.after_m
-            ),
+            behind=tuple(("M", float(w.value)) for w in m_words if w.value in dialect.after_m),
             unknown_m=tuple(
                 float("nan" if w.value is None else w.value)
-                for w in block.words
-                if w.letter == "M" and w.value not in dialect.before_m | dialect.after_m
+                for w in m_words
+                if w.value not in dialect.before_m | dialect.after_m
             ),
             axes=frozenset(AXES[k] for k in range(len(AXES)) if abs(step[k]) > STANDSTILL),
             limit=line_limit(dialect),
@@ -126,6 +110,30 @@ class Allowed:
         if others != (["F"] if self.feed else []):
             return "F stands behind the points where it is known, and nothing else does"
         return None
+
+
+def _setup_codes(rapids: Rapids, i: int, dialect: Dialect, *, exact: bool) -> frozenset[int]:
+    """G codes that may stand in front of the points: G94, G64 and G90 where a stream needs them."""
+    may: set[int | None] = set()
+    if rapids.feed_mode[i] != 94 or not rapids.feed_mode_stated[i]:
+        may.add(dialect.feed_code(94))
+    if exact:
+        may.add(dialect.path_code(64))
+    if not rapids.distance_stated[i] and dialect.groups.get(900) == "distance":
+        may.add(900)
+    return frozenset(code for code in may if code is not None)
+
+
+def _ending_code(
+    rapids: Rapids, i: int, block: Block, dialect: Dialect, *, exact: bool
+) -> int | None:
+    """G code that ends the last point in a standstill, where the rapid ended in one."""
+    stop = dialect.exact_stop
+    ending = dialect.path_code(int(rapids.path[i])) if exact else None
+    stated = stop is not None and any(
+        word.letter == "G" and word.value == stop / 10 for word in block.words
+    )
+    return stop if ending is None and (stated or dialect.stops_after_rapid) else ending
 
 
 def _codes(words: Words) -> set[int]:

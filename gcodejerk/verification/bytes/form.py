@@ -267,43 +267,24 @@ class StreamReader:
             self.complain(Kind.MODE, "distance mode is not that of the original")
 
     def _points(self) -> Stream | None:
-        window, first = self.window, self.window.line
+        """Read the points: those written alike in one go, the others one by one."""
+        first = self.window.line
         words = read_words(self.peek())
         if words is None or not words or words[0] != ("G", Decimal(1)):
             self.complain(Kind.FORM, "points of a stream are missing")
             return None
         letters = "".join(letter for letter, _ in words[1:-1])
         stream = Stream(self.i, self.original_line, first, "", b"")
-        if (
-            words[-1][0] == "F"
-            and all(c in AXES for c in letters)
-            and len(set(letters)) == len(letters)
-        ):
+        if words[-1][0] == "F" and set(letters) <= {*AXES} and len(set(letters)) == len(letters):
             stream.letters = letters
-            size = 1 << 13
-            while True:
-                have = window.fill(size)
-                pattern = self._run(letters)
-                end = _run_end(pattern, window.data, window.at, window.at + have)
-                if have < size or end < window.at + have - 512 or size > LONGEST_STREAM:
-                    break
-                size *= 4
-            stream.text = window.data[window.at : end]
-            window.skip(len(stream.text))
+            stream.text = self._take_alike(letters)
         ending, early = None, False
         while _IS_POINT.match(line := self.peek()):
-            words = read_words(line)
             early |= ending is not None
-            ending = None
-            if words and words[1:2] and words[1][0] == "G":
-                ending = int(words.pop(1)[1] * 10)
-            by_letter = dict(words[1:]) if words else {}
-            if not words or words[0] != ("G", Decimal(1)) or len(by_letter) != len(words) - 1:
-                self.complain(Kind.FORM, f"this is no point: '{line[:60].decode('latin-1')}'")
+            point = self._point(line)
+            if point is None:
                 return None
-            if "F" not in by_letter or not set(by_letter) <= {*AXES, "F"}:
-                self.complain(Kind.FORM, "a point holds axis words and F, nothing else")
-                return None
+            ending, by_letter = point
             stream.rest.append(by_letter)
             if len(stream.rest) > PIECE:
                 self.complain(Kind.FORM, "stream is endless")
@@ -321,6 +302,34 @@ class StreamReader:
         self._end_of_points(ending)
         self.modes.motion, self.modes.feed = 1, None
         return stream
+
+    def _take_alike(self, letters: str) -> bytes:
+        """Pass the points that are written alike, however many; their text."""
+        window, size = self.window, 1 << 13
+        while True:
+            have = window.fill(size)
+            pattern = self._run(letters)
+            end = _run_end(pattern, window.data, window.at, window.at + have)
+            if have < size or end < window.at + have - 512 or size > LONGEST_STREAM:
+                break
+            size *= 4
+        text = window.data[window.at : end]
+        window.skip(len(text))
+        return text
+
+    def _point(self, line: bytes) -> tuple[int | None, dict[str, Decimal]] | None:
+        """The G code beside the G1 of a point, and its numbers; None where it is no point."""
+        words, ending = read_words(line), None
+        if words and words[1:2] and words[1][0] == "G":
+            ending = int(words.pop(1)[1] * 10)
+        by_letter = dict(words[1:]) if words else {}
+        if not words or words[0] != ("G", Decimal(1)) or len(by_letter) != len(words) - 1:
+            self.complain(Kind.FORM, f"this is no point: '{line[:60].decode('latin-1')}'")
+            return None
+        if "F" not in by_letter or not set(by_letter) <= {*AXES, "F"}:
+            self.complain(Kind.FORM, "a point holds axis words and F, nothing else")
+            return None
+        return ending, by_letter
 
     def _run(self, letters: str) -> re.Pattern[bytes]:
         """Points with these axes, spelled as they may be."""

@@ -63,19 +63,10 @@ class Modes:
         if len(codes) < sum(letter == "G" for letter, _ in words):
             return "a code that is none"
         values = {letter: value for letter, value in words if letter != "G"}
-        if not set(values) <= {"F", "P", "Q"}:
-            return f"word {min(set(values) - {'F', 'P', 'Q'})} has no place here"
-        groups = [dialect.groups.get(code) for code in codes]
-        if len(set(groups)) < len(groups):
-            return "two codes of one modal group"
-        known = {0, *dialect.feed_modes, *dialect.paths}
-        known |= {code for code in (900, 910) if dialect.groups.get(code) == "distance"}
-        if not codes <= known:
-            return f"G{min(codes - known) / 10:g} has no place here"
-        if ("P" in values or "Q" in values) and 640 not in codes:
-            return "P or Q without G64"
-        self._set(codes, values, dialect)
-        return None
+        problem = _out_of_place(codes, values, dialect)
+        if problem is None:
+            self._set(codes, values, dialect)
+        return problem
 
     def _set(self, codes: set[int], values: dict[str, Decimal], dialect: Dialect) -> None:
         """Change what the words say, the feed mode before the feed."""
@@ -94,3 +85,19 @@ class Modes:
                 self.q = float(values.get("Q", math.nan)) if code == 640 else math.nan
         if "F" in values:
             self.feed = values["F"]
+
+
+def _out_of_place(codes: set[int], values: dict[str, Decimal], dialect: Dialect) -> str | None:
+    """What has no place in a line of modal words."""
+    if not set(values) <= {"F", "P", "Q"}:
+        return f"word {min(set(values) - {'F', 'P', 'Q'})} has no place here"
+    groups = [dialect.groups.get(code) for code in codes]
+    if len(set(groups)) < len(groups):
+        return "two codes of one modal group"
+    known = {0, *dialect.feed_modes, *dialect.paths}
+    known |= {code for code in (900, 910) if dialect.groups.get(code) == "distance"}
+    if not codes <= known:
+        return f"G{min(codes - known) / 10:g} has no place here"
+    if ("P" in values or "Q" in values) and 640 not in codes:
+        return "P or Q without G64"
+    return None

@@ -28,6 +28,7 @@ from gcodejerk.verification.cycles.holes import (
     QUIET_G,
     QUIET_M,
     STOPS,
+    Doubt,
     Event,
     Height,
     Series,
@@ -39,6 +40,7 @@ from gcodejerk.verification.cycles.holes import (
     same,
     told,
 )
+from gcodejerk.verification.cycles.lines import OriginalLine, WrittenLines
 from gcodejerk.verification.findings import Findings, Kind, Verification
 from gcodejerk.verification.second_reading.agreement import Context, confirm_contexts
 
@@ -148,55 +150,68 @@ class _Proof:
 
     def _line(self, text: bytes, begin: int, number: int, terminator: int) -> bool:
         """Take one line of the original; whether the walk can go on."""
-        state, reader = self.reader.state, self.reader
-        here, motion, ended = list(state.position), state.motion, state.ended
+        motion = self.reader.state.motion
+        line = self._read(text, begin, number, terminator)
+        if not line.ended:
+            self._remember(line.block, line.sure)
+            self._begin_series(line, motion)
+        if not self._is_kept(line.whole):
+            if line.hole:
+                modes = _modes(self.reader.state)
+                self.contexts.append(Context(number, line.here, modes))
+            return self._written(line)
+        self.theirs.skip(len(line.whole))
+        self.kept += 1
+        if line.ended:
+            return True
+        if self.lent and self._borrows(line):
+            return self._complain(Kind.SERIES, number, "the dwell of a later cycle gets lost")
+        return self.series is None or self._kept_in(self.series, line)
+
+    def _read(self, text: bytes, begin: int, number: int, terminator: int) -> OriginalLine:
+        """Let the first reading take a line, and ask what it was."""
+        reader = self.reader
+        here, ended = list(reader.state.position), reader.state.ended
         problems, inside = reader.problem_count, reader.inside
         reader.read_line(text, begin, number, terminator)
-        state = reader.state
         bare = text.removesuffix(b"\r")
         block = parse_block(bare, self.dialect)
         sure = problems == reader.problem_count and not (inside or reader.inside)
         sure = sure and not (block.block_delete or block.assigns or block.o_word is not None)
         sure = sure and all(word.value is not None for word in block.words)
-        if not ended:
-            self._remember(block, sure)
-        line = text + b"\n" * terminator
-        codes = [word.value for word in block.words if word.letter == "G"]
-        axes = any(word.letter in AXES for word in block.words)
-        in_cycle = state.motion in self.dialect.cycles
-        if self.series is None and in_cycle and not ended:
-            self.series = begin_series(here, state)
+        drills = reader.state.motion in self.dialect.cycles
+        hole = sure and drills and any(word.letter in AXES for word in block.words)
+        return OriginalLine(bare, text + b"\n" * terminator, number, block, here, ended, sure, hole)
+
+    def _begin_series(self, line: OriginalLine, motion: int | None) -> None:
+        """Note where a series begins; `motion` was in force in front of the line."""
+        state = self.reader.state
+        if self.series is None and state.motion in self.dialect.cycles:
+            self.series = begin_series(line.here, state)
             if motion in self.dialect.cycles:
                 self.series.doubt = "it began before the program"
-        if not self._is_kept(line):
-            hole = sure and axes and in_cycle
-            if hole:
-                self.contexts.append(Context(number, here, _modes(state)))
-            return self._written(bare, line, block, number, hole)
-        self.theirs.skip(len(line))
-        self.kept += 1
-        series = self.series
-        if self.lent and not ended and self._borrows(block, codes):
-            return self._complain(Kind.SERIES, number, "the dwell of a later cycle gets lost")
-        if series is None or ended:
-            return True
-        taken = any(code in (10, 28, 30, 52, 92) for code in codes)
-        if in_cycle and sure and axes and not taken:
+
+    def _kept_in(self, series: Series, line: OriginalLine) -> bool:
+        """A line of a series that is kept; whether the walk can go on."""
+        state, number = self.reader.state, line.number
+        in_cycle = state.motion in self.dialect.cycles
+        if line.hole and not any(code in (10, 28, 30, 52, 92) for code in line.codes):
             self.holes += 1
             if series.written:
                 return self._complain(Kind.CYCLE, number, "a hole of the series is not written out")
             series.written = False
-            self.lent = self.lent and not any(word.letter == "P" for word in block.words)
-        elif not sure:
+            self.lent = self.lent and not line.dwells
+        elif not line.sure:
             series.doubt = series.doubt or f"line {number} is not certain"
             if series.written:
                 return self._complain(Kind.SERIES, number, "it may make a hole, or end the series")
-        elif not self._quiet(block) and in_cycle:
+        elif in_cycle and not self._quiet(line.block):
             series.doubt = series.doubt or f"line {number} stands between its holes"
         if not in_cycle or state.ended:
             # The end of a series must be one beyond doubt, or a later block may be a hole.
             closes = state.ended or any(
-                self.dialect.groups.get(round((code or 0.0) * 10)) == "motion" for code in codes
+                self.dialect.groups.get(round((code or 0.0) * 10)) == "motion"
+                for code in line.codes
             )
             self.series = None
             if series.written and not closes:
@@ -209,12 +224,13 @@ class _Proof:
             return False
         return line.endswith(b"\n") or len(self.theirs.peek(len(line) + 1)) == len(line)
 
-    def _borrows(self, block: Block, codes: list[float | None]) -> bool:
+    @staticmethod
+    def _borrows(line: OriginalLine) -> bool:
         """Whether a block may tap with the P of an earlier cycle, or call what does."""
-        if any(code in (74, 84) for code in codes):
-            return not any(word.letter == "P" for word in block.words)
-        return block.o_word == "call" or any(
-            word.letter == "M" and word.value == 98 for word in block.words
+        if any(code in (74, 84) for code in line.codes):
+            return not line.dwells
+        return line.block.o_word == "call" or any(
+            word.letter == "M" and word.value == 98 for word in line.block.words
         )
 
     def _quiet(self, block: Block) -> bool:
@@ -226,67 +242,81 @@ class _Proof:
             for w in block.words
         )
 
-    def _written(self, text: bytes, line: bytes, block: Block, number: int, hole: bool) -> bool:
+    def _written(self, line: OriginalLine) -> bool:
         """A line that is not kept: the moves of a hole, or a violation."""
         theirs = self.theirs.peek_line()[:60].decode("latin-1").rstrip()
-        series, state = self.series, self.reader.state
-        if series is None or not hole:
-            mine = line[:60].decode("latin-1").rstrip()
+        series, number = self.series, line.number
+        if series is None or not line.hole:
+            mine = line.whole[:60].decode("latin-1").rstrip()
             problem = f"expected '{mine}' as in the original, found '{theirs}'"
             if not self.theirs.peek(1):
                 return self._complain(Kind.MISSING, number, f"file ends where '{mine}' follows")
             return self._complain(Kind.CHANGED, number, problem)
         self.holes += 1
-        doubt = series.doubt or doubt_of(series, state)
+        doubt = series.doubt or doubt_of(series, self.reader.state)
         if series.written is False:
             doubt = "an earlier hole of the series is not written out"
         if doubt is not None:
-            return self._complain(Kind.SERIES, number, f"its series is not certain: {doubt}")
+            return self._uncertain(number, doubt)
         series.written = True
         self.written += 1
-        self.lent = self.lent or any(word.letter == "P" for word in block.words)
-        return self._moves(series, text, line, block, number)
+        self.lent = self.lent or line.dwells
+        wanted = calls_for(series, line.block, self.reader.state, self.turning)
+        if isinstance(wanted, Doubt):
+            return self._uncertain(number, wanted.reason)
+        return self._moves(series, wanted, line)
 
-    def _moves(self, series: Series, text: bytes, line: bytes, block: Block, number: int) -> bool:
+    def _moves(self, series: Series, wanted: list[list[Event]], line: OriginalLine) -> bool:
         """Compare what stands in the place of a hole's block with what the block calls for."""
-        state = self.reader.state
-        wanted = calls_for(series, block, state, self.turning)
-        if isinstance(wanted, str):
-            return self._complain(Kind.SERIES, number, f"its series is not certain: {wanted}")
-        lines = _Lines(self.theirs)
+        state, number, lines = self.reader.state, line.number, WrittenLines(self.theirs)
         if lines.peek().startswith(b"(gcodejerk: "):
             comment = lines.next()
             if not (comment.endswith(b")") and comment.count(b"(") == comment.count(b")") == 1):
                 return self._complain(Kind.COMMENT, number, "not one closed comment")
         plane = PLANES[state.plane or 170]
-        head, stops = self._head(text, block, {*plane, "R", "L", "P", "Q"})
+        head, stops = self._head(line.text, line.block, {*plane, "R", "L", "P", "Q"})
         if head and squeezed(lines.peek()) != head:
             return self._complain(Kind.HEAD, number, f"expected '{head.decode('latin-1')}'")
         if head:
             lines.next()
-        # Where the path mode is not known, a rest behind every move does what G61 would.
-        stops_between = state.path != 64 or self.path is None
-        exact = state.path in (61, 62) or stops_between
-        if stops_between and state.path not in (61, 62):
-            wanted = [[*_with_rests(events)] for events in wanted]
-        if not exact and lines.next() != b"G61":
+        if not self._in_exact_path(series, wanted, lines, number, plane):
+            return False
+        if stops and lines.next().split() != stops:
+            return self._complain(Kind.STOP, number, "its stop is lost")
+        last = line.whole[len(line.text) :]
+        if lines.ends and not lines.well_ended(last if b"\n" in last else self.newline, last):
+            return self._complain(Kind.LINE_END, number, "lines do not end as the block did")
+        return True
+
+    def _in_exact_path(
+        self,
+        series: Series,
+        wanted: list[list[Event]],
+        lines: WrittenLines,
+        number: int,
+        plane: tuple[str, str, str],
+    ) -> bool:
+        """Compare the moves, and how they come to exact path mode and back."""
+        state = self.reader.state
+        if state.path in (61, 62):
+            return self._compare(series, wanted, lines, number, plane)
+        if state.path != 64 or self.path is None:
+            # Where the path mode is not known, a rest behind every move does what G61 would.
+            rests = [[*_with_rests(events)] for events in wanted]
+            return self._compare(series, rests, lines, number, plane)
+        if lines.next() != b"G61":
             return self._complain(Kind.MODE, number, "cycles run in exact path mode: no G61")
         if not self._compare(series, wanted, lines, number, plane):
             return False
-        if not exact and not self._path_restored(lines.next(), state):
+        if not self._path_restored(lines.next(), state):
             return self._complain(Kind.PATH, number, "the path mode of the program does not return")
-        if stops and lines.next().split() != stops:
-            return self._complain(Kind.STOP, number, "its stop is lost")
-        last = line[len(text) :]
-        if lines.ends and not lines.well_ended(last if b"\n" in last else self.newline, last):
-            return self._complain(Kind.LINE_END, number, "lines do not end as the block did")
         return True
 
     def _compare(
         self,
         series: Series,
         wanted: list[list[Event]],
-        lines: _Lines,
+        lines: WrittenLines,
         number: int,
         plane: tuple[str, str, str],
     ) -> bool:
@@ -358,6 +388,10 @@ class _Proof:
                 if all((word.value or 0.0) >= 0.0 for word in words):
                     self.path = {word.letter: number_of(word.text[1:]) * unit for word in words}
 
+    def _uncertain(self, number: int, doubt: str) -> bool:
+        """Note that a series was written out that had to be left alone."""
+        return self._complain(Kind.SERIES, number, f"its series is not certain: {doubt}")
+
     def _complain(self, kind: Kind, number: int, problem: str) -> bool:
         """Note a violation, with which the walk ends."""
         self.found.add(kind, self.theirs.line, number, problem)
@@ -375,29 +409,6 @@ def _modes(state: State) -> dict[str, float | None]:
         "retract": state.retract,
         "path": state.path,
     }
-
-
-class _Lines:
-    """The lines that stand in the place of one block."""
-
-    def __init__(self, theirs: Window) -> None:
-        self.theirs = theirs
-        self.ends: list[bytes] = []
-
-    def peek(self) -> bytes:
-        """The next line without its end."""
-        return self.theirs.peek_line().removesuffix(b"\n").removesuffix(b"\r")
-
-    def next(self) -> bytes:
-        """Take it."""
-        whole, bare = self.theirs.peek_line(), self.peek()
-        self.ends.append(whole[len(bare) :])
-        self.theirs.skip(len(whole))
-        return bare
-
-    def well_ended(self, end: bytes, last: bytes) -> bool:
-        """Whether every line taken ends in one way, and the last one as the block did."""
-        return self.ends[-1:] == [last] and all(got == end for got in self.ends[:-1])
 
 
 def _with_rests(events: list[Event]) -> Iterator[Event]:

@@ -109,43 +109,69 @@ def _belongs(word: Word, code: int, letters: set[str]) -> bool:
     return word.letter in letters or (word.letter == "M" and number in QUIET_M | STOPS)
 
 
-def calls_for(series: Series, block: Block, state: State, turning: int) -> list[list[Event]] | str:
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Why nobody knows for certain what a block of a cycle does."""
+
+    reason: str
+
+
+def calls_for(
+    series: Series, block: Block, state: State, turning: int
+) -> list[list[Event]] | Doubt:
     """What a block calls for: its moves, for each count of pecks that may be meant."""
     plane = PLANES[state.plane or 170]
     code = state.motion or 0
     said = {w.letter: number_of(w.text[1:]) for w in block.words if w.letter in "XYZRPQL"}
-    own = {"P"} & set(HEIGHTS[code]) | ({"Q"} if HEIGHTS[code][0] in "bc" else set())
+    own = _own_words(code)
     for word in block.words:
         if not _belongs(word, code, {*plane, "R", "L", "N", "F", "S", "T"} | own):
-            return f"nobody knows when {word.text.decode('latin-1')} acts"
-    if series.code != code:
-        series.code, series.said = code, {}
-    if plane[2] in said:
-        series.said["z"] = said[plane[2]]
-    series.said |= {letter: said[letter] for letter in "RPQ" if letter in said}
+            return Doubt(f"nobody knows when {word.text.decode('latin-1')} acts")
+    _remember(series, code, said, plane[2])
     needs = {"z", "R"} | own
     repeats = said.get("L", Fraction(1))
     if needs - series.said.keys() or repeats < 1 or repeats.denominator != 1:
-        return "a word that it needs is missing"
-    level = series.level[1]
-    r, z = series.said["R"], series.said["z"]
-    if state.distance == 910:
-        r, z = level + r, level + r + z
+        return Doubt("a word that it needs is missing")
+    r, z = _heights(series, state)
     if z > r or ("Q" in needs and series.said["Q"] <= 0):
-        return "the controller refuses it"
+        return Doubt("the controller refuses it")
+    level = series.level[1]
     if state.retract is None and level > r:
-        return "G98 or G99 is not known"
+        return Doubt("G98 or G99 is not known")
     if "S" in HEIGHTS[code] and not turning:
-        return "the spindle may stand"
+        return Doubt("the spindle may stand")
     top = r if state.retract == 990 else max(r, level)
     out = []
     for pecks in _pecks(series, code, r, z):
         if (pecks + 1) * repeats > MOST_PECKS:
-            return f"it pecks more than {MOST_PECKS} times"
+            return Doubt(f"it pecks more than {MOST_PECKS} times")
         visits = [*_visits(series, code, (r, z, top), pecks, state, turning)]
         places = _places(series, said, visits, (r, top), int(repeats), state)
         out.append([*_moving(places, series, plane)])
     return out
+
+
+def _own_words(code: int) -> set[str]:
+    """Letters that this cycle needs and others do not: P of a dwell, Q of pecks."""
+    return {"P"} & set(HEIGHTS[code]) | ({"Q"} if HEIGHTS[code][0] in "bc" else set())
+
+
+def _remember(series: Series, code: int, said: dict[str, Fraction], along: str) -> None:
+    """Put the words of a block in force; another cycle begins without any."""
+    if series.code != code:
+        series.code, series.said = code, {}
+    if along in said:
+        series.said["z"] = said[along]
+    series.said |= {letter: said[letter] for letter in "RPQ" if letter in said}
+
+
+def _heights(series: Series, state: State) -> tuple[Fraction, Fraction]:
+    """R and the bottom along the drilling axis, in the program's unit."""
+    r, z = series.said["R"], series.said["z"]
+    if state.distance == 910:
+        level = series.level[1]
+        return level + r, level + r + z
+    return r, z
 
 
 def _pecks(series: Series, code: int, r: Fraction, z: Fraction) -> list[int]:

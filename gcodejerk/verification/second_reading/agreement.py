@@ -67,13 +67,8 @@ def confirm(
         i = index[k]
         problem = _disagreement(seen, rapids, i)
         if problem:
-            found.add(
-                Kind.READING,
-                None,
-                int(rapids.line[i]),
-                f"a second reading of the program does not agree: {problem}",
-                "leave this rapid alone, and report the program: one of two readings is wrong",
-            )
+            advice = "leave this rapid alone, and report the program: one of two readings is wrong"
+            _differ(found, int(rapids.line[i]), problem, advice)
         else:
             confirmed += _is_known(seen, rapids, i)
     return confirmed
@@ -101,16 +96,10 @@ def confirm_contexts(
 
     Parameters
     ----------
-    original : BinaryIO
-        Seekable; read from where it stands to its end.
-    dialect : Dialect or str
-        How it is written.
-    start : Start
-        What it may assume when it starts.
+    original, dialect, start, found
+        As for `confirm`.
     contexts : sequence of Context
         What the first reading says, by ascending line.
-    found : Findings
-        Where they disagree.
 
     Returns
     -------
@@ -134,15 +123,16 @@ def confirm_contexts(
             elif mine != told:
                 problem = f"{name} is {mine:g}, not {told:g}"
         if problem:
-            found.add(
-                Kind.READING,
-                None,
-                context.line,
-                f"a second reading of the program does not agree: {problem}",
-                "process it without --expand-cycles, and report the program",
-            )
+            advice = "process it without --expand-cycles, and report the program"
+            _differ(found, context.line, problem, advice)
         confirmed += known and not problem
     return confirmed
+
+
+def _differ(found: Findings, line: int, problem: str, advice: str) -> None:
+    """Note in what the two readings of a line differ."""
+    told = f"a second reading of the program does not agree: {problem}"
+    found.add(Kind.READING, None, line, told, advice)
 
 
 def observations(
@@ -152,12 +142,8 @@ def observations(
 
     Parameters
     ----------
-    original : BinaryIO
-        Seekable; read from where it stands to its end.
-    dialect : Dialect
-        How it is written.
-    start : Start
-        What it may assume when it starts.
+    original, dialect, start
+        As for `confirm`.
     lines : list of int
         Ascending, counted from 1.
 

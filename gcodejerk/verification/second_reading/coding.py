@@ -59,6 +59,14 @@ class Codes(Known):
 
     def machine_codes(self, block: Sorted) -> bool:
         """Execute M codes; whether the program ends behind the block."""
+        ends = self._m_groups(block)
+        for m in block.m:
+            if m in self.dialect.m_bars:
+                self.bars[self.dialect.m_bars[m]] = _switched(block.values.get("P", 1.0))
+        return ends
+
+    def _m_groups(self, block: Sorted) -> bool:
+        """Do what the groups of M codes say; whether the program ends behind the block."""
         ends = False
         for m in block.m:
             group = self.dialect.m_groups.get(m)
@@ -97,25 +105,27 @@ class Codes(Known):
                 self.frames[name] = on
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
-                p = values.get("P", 0.0)
-                on_p = None if p != p else p != 0.0
-                self.bars[name] = on_p if begins == "P" else bool(begins)
+                by_p = _switched(values.get("P", 0.0))
+                self.bars[name] = by_p if begins == "P" else bool(begins)
         if "units" in g:
-            unit = INCH if dialect.units[g["units"]] else 1.0
-            if unit != self.unit:
-                self.p = self.q = self.level = self.r = NAN
-            if g["units"] not in dialect.lengths_only:
-                sure = unit == 1.0 or not dialect.feed_before_units
-                if unit != self.feed_unit and not (
-                    self.feed_unit is None and "F" in values and sure
-                ):
-                    self.feed = NAN
-                self.feed_unit = unit
-            self.unit = unit
+            self._units(g["units"], beside_feed="F" in values)
         if "path" in g:
             self.path = dialect.paths.get(g["path"])
             self.p = values.get("P", NAN) if g["path"] == 640 else NAN
             self.q = values.get("Q", NAN) if g["path"] == 640 else NAN
+
+    def _units(self, code: int, *, beside_feed: bool) -> None:
+        """Take a unit of lengths, and of F where the dialect does not keep the two apart."""
+        dialect = self.dialect
+        unit = INCH if dialect.units[code] else 1.0
+        if unit != self.unit:
+            self.p = self.q = self.level = self.r = NAN
+        if code not in dialect.lengths_only:
+            sure = unit == 1.0 or not dialect.feed_before_units
+            if unit != self.feed_unit and not (self.feed_unit is None and beside_feed and sure):
+                self.feed = NAN
+            self.feed_unit = unit
+        self.unit = unit
 
     def effect(self, effect: Effect, code: int, values: dict[str, float]) -> None:
         """What a code does besides, before anything moves."""
@@ -154,6 +164,11 @@ class Codes(Known):
         elif kind is not None and kind not in (1.0, 3.0, 10.0, 11.0, 12.0, 13.0):
             self.forget()
             self.bars["parameters"] = True
+
+
+def _switched(number: float) -> bool | None:
+    """Whether a P that switches something turns it on; None where P is not known."""
+    return None if number != number else number != 0.0
 
 
 def _axes(values: dict[str, float]) -> int:

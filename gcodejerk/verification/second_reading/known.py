@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
@@ -132,24 +133,10 @@ class Known:
         """Keep what both agree on: either may hold."""
         in_doubt = self.cycle != other.cycle
         for name, theirs in vars(other).items():
-            mine, kind = getattr(self, name), KINDS[name]
-            if kind in ("modes", "frames"):
-                none = None if kind == "modes" else False
-                keys = mine.keys() | theirs.keys()
-                both = {k: (mine.get(k, none), theirs.get(k, none)) for k in keys}
-                setattr(self, name, {k: a if a == b else None for k, (a, b) in both.items()})
-            elif kind == "axes":
-                pairs = zip(mine, theirs, strict=True)
-                setattr(self, name, [a if a == b else NAN for a, b in pairs])
-            elif kind == "table":
-                setattr(self, name, {k: v for k, v in mine.items() if theirs.get(k) == v})
-            elif kind == "number":
-                setattr(self, name, mine if mine == theirs else NAN)
-            elif kind == "ever":
-                setattr(self, name, mine or theirs)
-            elif kind == "mode" and mine != theirs:
-                setattr(self, name, None)
-            elif kind == "tolerance" and mine != theirs and (mine == mine or theirs == theirs):
+            mine = getattr(self, name)
+            if KINDS[name] != "tolerance":
+                setattr(self, name, _common(KINDS[name], mine, theirs))
+            elif mine != theirs and (mine == mine or theirs == theirs):
                 self.path = None
         if self.feed_whole is None:
             self.feed = NAN  # a cutting feed that may have to be written either way
@@ -289,6 +276,23 @@ class Known:
         """Axes that cutter compensation may displace."""
         plane = self.g.get("plane")
         return "XYZUVW" if plane is None else "".join(PLANES[plane][:2])
+
+
+def _common(kind: str, mine: Any, theirs: Any) -> Any:
+    """What two values of one field have in common."""
+    if kind in ("modes", "frames"):
+        none = None if kind == "modes" else False
+        both = {k: (mine.get(k, none), theirs.get(k, none)) for k in mine.keys() | theirs.keys()}
+        return {k: a if a == b else None for k, (a, b) in both.items()}
+    if kind == "axes":
+        return [a if a == b else NAN for a, b in zip(mine, theirs, strict=True)]
+    if kind == "table":
+        return {k: v for k, v in mine.items() if theirs.get(k) == v}
+    if kind == "number":
+        return mine if mine == theirs else NAN
+    if kind == "ever":
+        return mine or theirs
+    return None if kind == "mode" and mine != theirs else mine
 
 
 def _bits(axes: str) -> int:

@@ -197,10 +197,8 @@ class Text:
             No block stands in front of it.
         """
         rules, line = self.dialect.text, Line(blank=not text.strip())
-        if len(text) > rules.line_limit:
-            line.understood = False
-            return line
-        if self.python is not None and self.python.search(text):
+        runs_python = self.python is not None and self.python.search(text)
+        if len(text) > rules.line_limit or runs_python:
             line.understood = False
             return line
         if self.comments is not None:
@@ -208,42 +206,60 @@ class Text:
         text = text.strip(b" \t\0").upper()
         if first and rules.leader and _FILE_NAME.fullmatch(text):
             return line
-        if rules.delete == "ignored":
-            text = text.replace(b"/", b"")
-        elif b"/" in text and rules.delete != "none" and (mark := self.delete.match(text)):
-            line.deleted = True
-            text = text[mark.end() :]
+        text = self._mark(text, line)
         if rules.checksum:
             text = _CHECKSUM.sub(b"", text)
+        if self._no_words(text, line):
+            return line
+        text = self._blanked(text, line)
+        if line.flow is None:
+            if rules.blanks == "anywhere":
+                text = text.translate(None, _BLANKS)
+            self._words(text.replace(b"\0", b" "), line)
+        return line
+
+    def _mark(self, text: bytes, line: Line) -> bytes:
+        """Take out the mark of block delete."""
+        rules = self.dialect.text
+        if rules.delete == "ignored":
+            return text.replace(b"/", b"")
+        if b"/" in text and rules.delete != "none" and (mark := self.delete.match(text)):
+            line.deleted = True
+            return text[mark.end() :]
+        return text
+
+    def _no_words(self, text: bytes, line: Line) -> bool:
+        """Take a line that is no block of words: ``%``, an O word, system data, another base."""
+        rules = self.dialect.text
         if rules.percent != "error" and _PERCENT.match(text):
             line.percent = True
             line.understood = text == b"%" or (rules.percent == "named" and b" " not in text)
-            return line
-        if rules.o_word != "error" and (match := _O_WORD.match(text)):
+        elif rules.o_word != "error" and (match := _O_WORD.match(text)):
             line.flow = match[2].decode()
-            return line
-        if rules.hexadecimal and _HEXADECIMAL.search(text):
+        elif rules.hexadecimal and _HEXADECIMAL.search(text):
             line.understood = False
-            return line
-        if rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
+        elif rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
             line.effects.append("written")
-            return line
+        else:
+            return False
+        return True
+
+    def _blanked(self, text: bytes, line: Line) -> bytes:
+        """Take out names, and put a mark in the place of what is computed."""
+        rules = self.dialect.text
         if rules.strings:
             text = _STRING.sub(rb"\1#", text)
         if rules.names:
             text = self._names(text, line)
         elif rules.keywords and any(word.encode() in text for word in rules.keywords):
             line.flow = "JUMP"
-            return line
+            return b""
         if rules.variables == "#" and (b"#" in text or b"[" in text):
             text = self._expressions(text, line)
         elif rules.variables == "R" and b"=" in text:
             text = _PARAMETER.sub(b" ", text)
             text = re.sub(rb"([A-Z])=(?=[-+]?[0-9.]+(?:[ \t]|$))", rb"\1", text)
-        if rules.blanks == "anywhere":
-            text = text.translate(None, _BLANKS)
-        self._words(text.replace(b"\0", b" "), line)
-        return line
+        return text
 
     @staticmethod
     def _words(text: bytes, line: Line) -> None:

@@ -30,64 +30,72 @@ class Sorted:
 
     def sort(self, line: Line, dialect: Dialect, inch: bool, decimals: str | None) -> bool:
         """Sort; whether every word has a meaning that is known, and none stands twice."""
-        plain: list[tuple[str, float, bool]] = []
-        for letter, number, whole in line.words:
-            if letter == "G":
-                code = round(number * 10.0) if number == number else -1
-                group = dialect.groups.get(code)
-                if group is None or abs(number * 10.0 - code) > 1e-3 or group in self.g:
-                    return False
-                self.g[group] = code
-            elif letter == "M":
-                if number != number or number != int(number):
-                    return False
-                self.m.append(int(number))
-            elif letter != "N":
-                plain.append((letter, number, whole))
-        groups = [dialect.m_groups.get(m) for m in self.m]
-        if any(groups.count(group) > 1 for group in _SINGLE):
-            return False
-        if dialect.one_command and len(self.g) + len(self.m) > 1:
+        if not self._codes(line, dialect):
             return False
         dwells = any(dialect.effect(code) == "words" for code in self.g.values())
         inch = dialect.units[self.g["units"]] if "units" in self.g else inch
-        for letter, number, whole in plain:
-            if not self._value(letter, number, whole, dialect, None if dwells else decimals, inch):
+        for letter, number, whole in line.words:
+            if letter in "GMN":
+                continue
+            if not self._may_stand(letter, dialect):
                 return False
+            axis = dialect.increments.get(letter)
+            if letter == "F":
+                self.feed_whole = whole
+            elif whole and number and (axis or letter in AXES or letter == "R"):
+                read = None if dwells else decimals
+                number = _without_point(number, axis or letter, dialect, read, inch=inch)
+            self._put(letter, axis, number)
         return True
 
-    def _value(
-        self,
-        letter: str,
-        number: float,
-        whole: bool,
-        dialect: Dialect,
-        decimals: str | None,
-        inch: bool,
-    ) -> bool:
-        """Sort a word that is no code."""
+    def _codes(self, line: Line, dialect: Dialect) -> bool:
+        """Sort the codes; whether they are known and may stand together."""
+        for letter, number, _ in line.words:
+            if letter == "G" and not self._g_code(number, dialect):
+                return False
+            if letter == "M":
+                if number != number or number != int(number):
+                    return False
+                self.m.append(int(number))
+        groups = [dialect.m_groups.get(m) for m in self.m]
+        if any(groups.count(group) > 1 for group in _SINGLE):
+            return False
+        return not dialect.one_command or len(self.g) + len(self.m) <= 1
+
+    def _g_code(self, number: float, dialect: Dialect) -> bool:
+        """Sort a code; whether it is known, and the only one of its group."""
+        code = round(number * 10.0) if number == number else -1
+        group = dialect.groups.get(code)
+        if group is None or abs(number * 10.0 - code) > 1e-3 or group in self.g:
+            return False
+        self.g[group] = code
+        return True
+
+    def _may_stand(self, letter: str, dialect: Dialect) -> bool:
+        """Whether a letter is known, and neither it nor its axis stood in the line before."""
         axis = dialect.increments.get(letter)
-        known = letter in dialect.letters or axis is not None
         if letter in dialect.calls or letter in self.values or (axis or letter) in self.increments:
             return False
-        if not known and not dialect.one_command:
+        if letter not in dialect.letters and axis is None and not dialect.one_command:
             return False
-        if axis in self.values:
-            return False
-        if letter == "F":
-            self.feed_whole = whole
-        elif (
-            (axis or letter in AXES or letter == "R")
-            and (whole and number)
-            and (dialect.whole_numbers == "machine" and decimals != "calculator")
-        ):
-            small = LEAST / 10.0 if inch and (axis or letter) not in "ABC" else LEAST
-            number = number * small if decimals == "standard" else NAN
+        return axis not in self.values
+
+    def _put(self, letter: str, axis: str | None, number: float) -> None:
+        """Enter a word that is no code; `axis` where it is always an increment of one."""
         if axis is not None:
             self.increments[axis] = number
-            self.axes |= 1 << AXES.index(axis)
         else:
             self.values[letter] = number
-            if letter in AXES:
-                self.axes |= 1 << AXES.index(letter)
-        return True
+        name = axis or letter
+        if name in AXES:
+            self.axes |= 1 << AXES.index(name)
+
+
+def _without_point(
+    number: float, name: str, dialect: Dialect, decimals: str | None, *, inch: bool
+) -> float:
+    """What a number without a decimal point says; NaN where the machine has not told."""
+    if dialect.whole_numbers != "machine" or decimals == "calculator":
+        return number
+    small = LEAST / 10.0 if inch and name not in "ABC" else LEAST
+    return number * small if decimals == "standard" else NAN

@@ -183,64 +183,76 @@ class Tracker(Codes):
             self.contour = None
 
     def _run_block(self, block: Sorted) -> Observation:
-        dialect, g, values = self.dialect, block.g, block.values
-        effects = {code: dialect.effect(code) for code in g.values()}
-        burnt = self.spindle != 5
+        """Execute a block: its modal words, then its motion, then what stops or ends."""
+        effects = {code: self.dialect.effect(code) for code in block.g.values()}
         kinds = set(effects.values())
-        against = self._ban(kinds)
-        if "feed mode" in g:
-            mode = self.mode_of(g["feed mode"])
-            if mode != self.feed_mode:
-                self.feed = NAN
-            self.feed_mode = mode
-        taken = "words" in kinds or (dialect.one_command and not g)
-        if "F" in values and not taken:
-            self.feed, self.feed_whole = values["F"], self._matters(block.feed_whole)
+        burnt = self.spindle != 5
+        seen = Observation(against=self._ban(kinds), axes=block.axes)
+        self._set_feed(block, kinds)
         ends = self.machine_codes(block)
-        for m in block.m:
-            if m in dialect.m_bars:
-                p = values.get("P", 1.0)
-                self.bars[dialect.m_bars[m]] = None if p != p else p != 0.0
-        if dialect.tool_word_moves and "T" in values:
-            self.lose()
-        if dialect.length_word in values and "tool length" not in g:
-            self.lengthen(0, NAN, block.axes)
-        if not dialect.tool_frame.isdisjoint(values):
-            self.tool = [NAN] * len(AXES)
-            self.lose()
-            self.end_bar("tool data")
-            against = against or "it changes the tool's offset"
-        self.modes(g, values)
+        self._set_tool(block, seen)
+        self.modes(block.g, block.values)
         for code, effect in effects.items():
-            self.effect(effect, code, values)
-        motion = g.get("motion")
-        seen = Observation(against=against, axes=block.axes)
-        if kinds & _MOVES or (dialect.one_command and not g and not block.m):
-            if motion is not None:
-                self._motion(motion)
-            if dialect.one_command and not g and block.axes:
-                self.lose()
-            if "cycle" in kinds and "non-modal" in g and g["non-modal"] in dialect.contours:
-                self.contour = values.get("Q", NAN) if "P" in values else None
-            seen.against = seen.against or "its words are for something else than a move"
-        elif block.axes or motion is not None or "cycle" in g or kinds & _FRAMES:
-            self._move(block, kinds, seen)
-        else:
-            seen.against = seen.against or "it names no axis"
+            self.effect(effect, code, block.values)
+        self._use_axes(block, kinds, seen)
         seen.end = list(self.at)
         seen.modes = self._in_force()
         burns = self.beam(block, burnt)
         seen.sure = seen.sure and burns is False
         if burns:
             seen.against = seen.against or "a beam may be on"
+        self._stop(block, ends=ends)
+        return seen
+
+    def _set_feed(self, block: Sorted, kinds: set[Effect]) -> None:
+        """Put the feed mode in force, then F, unless a dwell takes it."""
+        g, values = block.g, block.values
+        if "feed mode" in g:
+            mode = self.mode_of(g["feed mode"])
+            if mode != self.feed_mode:
+                self.feed = NAN
+            self.feed_mode = mode
+        taken = "words" in kinds or (self.dialect.one_command and not g)
+        if "F" in values and not taken:
+            self.feed, self.feed_whole = values["F"], self._matters(block.feed_whole)
+
+    def _set_tool(self, block: Sorted, seen: Observation) -> None:
+        """Execute the words, other than codes, that move the tool or its frame."""
+        dialect, values = self.dialect, block.values
+        if dialect.tool_word_moves and "T" in values:
+            self.lose()
+        if dialect.length_word in values and "tool length" not in block.g:
+            self.lengthen(0, NAN, block.axes)
+        if not dialect.tool_frame.isdisjoint(values):
+            self.tool = [NAN] * len(AXES)
+            self.lose()
+            self.end_bar("tool data")
+            seen.against = seen.against or "it changes the tool's offset"
+
+    def _use_axes(self, block: Sorted, kinds: set[Effect], seen: Observation) -> None:
+        """Give the axis words to the motion, or to the code that takes them for itself."""
+        dialect, g = self.dialect, block.g
+        if kinds & _MOVES or (dialect.one_command and not g and not block.m):
+            self._motion(block)
+            if dialect.one_command and not g and block.axes:
+                self.lose()
+            if "cycle" in kinds and "non-modal" in g and g["non-modal"] in dialect.contours:
+                self.contour = block.values.get("Q", NAN) if "P" in block.values else None
+            seen.against = seen.against or "its words are for something else than a move"
+        elif block.axes or "motion" in g or "cycle" in g or kinds & _FRAMES:
+            self._move(block, kinds, seen)
+        else:
+            seen.against = seen.against or "it names no axis"
+
+    def _stop(self, block: Sorted, *, ends: bool) -> None:
+        """Stop or end behind the motion."""
         stays = self.facts.resume == "same"
-        if not stays and not (self.facts.resume is None and dialect.same_after_stop):
-            stops = [m for m in block.m if m in _STOPS and dialect.m_groups.get(m) == "stop"]
+        if not stays and not (self.facts.resume is None and self.dialect.same_after_stop):
+            stops = [m for m in block.m if m in _STOPS and self.dialect.m_groups.get(m) == "stop"]
             self.lose(AXES if stops else "")
         if ends:
             self.forget()
             self.ended = self.depth == 0  # in a branch it may not run
-        return seen
 
     def _in_force(self) -> dict[str, Any]:
         distance = self.g.get("distance")
@@ -268,35 +280,22 @@ class Tracker(Codes):
             return "a coordinate frame changes in it"
         return None
 
-    def _motion(self, code: int) -> None:
+    def _motion(self, block: Sorted) -> None:
+        """Put the motion code of the block in force, if it states one."""
+        code = block.g.get("motion")
+        if code is None:
+            return
         self.g["motion"] = code
         if code not in self.dialect.cycles:
             self.cycle = None
 
     def _move(self, block: Sorted, kinds: set[Effect], seen: Observation) -> None:
         """Move the axes, or whatever the block makes of its axis words."""
-        dialect, g, values = self.dialect, block.g, block.values
         seen.start = list(self.at)
-        motion = g.get("motion")
-        if motion is not None:
-            self._motion(motion)
-        if "return" in kinds:
-            if dialect.tool_cancelled_by_return:
-                self.tool = [NAN] * len(AXES)
-                self.lose()
-            self.lose("".join(a for k, a in enumerate(AXES) if block.axes >> k & 1) or AXES)
+        self._motion(block)
+        if self._taken(block, kinds):
             return
-        if kinds & {"set", "clear", "restore", "local", "table"}:
-            self.shift(kinds, block.values, block.increments)
-            return
-        if g.get("tool length") not in (None, 430, 490) and block.axes:
-            return
-        code = g.get("cycle")
-        if code is not None and code not in dialect.cycles:
-            self.cycle, code = None, None
-        if not dialect.drilling.own_group and self.g.get("motion") in dialect.cycles:
-            code = self.g["motion"]
-        code = code or self.cycle
+        code = self._cycle_of(block)
         if code is not None:
             seen.against = seen.against or "it belongs to a canned cycle"
             self._drill(code, block)
@@ -308,21 +307,47 @@ class Tracker(Codes):
         if motion is None or motion == 800:
             self.lose()
             return
-        if motion != dialect.rapid:
+        if motion != self.dialect.rapid:
             seen.against = seen.against or f"it moves with G{motion // 10}"
         if "machine" in kinds:
-            for k, axis in enumerate(AXES):
-                if axis in values:
-                    there = values[axis] * self.scale(axis)
-                    there -= self.system[k] + self.g92[k] + self.tool[k]
-                    known = self.g.get("distance") != 910 and not self.turned()
-                    self.at[k] = there if known else NAN
-        elif motion in dialect.redrawn:
+            self._go_to_machine_position(block)
+        elif motion in self.dialect.redrawn:
             self.lose(self.in_plane())
-            self.lose("".join(a for k, a in enumerate(AXES) if block.axes >> k & 1))
+            self.lose(_letters(block.axes))
         else:
             self._go(block)
         self._why_not(block, seen)
+
+    def _taken(self, block: Sorted, kinds: set[Effect]) -> bool:
+        """Execute what takes the axis words from the motion: G28, G92, G10, G43.1."""
+        if "return" in kinds:
+            if self.dialect.tool_cancelled_by_return:
+                self.tool = [NAN] * len(AXES)
+                self.lose()
+            self.lose(_letters(block.axes) or AXES)
+            return True
+        if kinds & {"set", "clear", "restore", "local", "table"}:
+            self.shift(kinds, block.values, block.increments)
+            return True
+        return block.g.get("tool length") not in (None, 430, 490) and block.axes != 0
+
+    def _cycle_of(self, block: Sorted) -> int | None:
+        """Code of the canned cycle that a block belongs to."""
+        dialect, code = self.dialect, block.g.get("cycle")
+        if code is not None and code not in dialect.cycles:
+            self.cycle, code = None, None
+        if not dialect.drilling.own_group and self.g.get("motion") in dialect.cycles:
+            code = self.g["motion"]
+        return code or self.cycle
+
+    def _go_to_machine_position(self, block: Sorted) -> None:
+        """G53: the words are machine coordinates."""
+        for k, axis in enumerate(AXES):
+            if axis in block.values:
+                there = block.values[axis] * self.scale(axis)
+                there -= self.system[k] + self.g92[k] + self.tool[k]
+                known = self.g.get("distance") != 910 and not self.turned()
+                self.at[k] = there if known else NAN
 
     def _go(self, block: Sorted) -> None:
         """To where the words say."""
@@ -385,13 +410,7 @@ class Tracker(Codes):
             self.level = self.r = NAN
             return
         first, second, along = PLANES[plane]
-        k = AXES.index(along)
-        if self.cycle is None:
-            self.level, self.r = self.at[k], NAN
-        elif self.cycle != code:
-            self.r = NAN
-        self.cycle = code
-        self.r = values["R"] * self.scale(along) if "R" in values else self.r
+        self._begin_cycle(code, block, along)
         if not block.axes:
             return
         repeats = [values[letter] for letter in drilling.repeats if letter in values]
@@ -402,8 +421,27 @@ class Tracker(Codes):
         for axis in (first, second):
             if axis in values:
                 self.at[AXES.index(axis)] = values[axis] * self.scale(axis)
-        retract = self.g.get("retract")
-        top = max(self.level, self.r) if self.level == self.level and self.r == self.r else NAN
-        self.at[k] = self.r if retract == 990 else top if retract == 980 else NAN
+        self.at[AXES.index(along)] = self._retracted()
         if self.turned() or self.g.get("compensation") != 400:
             self.lose()
+
+    def _retracted(self) -> float:
+        """Where the tool comes back to: R (G99), or the level of the series above it (G98)."""
+        retract = self.g.get("retract")
+        top = max(self.level, self.r) if self.level == self.level and self.r == self.r else NAN
+        return self.r if retract == 990 else top if retract == 980 else NAN
+
+    def _begin_cycle(self, code: int, block: Sorted, along: str) -> None:
+        """Put a cycle in force, with the level of its series and its R."""
+        if self.cycle is None:
+            self.level, self.r = self.at[AXES.index(along)], NAN
+        elif self.cycle != code:
+            self.r = NAN
+        self.cycle = code
+        if "R" in block.values:
+            self.r = block.values["R"] * self.scale(along)
+
+
+def _letters(axes: int) -> str:
+    """Axes by their bits."""
+    return "".join(axis for k, axis in enumerate(AXES) if axes >> k & 1)
