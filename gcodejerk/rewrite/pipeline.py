@@ -16,7 +16,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gcodejerk.cycles.expansion import Expansion, LineMap
+from gcodejerk.cycles.expansion import Expansion
+from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
