@@ -232,7 +232,7 @@ class _Expander(Reader):
                 crlf = first > 0 and chunk.data[first - 1 : first] == b"\r"
                 self.newline = b"\r\n" if crlf else b"\n"
             self._chunk = chunk
-            read_chunk(self, chunk, True)
+            read_chunk(self, chunk, fast=True)
             self._copy(chunk.offset + len(chunk.data))
         if self.series is not None:
             self._close(self.series)

@@ -197,7 +197,7 @@ def follow(
             first = chunk.data.find(b"\n")
             if first > 0 and chunk.data[first - 1 : first] == b"\r":
                 newline = b"\r\n"
-        read_chunk(reader, chunk, fast)
+        read_chunk(reader, chunk, fast=fast)
         size += len(chunk.data)
         lines += chunk.data.count(b"\n") + (not chunk.data.endswith(b"\n"))
         if progress is not None:
@@ -219,7 +219,7 @@ def follow(
     )
 
 
-def read_chunk(reader: Reader, chunk: Chunk, fast: bool) -> None:
+def read_chunk(reader: Reader, chunk: Chunk, *, fast: bool) -> None:
     """Take the lines of one chunk."""
     if not fast or not reader.dialect.quick:
         for line in split_lines(chunk):

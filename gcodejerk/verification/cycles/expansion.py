@@ -125,7 +125,9 @@ class _Proof:
         self.newline = b""
         self.contexts: list[Context] = []
         if start.startup:
-            self._remember(parse_block(start.startup.encode("latin-1", "replace"), dialect), True)
+            self._remember(
+                parse_block(start.startup.encode("latin-1", "replace"), dialect), sure=True
+            )
 
     def take(self, chunk: Chunk) -> bool:
         """Walk over a chunk of the original; whether the walk can go on."""
@@ -135,7 +137,7 @@ class _Proof:
         plain = self.series is None and not _CANDIDATE.search(chunk.data)
         if plain and self.theirs.peek(len(chunk.data)) == chunk.data:
             self.theirs.skip(len(chunk.data))
-            read_chunk(self.reader, chunk, True)
+            read_chunk(self.reader, chunk, fast=True)
             self.kept += chunk.data.count(b"\n")
             return True
         return all(self._line(*line) for line in split_lines(chunk))
@@ -153,7 +155,7 @@ class _Proof:
         motion = self.reader.state.motion
         line = self._read(text, begin, number, terminator)
         if not line.ended:
-            self._remember(line.block, line.sure)
+            self._remember(line.block, sure=line.sure)
             self._begin_series(line, motion)
         if not self._is_kept(line.whole):
             if line.hole:
@@ -372,7 +374,7 @@ class _Proof:
             abs(got[letter] - value) <= abs(value) * CLOSE for letter, value in self.path.items()
         )
 
-    def _remember(self, block: Block, sure: bool) -> None:
+    def _remember(self, block: Block, *, sure: bool) -> None:
         """Note which way the spindle turns and which G64 is in force."""
         codes = [word.value for word in block.words if word.letter == "G"]
         for word in block.words:
