@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
@@ -32,10 +33,7 @@ def left(profile, frequency, damping):
     omega = 2.0 * np.pi * frequency
     damped = omega * np.sqrt(1.0 - damping**2)
     kernel = np.exp((-damping * omega + 1j * damped) * (total - t))
-    return (
-        abs(np.trapezoid(a * kernel, t) if hasattr(np, "trapezoid") else np.trapz(a * kernel, t))
-        / damped
-    )
+    return abs(trapezoid(a * kernel, t)) / damped
 
 
 @pytest.mark.parametrize("band", range(len(BANDS)))
