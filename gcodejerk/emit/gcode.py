@@ -284,13 +284,15 @@ class _Frame:
             # The points are absolute: so is the end of an increment.
             return axis.encode() + _plain(programmed_end(self.rapids, self.move, axis, False))
         incremental = bool(self.rapids.incremental[self.move])
-        number = Decimal(b"".join(word.text[1:].split()).decode())
+        # X=3 of Siemens is X3.
+        text = b"".join(word.text[1:].split()).removeprefix(b"=")
+        number = Decimal(text.decode())
         if word.whole and number and self.dialect.whole_numbers == "machine":
             number = programmed_end(self.rapids, self.move, word.letter, incremental)
             if not incremental:
                 return word.letter.encode() + _plain(number)
         if not incremental:
-            return b"".join(word.text.split()).upper()
+            return word.letter.encode() + text.upper()
         left = number - before_end.get(AXES.index(word.letter), Decimal(0))
         return word.letter.encode() + _plain(left)
 

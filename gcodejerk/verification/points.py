@@ -122,7 +122,8 @@ class Reader:
                 increments = bool(self.rapids.incremental[i])
                 wanted[word.letter] = self._programmed(i, word.letter, increments)
             elif word.letter in AXES:
-                wanted[word.letter] = Decimal(b"".join(word.text[1:].split()).decode())
+                text = b"".join(word.text[1:].split()).removeprefix(b"=")
+                wanted[word.letter] = Decimal(text.decode())
         return wanted
 
     def _programmed(self, i: int, axis: str, incremental: bool) -> Decimal:

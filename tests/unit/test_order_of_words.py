@@ -146,3 +146,13 @@ def test_fanuc_and_haas_check_the_position_after_every_rapid():
     for dialect in ("fanuc", "haas"):
         assert any(x.startswith("G1 G9 X9. F") for x in made(dialect, "G0 X9.")[3])
     assert not any("G9 " in x for x in made("siemens", "G0 X9.")[3])
+
+
+def test_a_word_with_an_equals_sign_is_the_word_without_it():
+    program = "G710 G17 G40 G90 G94 G64 F100\nG0 X0 Y0 Z5\nG0 X=3 Y = +5\nG91 X=-2. Y = 7\nM30\n"
+    machine = machine_for("siemens")
+    made = process(program.encode(), machine, controller="siemens", dialect="siemens")
+    assert (made.planned, made.verification.ok) == (3, True)
+    written = made.output.decode().splitlines()
+    assert any(line.startswith("G1 X3 Y+5 F") for line in written)
+    assert not any("=" in line for line in written if line.startswith("G1"))
