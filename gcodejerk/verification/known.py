@@ -287,7 +287,8 @@ class Known:
     def in_plane(self) -> str:
         """Axes that cutter compensation may displace."""
         plane = self.g.get("plane")
-        return "XYZUVW" if plane is None else "".join(PLANES[plane][:2])
+        # Heidenhain's G20 is a plane that nothing here knows.
+        return "".join(PLANES[plane][:2]) if plane in PLANES else "XYZUVW"
 
 
 def _bits(axes: str) -> int:

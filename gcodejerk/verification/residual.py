@@ -14,7 +14,8 @@ sum of its velocity steps, each times :math:`e^{\lambda (T - t)}`.
 
 Rule: a stream is refused only if it leaves more than the controller's own rapid in every reading
 that is fair: more than that rapid in closed form, and more than it through straight lines at the
-same moments, by more than what rounding and the distance of the points may make of it.
+same moments, by more than what rounding and the distance of the points may make of it. Of a mode
+of which points tell less than two in a period, they tell nothing.
 """
 
 from __future__ import annotations
@@ -65,11 +66,11 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
     limits : ndarray, shape (3, streams, 9)
         Of the controller's own rapid, over the displacement of each axis. [1/s], [1/s^2], [1/s^3]
     """
-    modes = Oscillators.of(machine)
+    streams = _Streams(paths, machine, moment, limits)
+    modes = Oscillators.of(machine).slower_than(0.5 / streams.spacing)
     none = Excess(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
     if not len(modes.poles):
         return none
-    streams = _Streams(paths, machine, moment, limits)
     left = modes.largest(np.abs(streams.lines(modes, paths.position)))
     # Nearly every stream leaves less by far: only the others are looked at closely.
     rapid = modes.largest(np.abs(streams.own(modes)))
@@ -105,6 +106,12 @@ class _Streams:
         self.limits = limits
         self.begins = np.zeros(len(self.t), dtype=np.bool_)
         self.begins[paths.begin] = True
+
+    @property
+    def spacing(self) -> float:
+        """The longest mean time from point to point of any stream, in s."""
+        blocks = np.maximum(self.paths.count, 1)
+        return float((self.count / blocks).max(initial=1.0)) * self.machine.interval
 
     @property
     def banded(self) -> NDArray[np.bool_]:

@@ -378,7 +378,7 @@ class Tracker(Codes):
         values, drilling = block.values, self.dialect.drilling
         plane = self.g.get("plane")
         unsure = code in drilling.unknown_ends or (plane != 170 and code in drilling.only_in_xy)
-        if self.g.get("motion") == 800 or plane is None or unsure:
+        if self.g.get("motion") == 800 or plane not in PLANES or unsure:
             self.lose()
             self.cycle = code
             self.level = self.r = NAN

@@ -2,11 +2,12 @@
 
 import io
 import math
+from dataclasses import replace
 
 import pytest
 
 from gcodejerk.errors import ProgramError
-from gcodejerk.machine import Machine
+from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import AXES, CERTAIN, DIALECTS, Start, read_program
 from gcodejerk.nc.modal import FIELDS, State, agree, join, same
 from gcodejerk.nc.reader import Reader
@@ -485,3 +486,14 @@ def test_every_reader_begins_in_a_state_without_a_unit():
     for name, dialect in DIALECTS.items():
         fixed = "units" in dialect.defaults
         assert (Reader("p", dialect, Start()).state.unit is not None) is fixed, name
+
+
+def test_a_plane_that_nobody_knows_is_no_error_of_the_second_reader():
+    """Heidenhain's G20 takes the fourth axis for the tool's."""
+    program = (
+        b"N10 G20 G71 G90 G40\nN20 G00 X0 Y0 Z0\nN30 G00 X10 Y5\nN40 G41 G01 X20 F100\nN60 M30\n"
+    )
+    machine = Machine.load(find_machine("centre"))
+    machine = replace(machine, controller="csv", dialect="heidenhain-iso")
+    made = process(program, machine)
+    assert (made.planned, made.verification.confirmed) == (1, 1)
