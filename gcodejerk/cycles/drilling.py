@@ -17,6 +17,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 
+from gcodejerk.nc.dialects.gcodes import G17, G18, G19
+
 MOST_MOVES = 20_000
 """Of one block; more is a slip of the pen (a Q far too small, an L far too large)."""
 
@@ -85,7 +87,7 @@ LINUXCNC = DrillingRules(
         890: Cycle(dwells=True, out=Out.FEED),
     },
     # U, V and W as drilling axes are left alone: nobody has compared them.
-    planes=frozenset({170, 180, 190}),
+    planes=frozenset({G17, G18, G19}),
     repeats="L",
     peck="Q",
     dwell="P",

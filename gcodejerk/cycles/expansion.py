@@ -40,6 +40,7 @@ from gcodejerk.cycles.series import (
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.gcodes import G61, G61_1, G64
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.program import read_chunk
 from gcodejerk.nc.reader import Reader
@@ -382,7 +383,7 @@ class _Expander(Reader):
         for word in block.words:
             if word.letter == "M" and word.value not in (0, 1, 7, 8, 9, 48, 49):
                 self.spindle = int(word.value) if sure and word.value in (3.0, 4.0) else None
-        if any(code in (610, 611, 640) for code in g_codes(block)):
+        if any(code in (G61, G61_1, G64) for code in g_codes(block)):
             self.path = self._path_words(block) if sure else None
 
     def _path_words(self, block: Block) -> PathWords | None:

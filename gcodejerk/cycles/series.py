@@ -38,6 +38,22 @@ from gcodejerk.cycles.drilling import (
     most_moves,
 )
 from gcodejerk.nc.dialects.dialect import PLANES
+from gcodejerk.nc.dialects.gcodes import (
+    G17,
+    G18,
+    G19,
+    G20,
+    G21,
+    G40,
+    G90,
+    G90_1,
+    G91,
+    G91_1,
+    G94,
+    G95,
+    G98,
+    G99,
+)
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.text.block import Block, Word
 from gcodejerk.reasons import Reason
@@ -51,7 +67,7 @@ TOLERANCE = Context(prec=12)
 
 _STOPS = frozenset({0, 1, 2, 30, 60})
 _HARMLESS_M = frozenset({3, 4, 5, 7, 8, 9, 48, 49})
-_HARMLESS_G = frozenset({170, 180, 190, 200, 210, 400, 900, 910, 901, 911, 940, 950, 980, 990})
+_HARMLESS_G = frozenset({G17, G18, G19, G20, G21, G40, G90, G91, G90_1, G91_1, G94, G95, G98, G99})
 """G codes that act before the motion of their block, and of which the state tells all."""
 _TAKERS = frozenset({100, 280, 300, 520, 920})
 """G codes that the axis words of their block belong to, whatever motion is in force."""
@@ -175,7 +191,7 @@ def why_left_alone(
     if code not in rules.cycles:
         return f"G{code / 10:g} is a cycle that only the controller can do"
     reasons = [
-        (state.compensation != 400, str(Reason.CUTTER_COMPENSATION)),
+        (state.compensation != G40, str(Reason.CUTTER_COMPENSATION)),
         (state.rotated is not False, str(Reason.ROTATION)),
         (state.distance is None, str(Reason.DISTANCE_MODE_UNKNOWN)),
         (state.unit is None, str(Reason.UNITS_UNKNOWN)),
@@ -189,7 +205,7 @@ def why_left_alone(
     for applies, reason in reasons:
         if applies:
             return reason
-    own = {PLANES[state.plane or 170][k] for k in range(3)} | {"R", rules.repeats}
+    own = {PLANES[state.plane or G17][k] for k in range(3)} | {"R", rules.repeats}
     own |= {rules.peck} if rules.cycles[code].pecks is not Pecks.NONE else set()
     own |= {rules.dwell} if rules.cycles[code].dwells else set()
     for word in block.words:
@@ -207,7 +223,7 @@ def why_left_alone(
 
 def _on_diameter(state: State) -> bool:
     """Whether cycles drill along an X that is a diameter: R would not be one."""
-    return state.diameter is not False and state.plane == 190
+    return state.diameter is not False and state.plane == G19
 
 
 def _stops(moment: Moment) -> bool:
@@ -229,7 +245,7 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
     cycle = rules.cycles[code]
     given = {w.letter: decimal(w) for w in block.words if w.letter not in "GMN"}
     before = series.sticky or {} if series.code == code else {}
-    sticky = _sticky(before, given, PLANES[state.plane or 170][2], rules)
+    sticky = _sticky(before, given, PLANES[state.plane or G17][2], rules)
     repeats = given.get(rules.repeats, Decimal(1))
     if repeats != int(repeats) or repeats < 1 or not _is_complete(sticky, cycle):
         return LeftAlone(str(Reason.NOT_UNDERSTOOD))
@@ -237,7 +253,7 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
     assert series.at is not None
     r, bottom = sticky["r"], sticky["bottom"]
     binary = float(r), float(bottom)
-    if state.distance == 910:
+    if state.distance == G91:
         r += series.level
         bottom += r
         lifted = float(series.level) + binary[0]
@@ -256,7 +272,7 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
         level=series.level,
         r=r,
         bottom=bottom,
-        back_to_r=state.retract == 990,
+        back_to_r=state.retract == G99,
         repeats=int(repeats),
         peck=sticky.get("peck", Decimal(0)),
         clearance=clearance or Decimal(0),
@@ -358,8 +374,8 @@ def write_block(
 
 def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
     """The moves of a call as blocks."""
-    incremental = moment.state.distance == 910
-    along = PLANES[moment.state.plane or 170][2].encode()
+    incremental = moment.state.distance == G91
+    along = PLANES[moment.state.plane or G17][2].encode()
     hole_words, going = _to_hole(block, moment)
     lines, at = [], call.start
     for move in drill(call):
@@ -381,10 +397,10 @@ def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
 
 def _to_hole(block: Block, moment: Moment) -> tuple[list[bytes], bool]:
     """The words of a block that lead to its hole, and whether they lead anywhere."""
-    plane = PLANES[moment.state.plane or 170]
+    plane = PLANES[moment.state.plane or G17]
     hole = [w for w in block.words if w.letter in plane[:2]]
     words = [b"".join(w.text.split()).upper() for w in hole]
-    if moment.state.distance == 910:
+    if moment.state.distance == G91:
         return words, any(w.value for w in hole)
     # An unknown position is a NaN, which differs from everything.
     axes = [AXES.index(w.letter) for w in hole]

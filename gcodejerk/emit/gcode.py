@@ -38,6 +38,7 @@ from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
 from gcodejerk.nc.dialects.dialect import Writing, code_name
+from gcodejerk.nc.dialects.gcodes import G90
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import FINE_DECIMALS, Batch, NumberFormat
 from gcodejerk.units import MM_PER_INCH, per_minute
@@ -244,8 +245,8 @@ class _Frame:
         rapids, move, dialect = self.rapids, self.move, self.dialect
         stands = follows or rapids.path[move] in (61, 62)
         codes: list[int | None] = []
-        if not rapids.distance_stated[move] and dialect.groups.get(900) == "distance":
-            codes.append(900)
+        if not rapids.distance_stated[move] and dialect.groups.get(G90) == "distance":
+            codes.append(G90)
         if rapids.feed_mode[move] != 94 or not rapids.feed_mode_stated[move]:
             codes.append(dialect.feed_code(94))
         if rapids.path[move] in (61, 62):

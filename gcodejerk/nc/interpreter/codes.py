@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.gcodes import G80
 from gcodejerk.nc.interpreter.modal import NAN
 from gcodejerk.nc.interpreter.variables import before_block, word_value
 from gcodejerk.nc.text.block import Block, Name, Word
@@ -135,9 +136,9 @@ class _Sorter:
         group = self._dialect.groups.get(code) if abs(value * 10.0 - code) < 1e-3 else None
         if group is None:
             self.codes.reject(word.text)
-        elif group not in g or g[group] == 800:
+        elif group not in g or g[group] == G80:
             g[group] = code
-        elif code != 800:
+        elif code != G80:
             self.codes.fault = True
             g[group] = code
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import PLANES, Drilling
+from gcodejerk.nc.dialects.gcodes import G17, G90, G91, G99
 from gcodejerk.nc.interpreter.modal import NAN, State
 
 
@@ -41,7 +42,7 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     bool
         Whether the block is complete; False where the controller would refuse it.
     """
-    elsewhere = state.plane != 170 and code in rules.only_in_xy
+    elsewhere = state.plane != G17 and code in rules.only_in_xy
     if state.plane is None or elsewhere or code in rules.unknown_ends:
         state.forget_positions()
         state.put("cycle", (code, NAN, NAN))
@@ -59,7 +60,7 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     state.put("cycle", cycle)
     scale = state.scale(along)
     r, bottom = cycle[2] * scale, cycle[1] * scale
-    if state.distance == 910:
+    if state.distance == G91:
         r, bottom = r + state.cycle_level, r + state.cycle_level + bottom
     elif state.distance is None:
         r = bottom = NAN
@@ -98,15 +99,15 @@ def _end(state: State, r: float, rules: Drilling) -> float:
         above = NAN  # not stated: where such a control returns to from an R above its level
     if above != r and state.retract is None:
         return NAN
-    return r if state.retract == 990 else above
+    return r if state.retract == G99 else above
 
 
 def _go_to_hole(state: State, axis: int, number: float, repeats: float) -> None:
     """Go to the last hole of a block along one axis of the plane."""
     value = number * state.scale(axis)
-    if state.distance == 900:
+    if state.distance == G90:
         state.move(axis, value)
-    elif state.distance == 910:
+    elif state.distance == G91:
         state.move(axis, state.position[axis] + repeats * value)
     else:
         state.move(axis, NAN)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, Dialect, Effect
+from gcodejerk.nc.dialects.gcodes import G40
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import NO_FEED
@@ -152,7 +153,7 @@ def why_left_alone(
         return Reason.CANNED_CYCLE
     if effects & _FRAME_CHANGES or not dialect.tool_frame.isdisjoint(codes.values):
         return Reason.FRAME_CHANGE
-    if state.compensation != 400:
+    if state.compensation != G40:
         return Reason.CUTTER_COMPENSATION
     if state.transformed:
         return Reason.ROTATION

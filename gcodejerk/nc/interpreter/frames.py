@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
+from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G90
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import NAN, State
 
@@ -48,7 +49,7 @@ def tool_length(
     """
     axes = dialect.length_axes
     end_bar(state, "tool data written")
-    if state.plane != 170 or any(axis in values for axis in AXES if axis not in axes):
+    if state.plane != G17 or any(axis in values for axis in AXES if axis not in axes):
         axes = AXES
     kept = {k: state.tool[k] for k, axis in enumerate(AXES) if axis not in axes}
     places = {k: state.position[k] for k in kept}
@@ -63,9 +64,9 @@ def tool_length(
 def _shift_tool(state: State, code: int, values: Values, lengths: Mapping[int, float]) -> None:
     """Shift all axes by a tool length."""
     unknown = [NAN] * len(AXES)
-    if code == 490:
+    if code == G49:
         _rename(state, "tool", [0.0] * len(AXES))
-    elif code == 430:
+    elif code == G43:
         number = values.get("H", NAN)
         length = lengths.get(int(number)) if number == number else None
         # A table may hold offsets of every axis; a length that the user states is all there is.
@@ -163,7 +164,7 @@ def set_names(state: State, codes: Codes, dialect: Dialect) -> None:
             state.forget_positions()
             state.lose("g92")
     after = list(state.g92)
-    unknown = state.distance != 900 and not dialect.incremental_set
+    unknown = state.distance != G90 and not dialect.incremental_set
     for axis, letter in enumerate(AXES):
         if letter in codes.increments or (unknown and letter in values):
             after[axis] = NAN

@@ -7,6 +7,7 @@ leave changed is forgotten.
 from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.gcodes import G91
 from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import USES_FEED
@@ -63,5 +64,5 @@ def _behind_macro(state: State) -> None:
     state.lose("tool")
     if state.cycle is not None:
         state.lose("cycle")
-    if state.distance == 910 and "distance" not in state.fixed:
+    if state.distance == G91 and "distance" not in state.fixed:
         state.put("distance", None)

@@ -10,6 +10,7 @@ import math
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect
+from gcodejerk.nc.dialects.gcodes import G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -25,7 +26,7 @@ def go_straight(state: State, codes: Codes, step: Step) -> None:
         elif letter in values:
             value = values[letter] * state.scale(axis)
             function = codes.functions.get(letter)
-            if function == "IC" or (function is None and state.distance == 910):
+            if function == "IC" or (function is None and state.distance == G91):
                 value = state.position[axis] + value
             elif function in (None, "AC") and (function or state.distance is not None):
                 if letter not in LINEAR:
@@ -58,7 +59,7 @@ def go_to_machine_position(state: State, values: dict[str, float]) -> None:
         if letter in values:
             at = values[letter] * state.scale(axis) - state.shift(axis)
             counts = letter not in LINEAR and state.wraps[axis] in ("shortest", "sign")
-            state.move(axis, NAN if counts or state.distance == 910 else at)
+            state.move(axis, NAN if counts or state.distance == G91 else at)
 
 
 def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:

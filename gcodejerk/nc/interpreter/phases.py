@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
+from gcodejerk.nc.dialects.gcodes import G40, G64
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes
@@ -178,7 +179,7 @@ class Phases(Effects):
         state, code = self.state, codes.g.get("path")
         if code is None:
             return
-        continuous = code == 640
+        continuous = code == G64
         state.put("path", self.dialect.paths.get(code))
         state.put("path_p", codes.values.get("P", NAN) if continuous else NAN)
         state.put("path_q", codes.values.get("Q", NAN) if continuous else NAN)
@@ -298,7 +299,7 @@ class Phases(Effects):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         else:
             go_straight(state, codes, step)
-        if state.compensation != 400:
+        if state.compensation != G40:
             state.forget_positions(plane_axes(state))
         if any(on is not False for on in state.transforms.values()):
             state.forget_positions()

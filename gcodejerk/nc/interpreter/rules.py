@@ -7,12 +7,13 @@ accepted moves the tool somewhere else than we believe.
 from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, PLANES, Dialect
+from gcodejerk.nc.dialects.gcodes import G40, G80, G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
 
 _AXIS_USERS = frozenset({"return", "table", "local", "set"})
 """Effects that take the axis words of the block, so that no motion may be stated beside them."""
-_OFF = frozenset({400, None})
+_OFF = frozenset({G40, None})
 _REFUSED = -1
 """In the place of a motion code: the control refuses the block."""
 
@@ -39,7 +40,7 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
         if not _arc_complete(values, plane):
             return False
     mode = dialect.feed_modes.get(g["feed mode"]) if "feed mode" in g else state.feed_mode
-    if mode == 93 and motion not in (None, 0, 800) and axes and "F" not in values:
+    if mode == 93 and motion not in (None, 0, G80) and axes and "F" not in values:
         return False
     return _words_used(codes, motion, state, dialect)
 
@@ -60,10 +61,10 @@ def _strict_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
     effect = dialect.effect(codes.g.get("non-modal"))
     if effect in _AXIS_USERS or (axes and takes_axes(codes)):
         bare = effect in ("local", "set") and not axes
-        motion = _REFUSED if bare or motion not in (None, 800) else None
+        motion = _REFUSED if bare or motion not in (None, G80) else None
     elif motion is None and (axes or arc_words(codes.values, state)):
-        motion = _REFUSED if state.motion == 800 else state.motion
-    elif motion == 800:
+        motion = _REFUSED if state.motion == G80 else state.motion
+    elif motion == G80:
         motion = _REFUSED if axes else motion
     elif motion not in (None, 0, 10, *dialect.arcs) and not axes:
         motion = _REFUSED
@@ -74,7 +75,7 @@ def _strict_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
 
 def _takes_machine_position(codes: Codes, motion: int | None, state: State) -> bool:
     """Whether G53 may stand beside this motion, in these modes."""
-    absolute = codes.g.get("distance", state.distance) != 910
+    absolute = codes.g.get("distance", state.distance) != G91
     return motion in (0, 10) and state.compensation in _OFF and absolute
 
 

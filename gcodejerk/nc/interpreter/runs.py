@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LINEAR, PLANES, Dialect
+from gcodejerk.nc.dialects.gcodes import G40, G90, G91
 from gcodejerk.nc.interpreter.eligibility import BARS
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
@@ -35,7 +36,7 @@ def can_run(state: State) -> bool:
     """Whether the state is one that runs are computed in."""
     return (
         state.motion in (0, 10, 20, 30)
-        and state.compensation == 400
+        and state.compensation == G40
         and state.distance is not None
         and state.diameter is not None
         and state.plane in ARC_CENTRES
@@ -74,7 +75,7 @@ def _sure(
     counting = sum(
         1 << k for k, wrap in enumerate(state.wraps) if AXES[k] not in LINEAR and wrap != "none"
     )
-    if counting and state.distance == 900:
+    if counting and state.distance == G90:
         sure = sure & (letters & np.uint32(counting) == 0)  # where they end, the way they go says
     if state.feed_mode == 93:
         sure = sure & ((motion == 0) | (letters & _AXIS_BITS == 0) | (letters & BIT["F"] != 0))
@@ -176,7 +177,7 @@ def _positions(
     for axis, letter in enumerate(AXES):
         at, value = _words(lines, letter, first, last)
         history = np.concatenate([[state.position[axis]], value * state.scale(axis)])
-        if state.distance == 910:
+        if state.distance == G91:
             history = np.add.accumulate(history)
         start[:, axis] = history[np.searchsorted(at, rapid, side="left")]
         target[:, axis] = history[np.searchsorted(at, rapid, side="right")]

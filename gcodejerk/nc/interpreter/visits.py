@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.gcodes import G91
 from gcodejerk.nc.interpreter.modal import NAN, State, same
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
@@ -53,7 +54,7 @@ class ModeColumns:
         """Fill the columns in; what a block adds is set by whoever runs it."""
         return cls(
             inch=state.unit is not None and state.unit != 1.0,
-            incremental=state.distance == 910,
+            incremental=state.distance == G91,
             diameter=bool(state.diameter),
             distance_stated=state.distance_stated,
             feed_mode=state.feed_mode or 0,

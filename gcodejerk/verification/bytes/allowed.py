@@ -18,6 +18,7 @@ from decimal import Decimal
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids
+from gcodejerk.nc.dialects.gcodes import G90
 
 FINER = 3
 """Decimals more than the resolution's, where the control computes in doubles."""
@@ -119,8 +120,8 @@ def _setup_codes(rapids: Rapids, i: int, dialect: Dialect, *, exact: bool) -> fr
         may.add(dialect.feed_code(94))
     if exact:
         may.add(dialect.path_code(64))
-    if not rapids.distance_stated[i] and dialect.groups.get(900) == "distance":
-        may.add(900)
+    if not rapids.distance_stated[i] and dialect.groups.get(G90) == "distance":
+        may.add(G90)
     return frozenset(code for code in may if code is not None)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from gcodejerk.nc import Dialect, Rapids
+from gcodejerk.nc.dialects.gcodes import G64, G90, G91
 
 # No axis needs more digits; numbers without bounds would be a way to stall the reading.
 _NUMBER = rb"[-+]?(?:[0-9]{1,9}(?:\.[0-9]{0,250})?|\.[0-9]{1,250})(?![0-9.])"
@@ -77,12 +78,12 @@ class Modes:
                 mode = dialect.feed_modes[code]
                 if mode != self.feed_mode:
                     self.feed_mode, self.feed = mode, None
-            elif code in (900, 910):
+            elif code in (G90, G91):
                 self.distance = code // 10
             else:
                 self.path = dialect.paths[code]
-                self.p = float(values.get("P", math.nan)) if code == 640 else math.nan
-                self.q = float(values.get("Q", math.nan)) if code == 640 else math.nan
+                self.p = float(values.get("P", math.nan)) if code == G64 else math.nan
+                self.q = float(values.get("Q", math.nan)) if code == G64 else math.nan
         if "F" in values:
             self.feed = values["F"]
 
@@ -95,9 +96,9 @@ def _out_of_place(codes: set[int], values: dict[str, Decimal], dialect: Dialect)
     if len(set(groups)) < len(groups):
         return "two codes of one modal group"
     known = {0, *dialect.feed_modes, *dialect.paths}
-    known |= {code for code in (900, 910) if dialect.groups.get(code) == "distance"}
+    known |= {code for code in (G90, G91) if dialect.groups.get(code) == "distance"}
     if not codes <= known:
         return f"G{min(codes - known) / 10:g} has no place here"
-    if ("P" in values or "Q" in values) and 640 not in codes:
+    if ("P" in values or "Q" in values) and G64 not in codes:
         return "P or Q without G64"
     return None

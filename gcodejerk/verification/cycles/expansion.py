@@ -17,6 +17,7 @@ from typing import BinaryIO
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Block, Dialect, Start, find_dialect, parse_block
 from gcodejerk.nc.dialects.dialect import PLANES
+from gcodejerk.nc.dialects.gcodes import G17, G91
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.program import read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
@@ -275,7 +276,7 @@ class _Proof:
             comment = lines.next()
             if not (comment.endswith(b")") and comment.count(b"(") == comment.count(b")") == 1):
                 return self._complain(Kind.COMMENT, number, "not one closed comment")
-        plane = PLANES[state.plane or 170]
+        plane = PLANES[state.plane or G17]
         head, stops = self._head(line.text, line.block, {*plane, "R", "L", "P", "Q"})
         if head and squeezed(lines.peek()) != head:
             return self._complain(Kind.HEAD, number, f"expected '{head.decode('latin-1')}'")
@@ -324,7 +325,7 @@ class _Proof:
     ) -> bool:
         """Compare moves one by one; a second list is another count of pecks that is as good."""
         at = dict(series.at)
-        incremental = self.reader.state.distance == 910
+        incremental = self.reader.state.distance == G91
         candidates = wanted
         for k in range(max(map(len, wanted))):
             open_ = [events for events in candidates if len(events) > k]
@@ -404,7 +405,7 @@ def _modes(state: State) -> dict[str, float | None]:
     """What a cycle's moves depend on, as the second reading names it."""
     return {
         "unit": state.unit,
-        "incremental": None if state.distance is None else state.distance == 910,
+        "incremental": None if state.distance is None else state.distance == G91,
         "feed mode": state.feed_mode,
         "F": state.feed,
         "plane": state.plane,

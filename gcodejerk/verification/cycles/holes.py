@@ -20,6 +20,7 @@ from fractions import Fraction
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Block, Word
 from gcodejerk.nc.dialects.dialect import PLANES
+from gcodejerk.nc.dialects.gcodes import G17, G18, G19, G40, G90, G91, G99
 from gcodejerk.nc.interpreter.modal import State
 
 CLOSE = Fraction(1, 10**8)
@@ -88,11 +89,11 @@ def doubt_of(series: Series, state: State) -> str | None:
         return "only the controller can do this cycle"
     if state.plane != series.plane or state.unit != series.unit or series.unit is None:
         return "plane or unit change, or are not known"
-    if state.plane not in (170, 180, 190) or (state.plane == 190 and state.diameter is not False):
+    if state.plane not in (G17, G18, G19) or (state.plane == G19 and state.diameter is not False):
         return "nobody knows cycles in this plane"
-    if state.compensation != 400 or state.rotated is not False:
+    if state.compensation != G40 or state.rotated is not False:
         return "cutter compensation or rotation"
-    if state.distance not in (900, 910) or state.feed_mode not in (94, 95):
+    if state.distance not in (G90, G91) or state.feed_mode not in (94, 95):
         return "distance mode or feed mode"
     if not state.feed > 0.0:
         return "no feed"
@@ -120,7 +121,7 @@ def calls_for(
     series: Series, block: Block, state: State, turning: int
 ) -> list[list[Event]] | Doubt:
     """What a block calls for: its moves, for each count of pecks that may be meant."""
-    plane = PLANES[state.plane or 170]
+    plane = PLANES[state.plane or G17]
     code = state.motion or 0
     said = {w.letter: number_of(w.text[1:]) for w in block.words if w.letter in "XYZRPQL"}
     own = _own_words(code)
@@ -140,7 +141,7 @@ def calls_for(
         return Doubt("G98 or G99 is not known")
     if "S" in HEIGHTS[code] and not turning:
         return Doubt("the spindle may stand")
-    top = r if state.retract == 990 else max(r, level)
+    top = r if state.retract == G99 else max(r, level)
     out = []
     for pecks in _pecks(series, code, r, z):
         if (pecks + 1) * repeats > MOST_PECKS:
@@ -168,7 +169,7 @@ def _remember(series: Series, code: int, said: dict[str, Fraction], along: str) 
 def _heights(series: Series, state: State) -> tuple[Fraction, Fraction]:
     """R and the bottom along the drilling axis, in the program's unit."""
     r, z = series.said["R"], series.said["z"]
-    if state.distance == 910:
+    if state.distance == G91:
         level = series.level[1]
         return level + r, level + r + z
     return r, z
@@ -223,14 +224,14 @@ def _places(
     state: State,
 ) -> Iterator[Event]:
     """Every place of every hole, standing still included."""
-    first, second, along = PLANES[state.plane or 170]
+    first, second, along = PLANES[state.plane or G17]
     r, top = heights
     a, b, c = series.at[first], series.at[second], series.at[along][1]
     if series.level[1] < r:
         c = r
         yield "rapid", (a, b, ("", c))
     for k in range(repeats):
-        if state.distance == 910:
+        if state.distance == G91:
             a = (a[0], a[1] + said.get(first, Fraction(0)))
             b = (b[0], b[1] + said.get(second, Fraction(0)))
         else:

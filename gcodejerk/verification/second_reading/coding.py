@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Effect
+from gcodejerk.nc.dialects.gcodes import G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.known import Known
 from gcodejerk.verification.second_reading.reading import NAN, Line
@@ -84,7 +85,7 @@ class Codes(Known):
                     self.tool = [NAN] * len(AXES)
                     if self.cycle is not None:
                         self.g["motion"], self.cycle = None, None
-                    if self.g.get("distance") == 910 and "distance" not in self.fixed:
+                    if self.g.get("distance") == G91 and "distance" not in self.fixed:
                         self.g["distance"] = None
             elif group == "state":
                 self.forget()
@@ -111,8 +112,8 @@ class Codes(Known):
             self._units(g["units"], beside_feed="F" in values)
         if "path" in g:
             self.path = dialect.paths.get(g["path"])
-            self.p = values.get("P", NAN) if g["path"] == 640 else NAN
-            self.q = values.get("Q", NAN) if g["path"] == 640 else NAN
+            self.p = values.get("P", NAN) if g["path"] == G64 else NAN
+            self.q = values.get("Q", NAN) if g["path"] == G64 else NAN
 
     def _units(self, code: int, *, beside_feed: bool) -> None:
         """Take a unit of lengths, and of F where the dialect does not keep the two apart."""
@@ -137,7 +138,7 @@ class Codes(Known):
             number = values.get("P", NAN) if effect == "numbered system" else 0.0
             if "P" in values and code in self.dialect.p_selects:
                 number = NAN
-            self.select(code if effect == "system" else 541, number)
+            self.select(code if effect == "system" else G54_1, number)
         elif effect == "frames":
             self.lose_offsets()
             self.lose()

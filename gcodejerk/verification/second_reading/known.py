@@ -15,6 +15,7 @@ from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
+from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G54_1, G90
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.reading import NAN
 
@@ -189,12 +190,12 @@ class Known:
     def lengthen(self, code: int, number: float, named: int) -> None:
         """Put a tool length in force: that of the machine file under an H number, or none."""
         length = self.lengths.get(int(number), NAN) if number == number else NAN
-        length = 0.0 if code == 490 else length if code == 430 else NAN
+        length = 0.0 if code == G49 else length if code == G43 else NAN
         after = [length if axis == "Z" else 0.0 for axis in AXES]
         self.tool = self.rename(self.tool, after if length == length else [NAN] * len(AXES))
         self.end_bar("tool data")
         if self.dialect.length_moves:
-            only = self.g.get("plane") == 170 and named & ~_bits(self.dialect.length_axes) == 0
+            only = self.g.get("plane") == G17 and named & ~_bits(self.dialect.length_axes) == 0
             self.lose(self.dialect.length_axes if only else AXES)
 
     def end_bar(self, name: str) -> None:
@@ -247,7 +248,7 @@ class Known:
             elif not values and not increments and dialect.bare_set == "unknown":
                 self.lose()
                 self.g92 = [NAN] * len(AXES)
-            sure = dialect.incremental_set or self.g.get("distance") == 900
+            sure = dialect.incremental_set or self.g.get("distance") == G90
             for k, axis in enumerate(AXES):
                 if axis in increments or (axis in values and not sure):
                     self.at[k] = self.g92[k] = NAN
@@ -303,4 +304,4 @@ def _bits(axes: str) -> int:
 def _system(name: str) -> tuple[int, int]:
     """Key of a work system by its name in a machine file: ``G54``, ``G54.1 P3``."""
     code, _, number = name.upper().partition("P")
-    return (541, int(number)) if number else (round(float(code.strip()[1:]) * 10), 0)
+    return (G54_1, int(number)) if number else (round(float(code.strip()[1:]) * 10), 0)

@@ -14,6 +14,7 @@ from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Effect
+from gcodejerk.nc.dialects.gcodes import G17, G40, G43, G49, G80, G90, G91, G98, G99
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.second_reading.coding import QUIET, Codes
@@ -59,7 +60,7 @@ class Tracker(Codes):
     @property
     def _plain(self) -> bool:
         return (
-            self.g.get("distance") == 900
+            self.g.get("distance") == G90
             and self.cycle is None
             and not self.ended
             and self.contour is None
@@ -82,7 +83,7 @@ class Tracker(Codes):
                 self.at[AXES.index(letter)] = number * self.scale(letter)
         if run.code is not None and self.dialect.modal_motion:
             self.g["motion"] = run.code
-        if self.g.get("compensation") != 400:
+        if self.g.get("compensation") != G40:
             self.lose(self.in_plane())
 
     def _matters(self, whole: bool) -> bool:
@@ -260,7 +261,7 @@ class Tracker(Codes):
         return {
             "unit": self.unit,
             "speed": self.feed * (self.unit or NAN) / SECONDS_PER_MINUTE,
-            "incremental": None if distance is None else distance == 910,
+            "incremental": None if distance is None else distance == G91,
             "diameter": self.diameter,
             "feed mode": feed_mode,
             "F": self.feed,
@@ -304,7 +305,7 @@ class Tracker(Codes):
             seen.against = seen.against or "it names no axis"
             return
         motion = self.g.get("motion")
-        if motion is None or motion == 800:
+        if motion is None or motion == G80:
             self.lose()
             return
         if motion != self.dialect.rapid:
@@ -329,7 +330,7 @@ class Tracker(Codes):
         if kinds & {"set", "clear", "restore", "local", "table"}:
             self.shift(kinds, block.values, block.increments)
             return True
-        return block.g.get("tool length") not in (None, 430, 490) and block.axes != 0
+        return block.g.get("tool length") not in (None, G43, G49) and block.axes != 0
 
     def _cycle_of(self, block: Sorted) -> int | None:
         """Code of the canned cycle that a block belongs to."""
@@ -346,7 +347,7 @@ class Tracker(Codes):
             if axis in block.values:
                 there = block.values[axis] * self.scale(axis)
                 there -= self.system[k] + self.g92[k] + self.tool[k]
-                known = self.g.get("distance") != 910 and not self.turned()
+                known = self.g.get("distance") != G91 and not self.turned()
                 self.at[k] = there if known else NAN
 
     def _go(self, block: Sorted) -> None:
@@ -357,7 +358,7 @@ class Tracker(Codes):
                 self.at[k] += block.increments[axis] * self.scale(axis)
             elif axis in block.values:
                 there = block.values[axis] * self.scale(axis)
-                if distance == 910:
+                if distance == G91:
                     there += self.at[k]
                 elif axis not in LINEAR:
                     there = self.turn(k, there)
@@ -366,7 +367,7 @@ class Tracker(Codes):
     def _why_not(self, block: Sorted, seen: Observation) -> None:
         """Whether the move was a rapid in a known frame."""
         compensation = self.g.get("compensation")
-        if compensation != 400:
+        if compensation != G40:
             self.lose(self.in_plane())
             if compensation is not None:
                 seen.against = seen.against or "cutter compensation is active"
@@ -376,7 +377,7 @@ class Tracker(Codes):
                 seen.against = seen.against or "a rotation, scaling or mirroring is active"
         seen.against = seen.against or self._barred(block, seen)
         dialect = self.dialect
-        known = compensation == 400 and not self.turned() and self.depth == 0 and not self.doubt
+        known = compensation == G40 and not self.turned() and self.depth == 0 and not self.doubt
         known = known and all(on is False for on in self.bars.values())
         known = known and (self.path is not None or not dialect.path_has_to_be_stated)
         known = known and (self.feed_unit is not None or not dialect.lengths_only)
@@ -391,7 +392,7 @@ class Tracker(Codes):
                 return f"rapids have to stay as they are ({name})"
         for k, axis in enumerate(AXES):
             stated = axis in LINEAR or axis in self.facts.wraps
-            if stated or axis not in block.values or self.g.get("distance") != 900:
+            if stated or axis not in block.values or self.g.get("distance") != G90:
                 continue
             if seen.start[k] != self.at[k] and seen.start[k] == seen.start[k]:
                 return f"nobody says which way {axis} turns"
@@ -403,8 +404,8 @@ class Tracker(Codes):
         """Where a block of a drilling cycle ends, if it is one that is followed."""
         values, drilling = block.values, self.dialect.drilling
         plane = self.g.get("plane")
-        unsure = code in drilling.unknown_ends or (plane != 170 and code in drilling.only_in_xy)
-        if self.g.get("motion") == 800 or plane not in PLANES or unsure:
+        unsure = code in drilling.unknown_ends or (plane != G17 and code in drilling.only_in_xy)
+        if self.g.get("motion") == G80 or plane not in PLANES or unsure:
             self.lose()
             self.cycle = code
             self.level = self.r = NAN
@@ -414,7 +415,7 @@ class Tracker(Codes):
         if not block.axes:
             return
         repeats = [values[letter] for letter in drilling.repeats if letter in values]
-        if self.g.get("distance") != 900 or any(n != 1.0 for n in repeats) or block.increments:
+        if self.g.get("distance") != G90 or any(n != 1.0 for n in repeats) or block.increments:
             self.lose()
             self.level = self.r = NAN
             return
@@ -422,14 +423,14 @@ class Tracker(Codes):
             if axis in values:
                 self.at[AXES.index(axis)] = values[axis] * self.scale(axis)
         self.at[AXES.index(along)] = self._retracted()
-        if self.turned() or self.g.get("compensation") != 400:
+        if self.turned() or self.g.get("compensation") != G40:
             self.lose()
 
     def _retracted(self) -> float:
         """Where the tool comes back to: R (G99), or the level of the series above it (G98)."""
         retract = self.g.get("retract")
         top = max(self.level, self.r) if self.level == self.level and self.r == self.r else NAN
-        return self.r if retract == 990 else top if retract == 980 else NAN
+        return self.r if retract == G99 else top if retract == G98 else NAN
 
     def _begin_cycle(self, code: int, block: Sorted, along: str) -> None:
         """Put a cycle in force, with the level of its series and its R."""
