@@ -1,10 +1,10 @@
 """Runs a harness: guided by coverage for hours, for a few hundred inputs in a test, or once more.
 
-A harness is a function that takes bytes and raises where a profile is broken. With `atheris`
+A harness is a function that takes bytes and raises where a promise is broken. With `atheris`
 (libFuzzer for Python, `pip install atheris`) inputs that reach new code are kept and changed
 further; without it the seeds alone are changed, which finds less, and it says so.
 
-What breaks a profile is saved under `crashes/`, what reached new code under `corpus/`, both beside
+What breaks a promise is saved under `crashes/`, what reached new code under `corpus/`, both beside
 this file and not in git.
 """
 
@@ -68,7 +68,7 @@ def main(load, name):
 
 
 def rounds(minutes, seed):
-    """Fuzz in processes of a few minutes each, which share the corpus, until a profile is broken.
+    """Fuzz in processes of a few minutes each, which share the corpus, until a promise is broken.
 
     An instrumented process grows by some 0.2 MB with each input (the same inputs without atheris
     take 60 MB whatever their number), so an hour of it would end for lack of memory.
@@ -84,7 +84,7 @@ def rounds(minutes, seed):
 
 
 def guided(atheris, load, minutes, seed, crashes, corpus):
-    """Hand over to libFuzzer, which does not come back; it stops at the first profile broken."""
+    """Hand over to libFuzzer, which does not come back; it stops at the first promise broken."""
     with atheris.instrument_imports(include=["gcodejerk"]):
         harness = load()
 
@@ -110,7 +110,7 @@ def guided(atheris, load, minutes, seed, crashes, corpus):
 
 
 def blind(harness, minutes, seed, crashes):
-    """Change seeds until the time is over; the number of different profiles broken."""
+    """Change seeds until the time is over; the number of different promises broken."""
     draw, begun, found, runs = random.Random(seed), time.monotonic(), set(), 0
     kept = seeds()
     signal.signal(signal.SIGALRM, _too_slow)
@@ -141,6 +141,6 @@ def _too_slow(number, frame):
 
 
 def within_linear_time(begun, size, allowance, per_byte):
-    """Break the profile of linear time: so many seconds, and so many more for each byte."""
+    """Break the promise of linear time: so many seconds, and so many more for each byte."""
     took = time.process_time() - begun
     assert took <= allowance + per_byte * size, f"{took:.1f} s for {size} bytes"

@@ -3,7 +3,7 @@
     python tests/fuzz/fuzz_process.py --minutes 60
     python tests/fuzz/fuzz_process.py --replay tests/fuzz/crashes/process/crash-...
 
-Profiles: nothing but a GcodejerkError is raised, and never VerifyError, which says that we wrote
+Promises: nothing but a GcodejerkError is raised, and never VerifyError, which says that we wrote
 something wrong; every byte that is not a rapid's is kept; `verify` accepts every output; what has
 no rapid to rewrite is given back as it is, and what was rewritten is not rewritten again; the time
 grows with what is read and written, and no faster.

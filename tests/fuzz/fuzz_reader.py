@@ -3,7 +3,7 @@
     python tests/fuzz/fuzz_reader.py --minutes 60
     python tests/fuzz/fuzz_reader.py --replay tests/fuzz/crashes/reader/crash-...
 
-Profiles: nothing but ProgramError is raised; the quick and the careful reading find the same; every
+Promises: nothing but ProgramError is raised; the quick and the careful reading find the same; every
 rapid's block lies in the file; twice the program takes no more than twice the time, generously.
 """
 

@@ -1,4 +1,4 @@
-"""Profiles that hold on every machine that can be drawn."""
+"""Promises that hold on every machine that can be drawn."""
 
 import contextlib
 import math

@@ -1,4 +1,4 @@
-"""Profiles of motion, over drawn profiles, limits and modes."""
+"""Promises of motion, over drawn profiles, limits and modes."""
 
 import numpy as np
 from hypothesis import Phase, assume, given, settings
@@ -23,7 +23,7 @@ from gcodejerk.motion import (
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 drawn = settings(deadline=None, phases=PHASES, max_examples=100)
 
-# SyntaxProblem numbers on purpose: a period of exactly 1 or pi hides errors.
+# Odd numbers on purpose: a period of exactly 1 or pi hides errors.
 segment = st.floats(0.0007, 0.083)
 absent = st.one_of(st.just(0.0), segment)
 frequency = st.floats(1.3, 431.0)

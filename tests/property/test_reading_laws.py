@@ -1,4 +1,4 @@
-"""Profiles of reading, over drawn programs and over drawn bytes."""
+"""Promises of reading, over drawn programs and over drawn bytes."""
 
 import io
 import math

@@ -1,4 +1,4 @@
-"""Profiles of planned streams, over drawn machines and moves."""
+"""Promises of planned streams, over drawn machines and moves."""
 
 import numpy as np
 import pytest

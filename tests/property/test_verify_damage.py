@@ -76,7 +76,7 @@ def calm_programs(draw, dialect):
     for _ in range(draw(st.integers(2, 4))):
         named = draw(st.lists(st.sampled_from(axes), min_size=1, max_size=3, unique=True))
         mode = draw(st.sampled_from(["G90 ", "G91 ", ""])) if incremental else ""
-        # SyntaxProblem thousands: no drawn rapid is without way, and few are equal.
+        # Odd thousands: no drawn rapid is without way, and few are equal.
         values = [
             draw(st.sampled_from([-1, 1])) * (2 * draw(st.integers(500, 4_000)) + 1) / 1000
             for _ in named

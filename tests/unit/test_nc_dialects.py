@@ -378,7 +378,7 @@ def test_an_unknown_dialect_is_refused_with_the_nearest_one():
 
 
 def test_a_tool_axis_that_is_no_plane_is_read():
-    # Input by fuzzing: G20 is a tool axis for Heidenhain, and G42 asked for its plane.
+    # Found by fuzzing: G20 is a tool axis for Heidenhain, and G42 asked for its plane.
     start = Start(positions=KNOWN.positions)
     assert math.isnan(end(b"N1 G20*\nN2 G42 G01 X5*\nN3 G40*\n", "heidenhain-iso", start)[0])
 

@@ -69,7 +69,7 @@ def test_both_ways_agree_on_an_odd_line_anywhere_in_a_run(where, beginning):
 
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_both_ways_agree_on_a_long_run_in_every_dialect(dialect):
-    # Input by fuzzing: lines of linear and rotary axes together.
+    # Found by fuzzing: lines of linear and rotary axes together.
     lines = [b"G21 G90 G64", b"G0 A90 X0 Y0", b"G0 A-90 X1", b"G1 X5. F20", b"G0 X7", b"A5"] * 9
     assert differences(b"\n".join(lines) + b"\nM2\n", STARTS["nothing known"], dialect) == []
 
