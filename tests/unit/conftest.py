@@ -1,5 +1,6 @@
-"""What tests of commands share."""
+"""What several tests share: commands in a folder of their own, a second way to four segments."""
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -23,3 +24,55 @@ def command(tmp_path, monkeypatch):
         return result.exit_code, result.output
 
     return run
+
+
+class FourSegments:
+    """Profiles of Conditions I, II and III for a way of 1, by integration; shares no code with us.
+
+    Attributes
+    ----------
+    A, J : ndarray, shape (n,)
+        Largest moduli of acceleration and jerk. [1/s^2], [1/s^3]
+    V : ndarray, shape (n,)
+        Largest velocity. [1/s]
+    """
+
+    def __init__(self, condition, T1, total, points=4001):
+        T1 = np.asarray(T1, float)[:, np.newaxis]
+        other = 0.5 * total - T1
+        d1, d2, d3, d4 = {
+            "I": (T1, T1, other, other), "II": (T1, other, T1, other), "III": (T1, other, other, T1)
+        }[condition]  # fmt: skip
+        # Triangles of the acceleration: up to 1 and back, then down to -q and back, to rest.
+        q = (d1 + d2) / (d3 + d4)
+        t = np.linspace(0.0, total, points)
+        self.t, dt = t, t[1] - t[0]
+        corners = np.concatenate(np.broadcast_arrays(0.0, d1, d1 + d2, d1 + d2 + d3, total), axis=1)
+        levels = np.concatenate(np.broadcast_arrays(0.0, 1.0 + 0 * d1, 0.0, -q, 0.0), axis=1)
+        a = np.stack([np.interp(t, c, level) for c, level in zip(corners, levels, strict=True)])
+        v = (
+            np.cumsum(0.5 * (a + np.roll(a, 1, axis=1)) * dt, axis=1)
+            - 0.5 * (a[:, :1] + a[:, -1:]) * dt
+        )
+        way = np.sum(0.5 * (v[:, 1:] + v[:, :-1]) * dt, axis=1)
+        self.a = a / way[:, np.newaxis]
+        self.V = v.max(axis=1) / way
+        size = 1.0 / way
+        self.A = np.maximum(1.0, q[:, 0]) * size
+        jerks = np.concatenate([1.0 / d1, 1.0 / d2, q / d3, q / d4], axis=1)
+        self.J = jerks.max(axis=1) * size
+
+    def left(self, frequency, damping):
+        """Displacement that a mode of participation 1 keeps, shape (n,)."""
+        omega = 2.0 * np.pi * frequency
+        damped = omega * np.sqrt(1.0 - damping**2)
+        back = self.t[-1] - self.t
+        kernel = np.exp((-damping * omega + 1j * damped) * back)
+        kernel[[0, -1]] *= 0.5
+        return np.abs(self.a @ kernel) * (self.t[1] - self.t[0]) / damped
+
+
+@pytest.fixture
+def four_segments():
+    """The class `FourSegments`."""
+    return FourSegments
