@@ -132,7 +132,7 @@ def blind(harness, minutes, seed, crashes):
                 print(f"saved: {file}", flush=True)
         finally:
             signal.alarm(0)
-    print(f"{runs} inputs, {len(found)} laws broken; seed {seed}")
+    print(f"{runs} inputs, {len(found)} promises broken; seed {seed}")
     return len(found) > 0
 
 

@@ -50,4 +50,4 @@ def test_a_broken_law_is_saved_and_told(tmp_path, capsys):
     assert load("engine").blind(profile, 0.001, 1, tmp_path)
     (saved,) = tmp_path.iterdir()
     assert b"G0" in saved.read_bytes()
-    assert "laws broken" in capsys.readouterr().out
+    assert "promises broken" in capsys.readouterr().out
