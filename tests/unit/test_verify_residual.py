@@ -4,6 +4,7 @@ import pytest
 
 from gcodejerk.machine import Machine
 from gcodejerk.rewrite.pipeline import process
+from gcodejerk.verification import Kind, verify
 
 MACHINE = """
 interval: 0.0005
@@ -24,3 +25,32 @@ def test_points_two_milliseconds_apart_say_nothing_of_a_mode_that_is_faster(freq
     machine = Machine.loads(MACHINE.format(frequency=frequency))
     made = process(b"F300\nG0 X29\nX0\nM2\n", machine, controller="linuxcnc")
     assert (made.planned, made.verification.ok) == (2, True)
+
+
+NEIGHBOURS = """
+interval: 0.001
+positioning: linear
+axes:
+  X:
+    resolution: 1.0e-5
+    rapid: {{velocity: 400, acceleration: 4000, jerk: 8.0e+5}}
+    limit: {{acceleration: 6000, jerk: 8.0e+6}}
+    modes: [{modes}]
+design: {{minimum_length: 0.0001}}
+program: {{start: {{X: 0}}, startup: G21 G90}}
+spindle: mill
+"""
+SLOW, FAST = "{frequency: 30, damping: 0.0}", "{frequency: 200, damping: 0.0}"
+BEYOND = "{frequency: 420, damping: 0.0}"
+
+
+@pytest.mark.parametrize("modes", [FAST, f"{FAST}, {BEYOND}"], ids=["one", "one beyond"])
+@pytest.mark.parametrize("short", ["", "G0 X0.002\nG0 X0\n", "G0 X0.0004\nG0 X0\n"])
+def test_each_stream_is_judged_by_its_own_points_whatever_stands_beside_it(short, modes):
+    """Designed for 30 Hz, held against 200 Hz: a rapid of 3 ms in one block changes nothing."""
+    program = f"G64\nF300\nG0 X0\n{short}G0 X5\nG0 X0\nM2\n".encode()
+    made = process(program, Machine.loads(NEIGHBOURS.format(modes=SLOW)), controller="linuxcnc")
+    found = verify(program, made.output, Machine.loads(NEIGHBOURS.format(modes=modes)))
+    first = 4 + short.count("\n")
+    lines = [v.original_line for v in found.violations if v.kind == Kind.RESIDUAL]
+    assert [line for line in lines if line >= first] == [first, first + 1]

@@ -66,13 +66,6 @@ class Oscillators:
             banded=np.array([row[4] for row in rows], dtype=np.bool_),
         )
 
-    def slower_than(self, frequency: float) -> Oscillators:
-        """Those below a frequency [Hz]."""
-        slow = np.abs(self.poles) < 2.0 * np.pi * frequency
-        return Oscillators(
-            self.poles[slow], self.participation[slow], self.group[slow], self.banded[slow]
-        )
-
     def at(self, factor: float) -> Oscillators:
         """The same with the frequency of every mode multiplied, within the band."""
         poles = self.poles * np.where(self.banded, factor, 1.0)

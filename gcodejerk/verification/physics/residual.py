@@ -67,24 +67,25 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
         Of the controller's own rapid, over the displacement of each axis. [1/s], [1/s^2], [1/s^3]
     """
     streams = _Streams(paths, machine, moment, limits)
-    modes = Oscillators.of(machine).slower_than(0.5 / streams.spacing)
+    modes = Oscillators.of(machine)
     none = Excess(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
     if not len(modes.poles):
         return none
-    left = modes.largest(np.abs(streams.lines(modes, paths.position)))
+    left = streams.largest(modes, np.abs(streams.lines(modes, paths.position)))
     # Nearly every stream leaves less by far: only the others are looked at closely.
-    rapid = modes.largest(np.abs(streams.own(modes)))
+    rapid = streams.largest(modes, np.abs(streams.own(modes)))
     allowed = (1.0 + RELATIVE) * rapid + streams.noise(modes)
     if machine.design.profile == "shortest":
         allowed = np.maximum(allowed, machine.design.tolerance + streams.noise(modes))
     suspects = np.flatnonzero(left > allowed)
     if not len(suspects):
         return none
-    sampled = modes.largest(np.abs(streams.lines(modes, streams.own_positions())))
+    own = streams.lines(modes, streams.own_positions())
+    sampled = streams.largest(modes, np.abs(own))
     allowed = np.maximum(allowed, (1.0 + RELATIVE) * sampled + streams.noise(modes))
-    allowed = allowed + modes.largest(streams.coarseness(modes))
+    allowed = allowed + streams.largest(modes, streams.coarseness(modes))
     for factor in np.linspace(1.0 - machine.design.band, 1.0 + machine.design.band, BAND_POINTS):
-        near = modes.largest(np.abs(streams.own(modes.at(float(factor)))))
+        near = streams.largest(modes, np.abs(streams.own(modes.at(float(factor)))))
         allowed = np.where(streams.banded, np.maximum(allowed, (1.0 + RELATIVE) * near), allowed)
     suspects = np.flatnonzero(left > allowed)
     return Excess(suspects.astype(np.int64), left[suspects], allowed[suspects])
@@ -108,10 +109,14 @@ class _Streams:
         self.begins[paths.begin] = True
 
     @property
-    def spacing(self) -> float:
-        """The longest mean time from point to point of any stream, in s."""
-        blocks = np.maximum(self.paths.count, 1)
-        return float((self.count / blocks).max(initial=1.0)) * self.machine.interval
+    def spacing(self) -> Array:
+        """Mean time from point to point of each stream, shape (streams,), in s."""
+        return np.asarray(self.count * self.machine.interval / np.maximum(self.paths.count, 1))
+
+    def largest(self, modes: Oscillators, amplitude: Array) -> Array:
+        """Largest over the modes that each stream's own points can show, shape (streams,)."""
+        shown = np.abs(modes.poles) * self.spacing[:, np.newaxis] < np.pi
+        return modes.largest(np.where(shown, amplitude, 0.0))
 
     @property
     def banded(self) -> NDArray[np.bool_]:
@@ -181,12 +186,12 @@ class _Streams:
         """What rounding to steps may add, shape (streams,) [mm]."""
         step = np.where(self.paths.displacement != 0.0, self.paths.step, 0.0)
         blocks = np.maximum(self.paths.count, 1)
-        h = (self.count * self.machine.interval / blocks)[:, np.newaxis]
+        h = self.spacing[:, np.newaxis]
         omega = np.abs(modes.poles)
         # An error of one point is a second difference of the velocity: 2 - 2 cos(omega h).
         each = (2.0 - 2.0 * np.cos(np.minimum(omega * h, np.pi))) / h / modes.poles.imag
         each = each * (step @ np.abs(modes.participation).T)
-        return modes.largest(each * (SIGMAS * np.sqrt(blocks / 3.0) + 1.0)[:, np.newaxis])
+        return self.largest(modes, each * (SIGMAS * np.sqrt(blocks / 3.0) + 1.0)[:, np.newaxis])
 
     def coarseness(self, modes: Oscillators) -> Array:
         """What reading the points differently changes, shape (streams, m) [mm].
