@@ -112,11 +112,9 @@ def plan_moves(
             f"the time is {time:g} s, more than {MOST_INTERVALS} intervals ({longest:g} s)",
             "give a shorter one",
         )
-    planner = _Planner(
-        machine, profile, displacement, length, reason, time, T1, progress, speed, lone
-    )
-    planner.as_today = as_today
-    return planner.run()
+    return _Planner(
+        machine, profile, displacement, length, reason, time, T1, progress, speed, lone, as_today
+    ).run()
 
 
 def plan_rapids(
@@ -223,9 +221,10 @@ class _Planner:
         progress: Progress | None,
         speed: Array | None,
         lone: NDArray[np.bool_] | None,
+        as_today: bool,
     ) -> None:
         self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
-        self.as_today = False
+        self.as_today = as_today
         self.displacement, self.length, self.reason = displacement, length, reason
         self.modes = Modes.of(machine)
         self.interval = machine.interval
