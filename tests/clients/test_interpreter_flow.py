@@ -189,7 +189,7 @@ def write(folder, k, lines):
 # without shrinking: each try costs many runs of the interpreter
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @settings(
-    max_examples=2,
+    max_examples=3,
     deadline=None,
     phases=[Phase.generate],
     suppress_health_check=list(HealthCheck),

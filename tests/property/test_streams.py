@@ -90,7 +90,7 @@ def test_residual_of_a_stream_is_that_of_a_simulated_mode(case):
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @given(case=cases(jerk_limited=True))
-@settings(slow, max_examples=20)
+@settings(slow, max_examples=30)
 def test_no_stream_leaves_more_than_the_conventional_one(part, case):
     plan = plan_or_skip(case)
     worst = plan.residual.max(initial=0.0)
@@ -107,7 +107,7 @@ def rewritten():
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @given(case=cases(jerk_limited=True, positioning="linear"))
-@settings(slow, max_examples=20)
+@settings(slow, max_examples=30)
 def test_segments_add_up_to_the_time_and_to_the_length(part, rewritten, case):
     plan = plan_or_skip(case)
     position = velocity = acceleration = 0.0
