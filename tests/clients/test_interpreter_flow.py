@@ -186,6 +186,98 @@ def write(folder, k, lines):
     return path
 
 
+LEFTOVERS = {
+    "a continue of a do begins a later repeat again": """
+#1=0
+o102 do
+#1=[#1+1]
+o104 if [#1 LE 7]
+o102 continue
+o104 endif
+o102 while [#1 LT 2]
+o107 repeat [1]
+G91 G0 X8
+o107 endrepeat
+""",
+    "and the repeat around it": """
+#2=0
+o100 repeat [3]
+G91 G0 X8
+#2=[#2+1]
+#1=0
+o102 do
+#1=[#1+1]
+o104 if [#2 EQ 2]
+o102 continue
+o104 endif
+o102 while [#1 LT 2]
+o100 endrepeat
+""",
+    "and a while that is left by a break": """
+#1=0
+o102 do
+#1=[#1+1]
+o104 if [#1 LE 7]
+o102 continue
+o104 endif
+o102 while [#1 LT 2]
+o103 while [#1 LT 4]
+#1=[#1+1]
+G91 G0 X8
+o105 if [#1 EQ 3]
+o103 break
+o105 endif
+o103 endwhile
+""",
+    "on the second pass of the loop around": """
+#1=0
+#2=0
+o100 while [#2 LT 2]
+G90 G0 X0
+o101 repeat [1]
+G91 G0 X8
+o101 endrepeat
+G90 G0 X0
+o102 do
+#1=[#1+1]
+o104 if [#1 LE 7]
+o102 continue
+o104 endif
+o102 while [#1 LT 2]
+#1=0
+#2=[#2+#3]
+#3=1
+o100 endwhile
+""",
+    "a break ends a do of the second pass of the loop around": """
+#1=0
+o100 repeat [2]
+o101 do
+#1=[#1+1]
+G91 G0 X8
+o101 while [#1 LT 3]
+G90 G0 X0
+#1=0
+o102 while [#1 LT 1]
+o104 if [#1 LE 7]
+o102 break
+o104 endif
+o102 endwhile
+o100 endrepeat
+""",
+}
+
+
+@pytest.mark.parametrize("name", LEFTOVERS)
+def test_what_the_interpreter_keeps_of_a_jump(tmp_path, name):
+    lines = ["F100", *LEFTOVERS[name].split("\n"), "G0 Y1", "M2"]
+    moves, refusal = interpret(write(tmp_path, 0, lines))
+    assert moves, refusal
+    assert not refusal
+    wrong, _ = disagreements("\n".join([*lines, ""]).encode(), moves, refusal, AT_ZERO)
+    assert not wrong
+
+
 # without shrinking: each try costs many runs of the interpreter
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @settings(

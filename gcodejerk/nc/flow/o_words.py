@@ -63,6 +63,11 @@ class Passes:
         self._lost = False
         self._broken = False
         """A ``break`` has run: LinuxCNC 2.9 then ends a later ``do`` after its first pass."""
+        self._dos: set[str] = set()
+        """Labels of the ``do`` that have run."""
+        self._continued = False
+        """A ``continue`` of a ``do`` has run: LinuxCNC 2.9 then begins a later ``repeat`` again at
+        its end, and a later ``while`` that is left by a ``break``."""
         self._repeats: list[Node] = []
         """The ``repeat`` that run now, one within another."""
         self._stale: set[int] = set()
@@ -108,6 +113,10 @@ class Passes:
         if after is None or exits:
             runner.state.forget()  # LinuxCNC refuses a return from the main program
         return True
+
+    def _memory(self) -> tuple[bool, bool, int]:
+        """What LinuxCNC keeps of the jumps so far: a pass may run otherwise once it has changed."""
+        return self._broken, self._continued, len(self._stale)
 
     def _count(self) -> None:
         self._spent += 1
@@ -155,6 +164,7 @@ class Passes:
         if node.kind in ("break", "continue"):
             self._count()
             self._broken |= node.kind == "break"
+            self._continued |= node.kind == "continue" and node.name in self._dos
             return {f"{node.kind} {node.name}": state}
         if node.kind == "repeat":
             self._repeats.append(node)
@@ -206,7 +216,8 @@ class Passes:
     def _repeat(self, node: Node, state: State) -> Exits:
         """Run ``repeat``."""
         count = self._known(node.condition, state)
-        if count is None or not count.is_integer() or id(node) in self._stale:
+        again = self._continued or id(node) in self._stale
+        if count is None or not count.is_integer() or again:
             return self._settle(node, state, test_first=True)
         exits: Exits = {}
         leave: State | None = None
@@ -219,16 +230,22 @@ class Passes:
                 current = exits.pop(NEXT, None)
                 break
             left -= 1
-            before = current.copy()
+            before, memory = current.copy(), self._memory()
             current, broken = self._pass(node, current, exits)
             leave = _either(leave, broken)
-            if current is not None and broken is None and agree(before, current):
+            same = current is not None and agree(before, current)
+            if same and broken is None and memory == self._memory():
                 break  # every further pass is the same
+        if current is not None and self._continued:
+            _add(exits, self._settle(node, current, test_first=True))
+            current = exits.pop(NEXT, None)
         return self._left(exits, _either(current, leave))
 
     def _loop(self, node: Node, state: State) -> Exits:
         """Run ``while``, or ``do`` with its ``while`` at the end."""
         test_first = node.kind == "while"
+        if not test_first:
+            self._dos.add(node.name)
         exits: Exits = {}
         leave: State | None = None
         current: State | None = state
@@ -245,7 +262,7 @@ class Passes:
                 _add(exits, self._settle(node, current, test_first))
                 current = exits.pop(NEXT, None)
                 break
-            before = current.copy()
+            before, memory = current.copy(), self._memory()
             current, broken = self._pass(node, current, exits)
             leave = _either(leave, broken)
             if not test_first and current is not None:
@@ -257,7 +274,8 @@ class Passes:
                     _add(exits, self._settle(node, current, test_first))
                     current = exits.pop(NEXT, None)
                     break
-            if current is not None and agree(before, current):
+            same = current is not None and agree(before, current)
+            if same and memory == self._memory():
                 current = None  # endless
         return self._left(exits, _either(current, leave))
 
@@ -266,6 +284,8 @@ class Passes:
         out = self._sequence(node.body, state)
         back = _either(out.pop(NEXT, None), out.pop(f"continue {node.name}", None))
         broken = out.pop(f"break {node.name}", None)
+        if broken is not None and self._continued and node.kind == "while":
+            back = _either(back, broken.copy())
         _add(exits, out)
         return back, broken
 
@@ -288,6 +308,7 @@ class Passes:
             if test_first:
                 leave = _either(leave, entry.copy())
             self._uncertain()
+            memory = self._memory()
             back, broken = self._pass(node, entry.copy(), exits)
             self._uncertain()
             leave = _either(leave, broken)
@@ -296,7 +317,7 @@ class Passes:
             if not test_first:
                 leave = _either(leave, back.copy())
             wider = join(entry, back)
-            if agree(wider, entry):
+            if agree(wider, entry) and memory == self._memory():
                 return self._left(exits, leave)
             entry = wider
         raise TooLongError
