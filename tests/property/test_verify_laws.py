@@ -19,7 +19,7 @@ from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.machines import machines
 from gcodejerk.testing.programs import programs
 from gcodejerk.testing.vocabulary import VOCABULARIES
-from gcodejerk.verification import verify, verify_csv
+from gcodejerk.verification import verify, verify_files
 
 CALM = settings(
     deadline=None,
@@ -92,7 +92,7 @@ def test_every_table_is_accepted(part, machine, data):
     machine = ready(machine)
     result = outputs(data, machine, "csv")
     assume(result is not None)
-    found = verify_csv(io.BytesIO(data), io.BytesIO(result.output), machine)
+    found = verify_files(io.BytesIO(data), io.BytesIO(result.output), machine, table=True)
     assert found.violations == ()
     assert found.rewritten == result.planned
 
