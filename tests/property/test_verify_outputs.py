@@ -62,7 +62,9 @@ def test_every_output_is_accepted(machine, data, known):
 @pytest.mark.parametrize("planner", PLANNERS)
 @settings(parent=CALM, max_examples=25)
 @given(st.data(), st.booleans(), st.sampled_from(["condition3", "cascade", "conventional"]))
-def test_every_output_is_accepted_whatever_law_todays_rapids_follow(planner, data, known, profile):
+def test_every_output_is_accepted_whatever_profile_todays_rapids_follow(
+    planner, data, known, profile
+):
     machine = ready(data.draw(machines(axes="XYZ", planner=planner)), known)
     assert machine.planner == planner
     program = data.draw(programs())
