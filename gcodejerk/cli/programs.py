@@ -208,7 +208,7 @@ def verify(
     """Prove that a program is the original with only its rapids re-timed; list what it is not."""
     from gcodejerk.batch.files import open_input
     from gcodejerk.rewrite.expanded import verify_expanded
-    from gcodejerk.verification import verify_csv, verify_files
+    from gcodejerk.verification import verify_files
     from gcodejerk.verification.bytes.stamp import read_stamp
 
     if original == processed == "-":
@@ -238,10 +238,9 @@ def verify(
                 one, other, described, names=names, dialect=dialect, most=most
             )
         else:
-            found = (verify_csv if table else verify_files)(
-                one, other, described, names=names, dialect=dialect,
-                start=described.program_start(), most=most,
-            )  # fmt: skip
+            found = verify_files(
+                one, other, described, names=names, dialect=dialect, most=most, table=table
+            )
     for violation in found.violations:
         file, line = (
             (processed, violation.line) if violation.line else (original, violation.original_line)

@@ -53,7 +53,7 @@ class Machine(Description):
 
     @classmethod
     def loads(cls, text: str, name: str = "<machine>") -> Machine:
-        """Read a machine from the text of its file.
+        """Read a machine from the text of its file; otherwise as `load`.
 
         Parameters
         ----------
@@ -61,16 +61,6 @@ class Machine(Description):
             YAML.
         name : str
             What messages call the file. Its folder is where the names of spectrum files begin.
-
-        Returns
-        -------
-        Machine
-            What it describes.
-
-        Raises
-        ------
-        MachineFileError
-            The text is wrong; lists everything that is.
 
         Examples
         --------
@@ -91,19 +81,14 @@ class Machine(Description):
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], name: str = "<machine>") -> Machine:
-        """Read a machine from what its file would hold.
+        """Read a machine from what its file would hold; otherwise as `loads`.
 
         Parameters
         ----------
         values : mapping
             Keys and values as in a machine file, of plain types: dict, list, str, numbers, None.
         name : str
-            What messages call it, and whose folder is where the names of spectrum files begin.
-
-        Returns
-        -------
-        Machine
-            What it describes.
+            As for `loads`.
 
         Raises
         ------

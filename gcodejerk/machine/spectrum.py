@@ -70,7 +70,7 @@ def load_spectrum(
 
 
 def read_spectrum(data: bytes, source: str, highest: float, participation: float = 1.0) -> Spectrum:
-    r"""Spectrum from the bytes of a file: Klipper's, or plain `f,PSD`.
+    r"""As `load_spectrum`, from the bytes of a file: Klipper's, or plain `f,PSD`.
 
     Parameters
     ----------
@@ -78,21 +78,8 @@ def read_spectrum(data: bytes, source: str, highest: float, participation: float
         The whole file.
     source : str
         What messages call it.
-    highest : float
-        Frequency that lines have to be below: half the sampling rate, or infinity where that is
-        not known. [Hz]
-    participation : float, optional
-        How strongly the axis excites what was measured. [-]
-
-    Returns
-    -------
-    Spectrum
-        Its lines, `MOST_LINES` at most.
-
-    Raises
-    ------
-    MachineError
-        The file is no spectrum, or has no line in the usable band.
+    highest, participation
+        As for `load_spectrum`.
 
     Notes
     -----

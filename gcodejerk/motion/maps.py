@@ -112,16 +112,10 @@ def displacement_map(
 
     Parameters
     ----------
-    length : float
-        Of the move. [mm]
-    T1 : array_like, shape (n,)
-        Durations of the first segment. [s]
-    T_SUM : array_like, shape (k,)
-        Durations of the move. [s]
+    length, T1, T_SUM, condition
+        As for `amplitude_map`.
     frequency, damping, participation : array_like, shape (m,)
         Of each mode. [Hz], [-], [-]
-    condition : str, optional
-        I, II or III.
 
     Returns
     -------

@@ -185,18 +185,6 @@ def profiles_response(profiles: Profiles, poles: Complex) -> Complex:
 def symmetric_response(profiles: SymmetricProfiles, poles: Complex) -> Complex:
     r"""The same for symmetric profiles, from their four durations: what searches evaluate.
 
-    Parameters
-    ----------
-    profiles : SymmetricProfiles
-        n profiles.
-    poles : ndarray of complex, shape (m,)
-        From `mode_poles`. [rad/s]
-
-    Returns
-    -------
-    ndarray of complex, shape (n, m)
-        The integral of a(t) exp(lambda (T - t)). [1/s]
-
     Notes
     -----
     A ramp of acceleration from 0 to A within T1 contributes

@@ -68,17 +68,10 @@ def conventional_limits(
 
     Parameters
     ----------
-    machine : Machine
-        The machine.
-    share : ndarray, shape (n, 9)
-        Displacement of each axis. [mm] or [deg]
+    machine, share
+        As for `unit_limits`.
     lone : ndarray of bool, shape (n,), optional
         No other motion follows directly; all of them by default.
-
-    Returns
-    -------
-    velocity, acceleration, jerk : ndarray, shape (n,)
-        [1/s], [1/s^2], [1/s^3]
     """
     alone = np.ones(len(share), dtype=bool) if lone is None else lone
     with_all = _unit({axis.name: axis.conventional(lone=False) for axis in machine.axes}, share)

@@ -40,7 +40,7 @@ from gcodejerk.rewrite.notes import operator_notes, program_notes
 from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.stamp import stamp_text
-from gcodejerk.verification import Verification, require, verify_csv, verify_files
+from gcodejerk.verification import Verification, require, verify_files
 
 Progress = Callable[[str, int, int], None]
 """Called with a step's name, how much of it is done, and of how much."""
@@ -328,16 +328,15 @@ def _verified(
     """Read an output back; whatever is wrong with it is raised, in lines of the original."""
     source.seek(0)
     target.seek(0)
-    prove = verify_files if emitter.in_place else verify_csv
     design = replace(machine.design, profile=settings.profile or machine.design.profile)
     try:
-        found = prove(
+        found = verify_files(
             source,
             target,
             replace(machine, design=design),
             names=(program.name, f"the output for {program.name}"),
             dialect=program.dialect,
-            start=machine.program_start(),
+            table=not emitter.in_place,
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):

@@ -172,10 +172,8 @@ def compare_move(
 
     Parameters
     ----------
-    displacement : mapping of str to float
-        What each axis moves, for example ``{"Z": 1.0}``. [mm] or [deg]
-    machine : Machine
-        Limits, modes and interval.
+    displacement, machine
+        As for `plan_move`.
     time : float, optional
         T_SUM of the profiles that keep it; the conventional time by default. [s]
     shaper_damping : float or None, optional

@@ -1,4 +1,4 @@
-"""Moves to draw, and the laws that every stream has to keep on a given machine.
+"""Moves to draw, and the rules that every stream has to keep on a given machine.
 
 The checks here look at the written numbers alone, times and positions; how they were planned plays
 no part. They are what `gcodejerk`'s own property tests use.

@@ -16,7 +16,7 @@ tool is and what is in force), `cycles` (drilling cycles written out), `table` (
 """
 
 from gcodejerk.verification.findings import Kind, Verification, Violation, require
-from gcodejerk.verification.proof import verify, verify_csv, verify_files
+from gcodejerk.verification.proof import verify, verify_files
 
 __all__ = [
     "Kind",
@@ -24,6 +24,5 @@ __all__ = [
     "Violation",
     "require",
     "verify",
-    "verify_csv",
     "verify_files",
 ]

@@ -112,6 +112,7 @@ def verify_files(
     dialect: str | Dialect | None = None,
     start: Start | None = None,
     most: int = MOST,
+    table: bool = False,
 ) -> Verification:
     """Compare open files; see `verify`.
 
@@ -129,6 +130,9 @@ def verify_files(
         What the original may assume; the machine's `program` by default.
     most : int, optional
         Violations after which it stops.
+    table : bool, optional
+        What was processed is a table of the streams (controller `csv`): lines of violations are
+        those of the table, and no line counts as kept.
 
     Returns
     -------
@@ -144,60 +148,35 @@ def verify_files(
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
+    if table:
+        replaced, kept = _judge_table(processed, program, machine, found), 0
+    else:
+        replaced, kept = _judge_program(original, processed, program, machine, found)
+    original.seek(begin)
+    confirmed = confirm(original, program.dialect, start, program.rapids, replaced, found)
+    rapids = len(program.rapids)
+    return Verification(rapids, len(replaced), kept, found.sorted(), names, confirmed)
+
+
+def _judge_program(
+    original: BinaryIO, processed: BinaryIO, program: Program, machine: Machine, found: Findings
+) -> tuple[list[int], int]:
+    """Compare programs; which rapids were replaced, and how many lines were kept."""
     alignment = Alignment(Window(original), Window(processed), program, machine, found)
     reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
     stride = stride_of(machine)
     for streams in _batches(_checked(alignment, reader)):
         _check_points(reader.paths(streams), program, machine, stride, found)
     alignment.check_sum()
-    original.seek(begin)
-    confirmed = confirm(original, program.dialect, start, program.rapids, alignment.replaced, found)
-    return Verification(
-        len(program.rapids), alignment.rewritten, alignment.kept, found.sorted(), names, confirmed
-    )
+    return alignment.replaced, alignment.kept
 
 
-def verify_csv(
-    original: BinaryIO,
-    table: BinaryIO,
-    machine: Machine,
-    *,
-    names: tuple[str, str] = NAMES,
-    dialect: str | Dialect | None = None,
-    start: Start | None = None,
-    most: int = MOST,
-) -> Verification:
-    """Compare a table of streams (controller `csv`) with the program that it belongs to.
-
-    Parameters
-    ----------
-    original, table : BinaryIO
-        Opened for reading bytes, at their beginning.
-    machine, names, dialect, start, most
-        As for `verify_files`.
-
-    Returns
-    -------
-    Verification
-        Lines of violations are those of the table; no line counts as kept.
-
-    Raises
-    ------
-    ProgramError
-        The original cannot be a program.
-    """
-    start = machine.program_start() if start is None else start
-    begin = original.tell()
-    program = _read(original, machine, names[0], dialect, start)
-    found = Findings(most)
+def _judge_table(table: BinaryIO, program: Program, machine: Machine, found: Findings) -> list[int]:
+    """Compare a table with its program; which rapids it replaces."""
     reader = TableReader(table, program.rapids, machine, found)
     for paths in reader.paths():
         _check_points(paths, program, machine, 1, found)
-    original.seek(begin)
-    confirmed = confirm(original, program.dialect, start, program.rapids, reader.replaced, found)
-    return Verification(
-        len(program.rapids), len(reader.replaced), 0, found.sorted(), names, confirmed
-    )
+    return reader.replaced
 
 
 def _read(

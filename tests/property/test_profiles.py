@@ -91,7 +91,7 @@ def worst(machine, share, motion, band):
     return largest
 
 
-def check_law(plans, k, motion, profile):
+def check_profile(plans, k, motion, profile):
     """Arrival, limits, no way back."""
     machine, share = plans.machine, plans.share[k]
     total = plans.profile_counts[k] * machine.interval
@@ -125,7 +125,7 @@ def test_every_profile_keeps_what_it_promises(part, machine, seed):
         assert own.planned[fits].all(), name
         for k in range(len(own.profiles)):
             motion = Motion(own.profiles, k)
-            check_law(own, k, motion, name)
+            check_profile(own, k, motion, name)
             share, key = own.share[k], (own.move[k], tuple(np.nonzero(own.share[k])[0]))
             judged = band if name == "optimal" else 0.0
             left = worst(machine, share, motion, judged)

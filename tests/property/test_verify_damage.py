@@ -424,7 +424,7 @@ SUM_ALONE = {
     "feed 1 % up": "at low speed 1 % of F is less than the rounding of points, which bounds it",
     "feed 1 % down": "as above",
     "point moved by one step": "it may only have been rounded the other way",
-    "end point doubled": "the tool waits for one block where it has arrived, as slow laws do",
+    "end point doubled": "the tool waits for one block where it has arrived, as slow profiles do",
     "stamp changed": "which version wrote a file changes nothing of how it moves",
     "machine of the stamp changed": "a name, not the machine that it is judged for",
 }

@@ -41,7 +41,7 @@ from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.planning.plan import PROFILES
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.machines import machines
-from gcodejerk.verification import Kind, verify, verify_csv
+from gcodejerk.verification import Kind, verify, verify_files
 
 WRITTEN = tuple(profile for profile in PROFILES if profile not in SHAPERS)
 KNOWN = dict.fromkeys("XYZABC", 0.0)
@@ -101,7 +101,7 @@ def judged(data, machine, controller):
     assume(result is not None)
     if controller == "linuxcnc":
         return verify(data, result.output, machine)
-    return verify_csv(io.BytesIO(data), io.BytesIO(result.output), machine)
+    return verify_files(io.BytesIO(data), io.BytesIO(result.output), machine, table=True)
 
 
 @pytest.mark.parametrize("profile", WRITTEN)
@@ -268,7 +268,7 @@ def test_a_stream_that_shakes_more_than_the_controllers_own_rapid_is_refused():
     assert verify(data, result.output, ready(calm, "optimal")).ok
     assert {v.kind for v in verify(data, result.output, other).violations} == {Kind.RESIDUAL}
     table = process(data, ready(calm, "optimal"), verify=False, controller="csv").output
-    found = verify_csv(io.BytesIO(data), io.BytesIO(table), other)
+    found = verify_files(io.BytesIO(data), io.BytesIO(table), other, table=True)
     assert {v.kind for v in found.violations} == {Kind.RESIDUAL}
 
 

@@ -325,7 +325,7 @@ def test_a_move_of_few_intervals_has_no_four_segments(interval):
     jsonschema.validate(json.loads(dump(compare_record(found))), SCHEMA)
 
 
-def test_an_extension_and_a_kept_law_are_noted():
+def test_an_extension_and_a_kept_profile_are_noted():
     found = compare_move({"X": 2.0}, Machine.loads(TRAPEZOID, "t.yaml"))
     assert found["condition3"].time > found.time
     assert found["condition3"].note == "1 ms longer to keep the limits"

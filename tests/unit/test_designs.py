@@ -221,7 +221,7 @@ def test_a_measured_spectrum_takes_the_place_of_modes(tmp_path):
     assert left["optimal"] < 0.8 * left["conventional"]
 
 
-def test_no_law_hides_between_the_lines_of_a_spectrum(tmp_path):
+def test_no_profile_hides_between_the_lines_of_a_spectrum(tmp_path):
     (tmp_path / "measured.csv").write_text(spectrum_of([(43.0, 0.05), (71.0, 0.08)]))
     text = "interval: 0.001\npositioning: linear\naxes:\n  X:\n"
     file = tmp_path / "printer.yaml"

@@ -58,7 +58,7 @@ def test_the_deviation_bounds_the_distance_from_the_path_of_an_integrated_dogleg
     assert bound <= 1.1 * true + 0.02
 
 
-def test_axes_arrive_when_their_own_laws_end():
+def test_axes_arrive_when_their_own_profiles_end():
     plan = plan_move({"X": 200.0, "Y": 60.0}, DOGLEG)
     times = arrivals(plan.plans, 0)
     assert set(times) == {"X", "Y"}

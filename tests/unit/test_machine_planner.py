@@ -40,7 +40,7 @@ JERK = "{velocity: 600, acceleration: 5000, jerk: 5.0e+5}"
         ("controller: fanuc\n", JERK[:-1] + ", planner: bell}", "bell"),
     ],
 )
-def test_the_law_is_the_stated_one_or_that_of_the_control(head, rapid, planner):
+def test_the_profile_is_the_stated_one_or_that_of_the_control(head, rapid, planner):
     made = machine(rapid, head)
     assert made.planner == planner == made.axis("Z").planner
     again = Machine.loads(machine_yaml(made))
@@ -98,7 +98,7 @@ def test_one_control_makes_the_rapids_of_all_axes():
         (JERK[:-1] + ", planner: bell}", 200.0, 200 / 600 + 600 / 5000 + 0.010),
     ],
 )
-def test_conventional_times_are_those_of_the_law(rapid, length, time):
+def test_conventional_times_are_those_of_the_profile(rapid, length, time):
     plan = plan_move({"Z": length}, machine(rapid, limit="{acceleration: 9000, jerk: 5.0e+6}"))
     assert plan.conventional_time == pytest.approx(time, rel=1e-9)
     assert plan.time == pytest.approx(np.ceil(time / 0.001 - 1e-6) * 0.001, abs=1e-9)

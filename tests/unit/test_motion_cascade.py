@@ -59,7 +59,7 @@ def test_two_modes_are_silenced_where_there_is_room_for_two_periods(total):
     assert float(worst[0]) < 1e-6
 
 
-def test_one_law_for_each_move_within_its_limits():
+def test_one_profile_for_each_move_within_its_limits():
     rng = np.random.default_rng(3)
     n = 60
     total = rng.uniform(0.02, 0.4, n)

@@ -110,7 +110,7 @@ def test_each_end_of_the_range_is_where_one_limit_binds():
     assert (low > high).any()
 
 
-def test_a_range_of_a_single_law_survives_rounding():
+def test_a_range_of_a_single_profile_survives_rounding():
     # At the conventional limits and time there is one profile, T1 = T_SUM/4.
     J = 5e5
     T = 4.0 * np.cbrt(0.5 / J)
@@ -142,7 +142,7 @@ def test_the_design_of_the_paper_s_case_is_the_least_T1():
     assert float(worst[0]) * (60 * np.pi) ** 2 == pytest.approx(5696.8, abs=0.05)
 
 
-def test_no_law_of_a_dense_scan_leaves_much_less_than_the_design():
+def test_no_profile_of_a_dense_scan_leaves_much_less_than_the_design():
     rng = np.random.default_rng(1)
     checked = 0
     for _ in range(60):
@@ -166,7 +166,7 @@ def test_no_law_of_a_dense_scan_leaves_much_less_than_the_design():
     assert checked > 40
 
 
-def test_the_reported_worst_is_that_of_the_reported_law():
+def test_the_reported_worst_is_that_of_the_reported_profile():
     poles = mode_poles([30.0, 90.0], [0.02, 0.0])
     weights = np.array([[1.0, 0.3], [0.0, 2.0], [5.0, 5.0]])
     T = column(0.04, 0.053, 0.2)
@@ -245,7 +245,7 @@ def design(total, V, A, J, poles, weights, conventional):
     )
 
 
-def test_general_designs_are_legal_and_never_worse_than_the_stretched_conventional_law():
+def test_general_designs_are_legal_and_never_worse_than_the_stretched_conventional_profile():
     better = 0
     for case in drawn_long_moves(3, 150):
         total, V, A, J, poles, weights, conventional = case
@@ -293,7 +293,7 @@ def test_general_designs_are_near_the_best_that_a_global_search_finds(seed):
         cost, [(0, longest), (0, longest), (0, 1)], popsize=40, maxiter=250, **{RNG: seed},
         vectorized=True, updating="deferred", polish=False,
     )  # fmt: skip
-    assert found.fun < NOWHERE, "the search found no legal law to compare with"
+    assert found.fun < NOWHERE, "the search found no legal profile to compare with"
     _, worst, _ = design(*case)
     reference = float(displacement(*conventional.columns(), poles, weights)[0][0])
     assert float(worst[0]) <= 1.3 * found.fun + 0.02 * reference

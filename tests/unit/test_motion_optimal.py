@@ -167,7 +167,7 @@ def test_over_a_band_the_worst_is_that_of_a_dense_scan():
         assert optimum.worst <= few * 1.02 + 1e-6
 
 
-def test_an_optimal_law_arrives_at_rest_and_keeps_its_limits():
+def test_an_optimal_profile_arrives_at_rest_and_keeps_its_limits():
     for n, V, A, J, f, zeta, w in drawn_cases(25):
         optimum = least_residual(move_of(n, V, A, J, f, zeta, w, band=0.03), 1.0)
         if optimum is None:
@@ -231,7 +231,7 @@ def test_the_fewest_intervals_have_what_the_programme_has(count, damping):
     assert optimum.worst == pytest.approx(least, rel=0.02, abs=1e-6)
 
 
-def test_within_a_tolerance_the_smoothest_law_is_taken():
+def test_within_a_tolerance_the_smoothest_profile_is_taken():
     move = move_of(40, 50, 5000, 5e6, [30.0], band=0.05)
     least = least_residual(move, 0.37)
     assert smoothest_within(move, 0.9 * least.worst, 0.37) is None

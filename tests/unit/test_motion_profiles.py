@@ -79,7 +79,7 @@ def test_steps_add_up_to_the_acceleration():
             assert found == pytest.approx(float(a(moment)), abs=1e-9)
 
 
-def test_laws_taken_replaced_and_joined_are_the_same_laws():
+def test_profiles_taken_replaced_and_joined_are_the_same_profiles():
     profiles, others = drawn(12), drawn(3)
     both = joined([profiles, others])
     assert len(both) == 15
@@ -97,14 +97,14 @@ def test_laws_taken_replaced_and_joined_are_the_same_laws():
     assert len(profiles.take(np.zeros(12, dtype=bool))) == 0
 
 
-def test_no_laws_have_no_peaks():
+def test_no_profiles_have_no_peaks():
     none = drawn(3).take(np.zeros(0, dtype=np.int64))
     for column in (none.total, none.peak_velocity, none.peak_jerk, none.least_velocity):
         assert column.shape == (0,)
     assert profiles_response(none, mode_poles([30.0], [0.0])).shape == (0, 1)
 
 
-def test_a_symmetric_law_as_segments_ends_at_one_and_at_rest():
+def test_a_symmetric_profile_as_segments_ends_at_one_and_at_rest():
     columns = (np.array([0.003, 0.0]), np.array([0.005, 0.02]), np.array([0.011, 0.0]),
                np.array([0.021, 0.0]))  # fmt: skip
     symmetric = SymmetricProfiles(*columns)

@@ -184,7 +184,7 @@ def test_equation_28_is_the_undamped_case():
         (0.0119, 0.0023, 0.0, 0.0),
     ],
 )
-def test_the_response_to_a_law_is_what_a_differential_equation_solver_finds(durations, damping):
+def test_the_response_to_a_profile_is_what_a_differential_equation_solver_finds(durations, damping):
     f = 41.3
     omega = 2.0 * np.pi * f
     T1, Ta, T2, Tv = durations
@@ -211,7 +211,7 @@ def test_the_response_to_a_law_is_what_a_differential_equation_solver_finds(dura
     assert simulate(durations, omega, damping) == pytest.approx(expected, rel=1e-6)
 
 
-def test_the_response_has_a_row_a_law_and_a_column_a_mode():
+def test_the_response_has_a_row_a_profile_and_a_column_a_mode():
     symmetric = SymmetricProfiles(*np.array([[1.0, 3, 0], [0, 5, 9], [9, 2, 0], [0, 7, 4]]) * MS)
     profiles = symmetric.general()
     poles = mode_poles([17.0, 61.0], [0.01, 0.0])

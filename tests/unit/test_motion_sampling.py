@@ -70,7 +70,7 @@ def test_samples_are_antisymmetric_and_monotone_with_exact_ends(name):
         np.testing.assert_allclose(velocity[0], velocity[0, ::-1], rtol=1e-9, atol=1e-9)
 
 
-def test_a_law_rests_before_it_begins_and_after_it_has_ended():
+def test_a_profile_rests_before_it_begins_and_after_it_has_ended():
     profile = law_of("four segments")
     position, velocity = sample_profiles(profile, np.array([[-7, 0, 60, 61, 500]]), INTERVAL)
     assert position.tolist() == [[0.0, 0.0, 1.0, 1.0, 1.0]]
@@ -84,7 +84,7 @@ def test_the_paper_s_profile_has_the_paper_s_first_sample():
     assert float(position[0, 0]) == pytest.approx(3846153.846 * 1e-9 / 6, rel=1e-9)
 
 
-def test_laws_of_different_kinds_are_sampled_together_as_alone():
+def test_profiles_of_different_kinds_are_sampled_together_as_alone():
     profiles = SymmetricProfiles(
         *(np.array(c) * INTERVAL for c in zip(*SHAPES.values(), strict=True))
     ).general()

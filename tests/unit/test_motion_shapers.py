@@ -60,7 +60,7 @@ def test_a_derivative_shaper_is_flat_at_its_frequency():
 
 
 @pytest.mark.parametrize("name", SHAPERS)
-def test_a_shaped_law_arrives_at_rest_within_the_limits_of_the_plain_one(name):
+def test_a_shaped_profile_arrives_at_rest_within_the_limits_of_the_plain_one(name):
     profiles = [
         CONVENTIONAL,
         SymmetricProfiles(*(np.array([x]) for x in (0.0, 0.03, 0.0, 0.05))).general(),

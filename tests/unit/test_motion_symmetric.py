@@ -43,7 +43,7 @@ SHAPES = [
 
 
 @pytest.mark.parametrize("durations", SHAPES)
-def test_peaks_of_a_law_are_those_of_its_integrated_acceleration(durations):
+def test_peaks_of_a_profile_are_those_of_its_integrated_acceleration(durations):
     q, v, a = integrated(durations)
     profile, T = one(*durations), 2 * sum(durations[:3]) + durations[3]
     t = np.linspace(0.0, T, 20001)
@@ -93,7 +93,7 @@ def test_a_trapezoid_has_no_jerk_in_its_segments_and_an_infinite_peak():
     assert np.isinf(profile.jerk[0])
 
 
-def test_taking_and_replacing_laws_keeps_the_others():
+def test_taking_and_replacing_profiles_keeps_the_others():
     profiles = SymmetricProfiles(*(np.arange(4.0) + 10 * k for k in range(4)))
     few = profiles.take(np.array([2, 0]))
     assert [c.tolist() for c in few.columns()] == [[2, 0], [12, 10], [22, 20], [32, 30]]
@@ -123,7 +123,7 @@ def shortest_by_search(V, A, J):
     return float((4.0 * tj + 2.0 * ta + tv).min())
 
 
-def test_no_symmetric_law_within_limits_is_faster_than_the_conventional_one():
+def test_no_symmetric_profile_within_limits_is_faster_than_the_conventional_one():
     V, A, J = limits(40)
     profiles = conventional_profiles(V, A, J)
     for i in range(40):
@@ -132,7 +132,7 @@ def test_no_symmetric_law_within_limits_is_faster_than_the_conventional_one():
         assert float(profiles.total[i]) >= found * 0.97
 
 
-def test_the_conventional_law_keeps_its_limits_and_reaches_one_in_each_phase():
+def test_the_conventional_profile_keeps_its_limits_and_reaches_one_in_each_phase():
     V, A, J = limits(500)
     profiles = conventional_profiles(V, A, J)
     v, a, j = profiles.velocity / V, profiles.acceleration / A, profiles.jerk / J
@@ -146,7 +146,7 @@ def test_the_conventional_law_keeps_its_limits_and_reaches_one_in_each_phase():
     assert 10 < four.sum() < 490, "the drawn limits do not cover both kinds"
 
 
-def test_the_conventional_law_covers_the_length_by_its_own_limits():
+def test_the_conventional_profile_covers_the_length_by_its_own_limits():
     V, A, J = limits(50)
     profiles = conventional_profiles(V, A, J)
     for i in range(50):
@@ -158,14 +158,14 @@ def test_the_conventional_law_covers_the_length_by_its_own_limits():
         assert float(jerk.antiderivative(3)(4 * tj + 2 * ta + tv)) == pytest.approx(1.0, rel=1e-6)
 
 
-def test_without_a_jerk_limit_the_conventional_law_is_a_trapezoid():
+def test_without_a_jerk_limit_the_conventional_profile_is_a_trapezoid():
     profiles = conventional_profiles([10.0, 1000.0], [400.0, 400.0], np.inf)
     assert profiles.T1.tolist() == profiles.T2.tolist() == [0.0, 0.0]
     np.testing.assert_allclose(profiles.Ta, [10.0 / 400.0, 1.0 / np.sqrt(400.0)])
     np.testing.assert_allclose(profiles.Tv, [1 / 10.0 - 10.0 / 400.0, 0.0], atol=1e-12)
 
 
-def test_a_shortest_ramp_lengthens_the_law_only_where_the_jerk_would_allow_less():
+def test_a_shortest_ramp_lengthens_the_profile_only_where_the_jerk_would_allow_less():
     V, A, J = limits(300)
     free, held = conventional_profiles(V, A, J), conventional_profiles(V, A, J, 0.002)
     assert held.T1.min() >= 0.002

@@ -65,7 +65,7 @@ def test_length_is_along_the_path():
 
 
 @pytest.mark.parametrize("machine", [TWO, VMC, ROUTER], ids=lambda m: m.name[:10])
-def test_unsampled_amplitudes_are_those_of_finely_sampled_laws(machine):
+def test_unsampled_amplitudes_are_those_of_finely_sampled_profiles(machine):
     row = {"Y": 3.7, "Z": -1.9}
     plan = plan_move(row, machine)
     modes = plan.plans.modes
@@ -128,7 +128,7 @@ def test_an_extended_move_says_how_long_the_controller_takes():
     assert plan.time == pytest.approx(0.501)
 
 
-def test_a_kept_conventional_law_says_so():
+def test_a_kept_conventional_profile_says_so():
     plan = plan_move({"Z": 1.0}, PAPER, "conventional")
     assert plan.profile == "conventional"
     assert plan.stays_conventional.tolist() == [True]

@@ -85,7 +85,7 @@ def durations(profiles, k):
     return [duration for duration, _ in profiles.segments(k)]
 
 
-def test_the_common_law_of_a_straight_line_keeps_the_limits_of_every_axis():
+def test_the_common_profile_of_a_straight_line_keeps_the_limits_of_every_axis():
     machine = machine_of(
         {
             "X": "{rapid: {velocity: 100, acceleration: 9000, jerk: 9.0e+6}}",
@@ -167,7 +167,7 @@ def test_an_axis_that_no_mode_feels_gets_the_lowest_jerk():
     assert durations(plans.profiles, 1)[0] == 0.001
 
 
-def test_designs_are_never_worse_than_the_conventional_law():
+def test_designs_are_never_worse_than_the_conventional_profile():
     machine = machine_of(
         {
             "Z": f"{Z_AXIS}, modes: "
@@ -185,7 +185,7 @@ def test_designs_are_never_worse_than_the_conventional_law():
     assert np.median(worst[0] / worst[1]) < 0.6
 
 
-def test_where_the_conventional_law_is_still_already_it_stays():
+def test_where_the_conventional_profile_is_still_already_it_stays():
     # 80 ms is two periods of 25 Hz: the conventional profile has its null there.
     machine = machine_of(
         {
@@ -199,7 +199,7 @@ def test_where_the_conventional_law_is_still_already_it_stays():
     assert durations(plans.profiles, 0) == pytest.approx([0.02] * 4)
 
 
-def test_independent_axes_have_laws_and_times_of_their_own():
+def test_independent_axes_have_profiles_and_times_of_their_own():
     axes = {
         "X": f"{Z_AXIS}, modes: [{{frequency: 41, damping: 0}}]}}",
         "Y": f"{Z_AXIS}}}",
@@ -454,7 +454,7 @@ def test_travel_counts_only_where_the_offset_is_known():
     assert reasons(plan_rapids(rapids, KNOWN)) == [None]
 
 
-def test_laws_of_a_plan_stand_for_the_moves_they_belong_to():
+def test_profiles_of_a_plan_stand_for_the_moves_they_belong_to():
     rapids = rapids_of("G21 G90 G94 G64\nG1 X0 Z0 F600\nG0 X0\nG0 X9\nG0 Z-4\nM2\n", KNOWN)
     plans = plan_rapids(rapids, KNOWN)
     assert plans.move.tolist() == [1, 2]

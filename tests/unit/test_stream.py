@@ -135,7 +135,7 @@ def test_the_conventional_residual_is_that_of_the_controller_s_samples():
             )
 
 
-def test_velocities_are_those_of_the_law():
+def test_velocities_are_those_of_the_profile():
     batch = one_batch(drawn_moves(10, seed=7))
     for axis, velocity in batch.velocity.items():
         for row in range(10):
@@ -235,7 +235,7 @@ def test_an_axis_that_stands_at_an_unknown_place_spoils_nothing():
     assert np.isnan(q[:, Z]).all()
 
 
-def test_where_rounding_spoils_a_design_the_conventional_law_is_written():
+def test_where_rounding_spoils_a_design_the_conventional_profile_is_written():
     # Steps of 1 mm: whatever was designed, the rounding decides, and never for the worse.
     displacement = np.zeros((40, len(AXES)))
     displacement[:, Z] = np.linspace(9.0, 60.0, 40)
@@ -253,7 +253,7 @@ def test_where_rounding_spoils_a_design_the_conventional_law_is_written():
     ).all()
 
 
-def test_a_kept_law_reaches_its_end_before_the_last_interval_has_passed():
+def test_a_kept_profile_reaches_its_end_before_the_last_interval_has_passed():
     displacement = np.zeros((1, len(AXES)))
     displacement[0, Z] = 1.07
     batch = one_batch(displacement, profile="conventional")
@@ -263,7 +263,7 @@ def test_a_kept_law_reaches_its_end_before_the_last_interval_has_passed():
     assert q[-1, Z] == 1.07
 
 
-def test_a_move_has_kept_the_conventional_law_only_if_all_of_its_axes_have():
+def test_a_move_has_kept_the_conventional_profile_only_if_all_of_its_axes_have():
     axis = "rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}"
     machine = Machine.loads(
         "interval: 0.001\npositioning: independent\naxes:\n"
@@ -278,7 +278,7 @@ def test_a_move_has_kept_the_conventional_law_only_if_all_of_its_axes_have():
     assert plan.residual.max() < 0.5 * plan.conventional_residual.max()
 
 
-def test_a_conventional_law_that_does_not_fit_the_time_is_never_written():
+def test_a_conventional_profile_that_does_not_fit_the_time_is_never_written():
     # Steps of 0.3 mm spoil the design; the conventional profile takes 58 ms and would be cut off.
     machine = Machine.loads(
         "interval: 0.001\npositioning: linear\naxes:\n  Z: {resolution: 0.1, "

@@ -14,7 +14,7 @@ import pytest
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.verification import Kind, require, verify, verify_csv
+from gcodejerk.verification import Kind, require, verify, verify_files
 from gcodejerk.verification.physics import points
 
 TEXT = """
@@ -385,7 +385,7 @@ CSV_ORIGINAL = b"G21 G90 G94 F600\nG0 Z0\nG0 Z1.\nG0 Z#1\nM2\n"
 
 
 def judge_table(text):
-    return verify_csv(io.BytesIO(CSV_ORIGINAL), io.BytesIO(text.encode()), MACHINE)
+    return verify_files(io.BytesIO(CSV_ORIGINAL), io.BytesIO(text.encode()), MACHINE, table=True)
 
 
 def test_a_table_is_accepted():

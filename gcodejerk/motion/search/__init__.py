@@ -2,5 +2,5 @@
 
 `condition3` chooses T1 as the paper has it; `conditions` does so for the other two families,
 `cascade` chooses boxes, and `optimal` every jerk on the command grid, by the cone programmes of
-`socp`. All are judged by the one `objective`.
+`socp`. All are judged by the one `objective`, and take moves in `rows`.
 """

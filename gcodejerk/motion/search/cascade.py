@@ -23,6 +23,7 @@ from gcodejerk.motion.profiles.boxes import box_profiles
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.search.objective import Objective
+from gcodejerk.motion.search.rows import ROUNDING, best_in_rows, parts
 
 GRID = 16
 """Values of w2 and of w3 each on the map."""
@@ -32,9 +33,6 @@ MODES = 8
 """Modes whose periods are tried, those that count most."""
 REFINEMENTS = 14
 """Halvings of the step around the best of the map."""
-CELLS = 1 << 16
-"""Candidates evaluated at a time."""
-ROUNDING = 1e-9
 STEPS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]], float)
 """Steps of the refinement, in w2 and w3."""
 
@@ -68,9 +66,7 @@ def design_cascade(
     periods = 2.0 * np.pi / objective.poles.imag[_leading(objective)]
     boxes = np.concatenate([k * periods for k in range(1, PERIODS + 1)])
     width = GRID * GRID + len(boxes) ** 2 + GRID * len(boxes)
-    rows = max(1, CELLS // width)
-    for begin in range(0, n, rows):
-        part = slice(begin, min(begin + rows, n))
+    for part in parts(n, width):
         search = _Search(
             total[part], velocity[part], acceleration[part], jerk[part],
             objective.take(part), interval,
@@ -144,8 +140,8 @@ class _Search:
     def _best(self, w2: Array, w3: Array) -> tuple[Array, Array, Array]:
         """The best of the candidates in each row, the first among equals."""
         value = self._value(w2, w3)
-        row, chosen = np.arange(len(value)), np.argmin(value, axis=1)
-        return w2[row, chosen], w3[row, chosen], value[row, chosen]
+        w2, w3, least = best_in_rows(value, w2, w3, value)
+        return w2, w3, least
 
     def _value(self, w2: Array, w3: Array) -> Array:
         """Worst residual of candidates, shape (n, k); infinite where limits are broken."""

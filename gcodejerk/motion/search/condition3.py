@@ -25,6 +25,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.profiles.symmetric import SymmetricProfiles, conventional_profiles
 from gcodejerk.motion.residual import Complex, symmetric_response
 from gcodejerk.motion.search.objective import Objective
+from gcodejerk.motion.search.rows import ROUNDING, best_in_rows, parts, pick_in_rows
 
 MAP_COLUMNS = 257
 """Values of T1 on the map of four-segment profiles, T_SUM/4 among them."""
@@ -34,10 +35,6 @@ REFINEMENTS = 10
 """Halvings of the step in the search around the best general profile of the map."""
 TIE = 1e-7
 """Residuals that differ by less than this are equal, and the lower jerk decides [mm]."""
-ROUNDING = 1e-9
-"""Relative tolerance on limits, for the rounding of floating-point numbers."""
-CELLS = 1 << 16
-"""Candidates evaluated at a time: arrays that stay in the processor's cache."""
 
 
 def four_segment_range(
@@ -117,7 +114,7 @@ def design_four_segments(
     best = np.empty(len(total))
     worst = np.empty(len(total))
     step = 0.5 * total / (MAP_COLUMNS - 1)
-    for part in _slices(len(total), T1.shape[1] * max(len(poles), 1)):
+    for part in parts(len(total), T1.shape[1] * max(len(poles), 1)):
         columns = T1[row[part]]
         value = objective.take(part).worst(amplitude[row[part]])
         inside = (columns >= low[part, np.newaxis]) & (columns <= high[part, np.newaxis])
@@ -129,14 +126,14 @@ def design_four_segments(
             0.5 * (low[part] + high[part]),
         )
         chosen = _least(value, np.abs(columns - quarter[:, np.newaxis]))
-        found = np.isfinite(value[np.arange(len(chosen)), chosen])
-        best[part] = np.where(found, columns[np.arange(len(chosen)), chosen], best[part])
+        found, least = pick_in_rows(chosen, columns, value)
+        best[part] = np.where(np.isfinite(least), found, best[part])
         # The ends of the range are seldom on the map; T1 of one interval is such an end.
         every = np.stack([best[part], low[part], high[part]], axis=1)
         own = objective.take(part)
         value = own.worst(_displacement(_four(every, total[part, np.newaxis]), poles))
         chosen = _least(value, np.abs(every - quarter[:, np.newaxis]))
-        best[part] = every[np.arange(len(chosen)), chosen]
+        (best[part],) = pick_in_rows(chosen, every)
         best[part], worst[part] = _refine_T1(
             best[part], step[part], low[part], high[part], total[part], own
         )
@@ -150,7 +147,6 @@ def _refine_T1(
     poles = objective.poles
     worst = objective.of(_four(T1, total))
     around = np.array([-1.0, -0.5, 0.5, 1.0])
-    index = np.arange(len(T1))
     for _ in range(8):
         every = np.clip(
             T1[:, np.newaxis] + step[:, np.newaxis] * around,
@@ -158,10 +154,9 @@ def _refine_T1(
             high[:, np.newaxis],
         )
         value = objective.worst(_displacement(_four(every, total[:, np.newaxis]), poles))
-        chosen = np.argmin(value, axis=1)
-        better = value[index, chosen] < worst - 0.01 * TIE
-        T1 = np.where(better, every[index, chosen], T1)
-        worst = np.where(better, value[index, chosen], worst)
+        found, least = best_in_rows(value, every, value)
+        better = least < worst - 0.01 * TIE
+        T1, worst = np.where(better, found, T1), np.where(better, least, worst)
         step = 0.25 * step
     return T1, worst
 
@@ -204,7 +199,7 @@ def design_condition3(
     columns = [np.empty(n) for _ in range(4)]
     worst = np.empty(n)
     fastest = conventional_profiles(velocity, acceleration, jerk, interval)
-    for part in _slices(n, RAMP_GRID * RAMP_GRID * 2):
+    for part in parts(n, RAMP_GRID * RAMP_GRID * 2):
         search = _GeneralSearch(
             total[part],
             velocity[part],
@@ -283,8 +278,7 @@ class _GeneralSearch:
     def _least(self, T1: Array, T2: Array, share: Array) -> _Points:
         """The best of the candidates of each row, arrays of shape (n, k)."""
         value = self._value(T1, T2, share)
-        index, chosen = np.arange(len(value)), np.argmin(value, axis=1)
-        return _Points(*(x[index, chosen] for x in (T1, T2, share, value)))
+        return _Points(*best_in_rows(value, T1, T2, share, value))
 
     def _stretched(self, profiles: SymmetricProfiles) -> _Points:
         """SymmetricProfiles stretched to T_SUM, as points of the search."""
@@ -396,9 +390,3 @@ def _least(value: Array, tie_break: Array) -> NDArray[np.intp]:
     tied = value <= least + TIE
     column: NDArray[np.intp] = np.argmin(np.where(tied, tie_break, np.inf), axis=1)
     return column
-
-
-def _slices(n: int, width: int) -> list[slice]:
-    """Rows cut into parts of about CELLS cells."""
-    rows = max(1, CELLS // max(width, 1))
-    return [slice(begin, min(begin + rows, n)) for begin in range(0, n, rows)]

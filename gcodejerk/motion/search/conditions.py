@@ -12,14 +12,12 @@ import numpy as np
 from gcodejerk.motion.profiles.conditions import condition_profiles
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.search.objective import Objective
+from gcodejerk.motion.search.rows import ROUNDING, best_in_rows, parts
 
 CANDIDATES = 65
 """Values of T1 that are looked at first."""
 REFINEMENTS = 5
 """Times that the grid is drawn closer around the best."""
-CELLS = 1 << 15
-"""Candidates evaluated at a time."""
-ROUNDING = 1e-9
 
 
 def design_condition(
@@ -48,11 +46,8 @@ def design_condition(
     worst : ndarray, shape (n,)
         Largest residual displacement, infinite where no T1 keeps the limits. [mm]
     """
-    n = len(total)
-    T1, worst = 0.25 * total, np.empty(n)
-    rows = max(1, CELLS // CANDIDATES)
-    for begin in range(0, n, rows):
-        part = slice(begin, min(begin + rows, n))
+    T1, worst = 0.25 * total, np.empty(len(total))
+    for part in parts(len(total), CANDIDATES):
         limits = [limit[part] for limit in (velocity, acceleration, jerk)]
         T1[part], worst[part] = _best_T1(
             condition, total[part], limits, objective.take(part), interval
@@ -64,17 +59,16 @@ def _best_T1(
     condition: str, total: Array, limits: list[Array], objective: Objective, interval: float
 ) -> tuple[Array, Array]:
     """A grid over T1, the conventional T_SUM/4 on it, drawn closer around its best."""
-    n, row = len(total), np.arange(len(total))
+    n = len(total)
     low, high = np.full(n, interval), np.maximum(0.5 * total - interval, interval)
     share = np.linspace(0.0, 1.0, CANDIDATES)
     T1, worst = 0.25 * total, np.full(n, np.inf)
     for _ in range(REFINEMENTS):
         every = low[:, np.newaxis] + share * (high - low)[:, np.newaxis]
         value = _value(condition, every, total, limits, objective, interval)
-        chosen = np.argmin(value, axis=1)
-        better = value[row, chosen] < worst
-        T1 = np.where(better, every[row, chosen], T1)
-        worst = np.where(better, value[row, chosen], worst)
+        found, least = best_in_rows(value, every, value)
+        better = least < worst
+        T1, worst = np.where(better, found, T1), np.where(better, least, worst)
         step = (high - low) / (CANDIDATES - 1)
         low, high = np.maximum(low, T1 - step), np.minimum(high, T1 + step)
     return T1, worst

@@ -191,24 +191,8 @@ def smoothest_within(move: Move, worst: float, reference: float) -> Optimum | No
 def quiet_enough(move: Move, worst: float, reference: float) -> Optimum | None:
     """Any profile that leaves at most `worst`; found sooner than the best or the smoothest.
 
-    Parameters
-    ----------
-    move : Move
-        At least one pole has a weight above zero.
-    worst : float
-        Residual allowed, above zero. [mm]
-    reference : float
-        As in `least_residual`. [mm]
-
-    Returns
-    -------
-    Optimum or None
-        None where no profile on the grid does that within the limits.
-
-    Raises
-    ------
-    PlanError
-        scipy or clarabel is not installed.
+    Takes, returns and raises what `smoothest_within` does; `worst` must be above zero, and so the
+    weight of one pole at least.
     """
     search = _Search(move, reference)
     found = search.least(worst / search.scale)

@@ -282,7 +282,7 @@ class _Proof:
             return self._complain(Kind.HEAD, number, f"expected '{head.decode('latin-1')}'")
         if head:
             lines.next()
-        if not self._in_exact_path(series, wanted, lines, number, plane):
+        if not self._in_exact_path(series, wanted, lines, number):
             return False
         if stops and lines.next().split() != stops:
             return self._complain(Kind.STOP, number, "its stop is lost")
@@ -292,40 +292,31 @@ class _Proof:
         return True
 
     def _in_exact_path(
-        self,
-        series: Series,
-        wanted: list[list[Event]],
-        lines: WrittenLines,
-        number: int,
-        plane: tuple[str, str, str],
+        self, series: Series, wanted: list[list[Event]], lines: WrittenLines, number: int
     ) -> bool:
         """Compare the moves, and how they come to exact path mode and back."""
         state = self.reader.state
         if state.path in (61, 62):
-            return self._compare(series, wanted, lines, number, plane)
+            return self._compare(series, wanted, lines, number)
         if state.path != 64 or self.path is None:
             # Where the path mode is not known, a rest behind every move does what G61 would.
             rests = [[*_with_rests(events)] for events in wanted]
-            return self._compare(series, rests, lines, number, plane)
+            return self._compare(series, rests, lines, number)
         if lines.next() != b"G61":
             return self._complain(Kind.MODE, number, "cycles run in exact path mode: no G61")
-        if not self._compare(series, wanted, lines, number, plane):
+        if not self._compare(series, wanted, lines, number):
             return False
         if not self._path_restored(lines.next(), state):
             return self._complain(Kind.PATH, number, "the path mode of the program does not return")
         return True
 
     def _compare(
-        self,
-        series: Series,
-        wanted: list[list[Event]],
-        lines: WrittenLines,
-        number: int,
-        plane: tuple[str, str, str],
+        self, series: Series, wanted: list[list[Event]], lines: WrittenLines, number: int
     ) -> bool:
         """Compare moves one by one; a second list is another count of pecks that is as good."""
         at = dict(series.at)
         incremental = self.reader.state.distance == G91
+        plane = PLANES[self.reader.state.plane or G17]
         candidates = wanted
         for k in range(max(map(len, wanted))):
             open_ = [events for events in candidates if len(events) > k]

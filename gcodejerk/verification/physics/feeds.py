@@ -10,6 +10,13 @@ better than from rounded points. That gives these tests:
 
 For independent axes the speeds are those of no single profile: F is held between the bounds that
 the points and the axes' jerk give, which notices gross changes only.
+
+What is promised (README, "How results are checked"): an F in the middle of a stream that is not
+above zero, doubled, halved or of another unit is noticed, one that is off by 1 % where the rounding
+of the points leaves no other motion open; and no right output is refused. `FEED_STEP` is the
+rounding of F, ten times its last decimal. The others are chosen so that every profile on drawn
+machines is accepted: `SOLVED` for optima that are symmetric up to what their solver leaves,
+`FREE_BLOCKS` and `DRIVEN` to tell profiles apart that agree in their ramps only.
 """
 
 from __future__ import annotations

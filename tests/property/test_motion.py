@@ -70,7 +70,7 @@ def simulate(times, omega, zeta):
 
 @given(durations(), frequency, damping)
 @drawn
-def test_residual_of_a_law_is_that_of_a_simulated_mode(times, f, zeta):
+def test_residual_of_a_profile_is_that_of_a_simulated_mode(times, f, zeta):
     omega, pole = 2.0 * np.pi * f, mode_poles([f], [zeta])
     D = float(residual_displacement(profiles_response(law_of(times), pole), pole)[0, 0])
     # Of the size of the static deflection, a/omega^2: what is far below it is rounding.
@@ -80,7 +80,7 @@ def test_residual_of_a_law_is_that_of_a_simulated_mode(times, f, zeta):
 
 @given(segment, absent, segment, absent, frequency, damping)
 @drawn
-def test_residual_of_a_law_is_that_of_its_jerk_steps(T1, Ta, T2, Tv, f, zeta):
+def test_residual_of_a_profile_is_that_of_its_jerk_steps(T1, Ta, T2, Tv, f, zeta):
     profile, pole = law_of((T1, Ta, T2, Tv)), mode_poles([f], [zeta])
     every = [(d, (end - begin) / d) for d, begin, end in phases((T1, Ta, T2, Tv)) if d > 0.0]
     times = np.cumsum([0.0, *(d for d, _ in every)])
@@ -116,7 +116,7 @@ def test_samples_go_from_0_to_1_and_their_speed_is_their_slope(times, interval):
     st.floats(1.01, 30.0),
 )  # fmt: skip
 @drawn
-def test_conventional_laws_scale_with_the_length(V, A, J, factor):
+def test_conventional_profiles_scale_with_the_length(V, A, J, factor):
     """A longer move has smaller limits of its unit profile, takes longer, keeps the real ones."""
     short = conventional_profiles([V], [A], [J])
     long = conventional_profiles([V / factor], [A / factor], [J / factor])

@@ -19,7 +19,7 @@ from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.machines import machines
 from gcodejerk.testing.programs import programs
 from gcodejerk.testing.vocabulary import VOCABULARIES
-from gcodejerk.verification import verify, verify_csv
+from gcodejerk.verification import verify, verify_files
 
 CALM = settings(
     deadline=None,
@@ -62,7 +62,9 @@ def test_every_output_is_accepted(machine, data, known):
 @pytest.mark.parametrize("planner", PLANNERS)
 @settings(parent=CALM, max_examples=25)
 @given(st.data(), st.booleans(), st.sampled_from(["condition3", "cascade", "conventional"]))
-def test_every_output_is_accepted_whatever_law_todays_rapids_follow(planner, data, known, profile):
+def test_every_output_is_accepted_whatever_profile_todays_rapids_follow(
+    planner, data, known, profile
+):
     machine = ready(data.draw(machines(axes="XYZ", planner=planner)), known)
     assert machine.planner == planner
     program = data.draw(programs())
@@ -92,7 +94,7 @@ def test_every_table_is_accepted(part, machine, data):
     machine = ready(machine)
     result = outputs(data, machine, "csv")
     assume(result is not None)
-    found = verify_csv(io.BytesIO(data), io.BytesIO(result.output), machine)
+    found = verify_files(io.BytesIO(data), io.BytesIO(result.output), machine, table=True)
     assert found.violations == ()
     assert found.rewritten == result.planned
 
