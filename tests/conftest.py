@@ -12,6 +12,8 @@ LONG = 100
 def pytest_configure(config):
     # No test reads or fills the user's own cache of solutions.
     os.environ["GCODEJERK_CACHE"] = tempfile.mkdtemp(prefix="gcodejerk-cache-")
+    # The first command that tests start compiles our modules; hundreds after it need not.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_addoption(parser):
