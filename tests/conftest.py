@@ -10,8 +10,13 @@ LONG = 100
 
 
 def pytest_configure(config):
+    # How long an example takes says what else the machine does, not what the package does.
+    settings.register_profile("untimed", deadline=None)
+    settings.load_profile("untimed")
     # No test reads or fills the user's own cache of solutions.
     os.environ["GCODEJERK_CACHE"] = tempfile.mkdtemp(prefix="gcodejerk-cache-")
+    # The first command that tests start compiles our modules; hundreds after it need not.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_addoption(parser):

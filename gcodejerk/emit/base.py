@@ -10,9 +10,11 @@ from __future__ import annotations
 import difflib
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,9 +121,10 @@ class Controller(ABC):
         """
 
 
-def controllers() -> dict[str, EntryPoint]:
-    """Every emitter that is installed, by name; none is loaded."""
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+@cache
+def controllers() -> Mapping[str, EntryPoint]:
+    """Every emitter that is installed, by name: the same as long as a process lives."""
+    return MappingProxyType({entry.name: entry for entry in entry_points(group=GROUP)})
 
 
 def load_controller(name: str) -> Controller:
@@ -150,32 +153,37 @@ def load_controller(name: str) -> Controller:
             f"{hint}available: {', '.join(sorted(found)) or 'none (gcodejerk is not installed)'}",
         )
     entry = found[name]
-    origin = f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
     try:
         made = entry.load()()
     except Exception as error:
         raise EmitError(
-            f"controller {name!r} of {origin} cannot be loaded: {type(error).__name__}: {error}",
+            f"{_named(name, entry)} cannot be loaded: {type(error).__name__}: {error}",
             "repair or remove that package",
         ) from error
     if getattr(made, "api", None) != API:
         raise EmitError(
-            f"controller {name!r} of {origin} has api {getattr(made, 'api', None)}, expected {API}",
+            f"{_named(name, entry)} has api {getattr(made, 'api', None)}, expected {API}",
             "install a version of it that fits this gcodejerk",
         )
     if not isinstance(made, Controller):
         raise EmitError(
-            f"controller {name!r} of {origin} is a {type(made).__name__}, which is no "
+            f"{_named(name, entry)} is a {type(made).__name__}, which is no "
             "gcodejerk.emit.base.Controller",
             "derive its class from that one",
         )
     if made.name != name or not made.forms:
         lacks = f"calls itself {made.name!r}" if made.name != name else "has no forms"
         raise EmitError(
-            f"controller {name!r} of {origin} {lacks}",
+            f"{_named(name, entry)} {lacks}",
             f"give its class name = {name!r} and at least one Form",
         )
     return made
+
+
+def _named(name: str, entry: EntryPoint) -> str:
+    """An emitter and the package that it is part of, whose metadata take their time to read."""
+    origin = f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
+    return f"controller {name!r} of {origin}"
 
 
 def decimal_step(resolution: float) -> tuple[int, int]:

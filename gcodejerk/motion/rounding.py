@@ -13,6 +13,7 @@ Rule 2: a rounded move never goes backwards and never passes its end.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
@@ -59,35 +60,51 @@ def round_positions(
     scale = direction / step[order]
     x = (positions[order] - origin[order, np.newaxis]) * scale[:, np.newaxis]
     tolerance = 1e-6
-    previous = np.ceil(x[:, 0] - tolerance)
     last = np.floor(x[:, -1] + tolerance)
+    previous = np.minimum(np.ceil(x[:, 0] - tolerance), last)
+    # One row for each knot from here on.
+    exact = np.ascontiguousarray(x.T)
+    below = np.floor(exact + tolerance)
+    above = np.minimum(np.ceil(exact - tolerance), last)
+    half = exact + 0.5
+    out = np.rint(exact)
+    blocks = grid.blocks[order]
+    if not len(poles):  # nothing to feed back: all knots at once
+        begun = np.arange(1, k - 1)[:, np.newaxis] >= k - blocks
+        nearest = np.minimum(np.maximum(np.floor(half), below), above)[1:-1]
+        nearest = np.maximum.accumulate(np.where(begun, nearest, previous), axis=0)
+        out[1:-1] = np.where(begun, np.maximum(nearest, previous), out[1:-1])
+        return _in_order(out, direction, order)
+    under_way = np.searchsorted(-blocks, -np.arange(k - 1, 0, -1), side="right")
     share = _shares(poles, weights)
     running = np.zeros((n, len(poles)), dtype=np.complex128)
-    out = np.rint(x)
-    blocks = grid.blocks[order]
     duration = np.diff(grid.knots, axis=1)[order]
     usual = int(np.median(duration[:, -1])) if n else 1
     step_phase = np.exp(poles * usual * grid.interval)
-    under_way = np.searchsorted(-blocks, -np.arange(k - 1, 0, -1), side="right")
-    for column in range(1, k - 1):
-        m = under_way[column - 1]
+    differs = (duration != usual) & (np.arange(n)[:, np.newaxis] < under_way)
+    some_differ = differs.any(axis=0)
+    for knot, m in enumerate(under_way[:-1].tolist(), 1):
         if m == 0:
             continue
-        exact = x[:m, column]
-        ringing = running[:m] * step_phase
-        long = duration[:m, column - 1] != usual
-        if long.any():
-            phase = poles * (duration[:m, column - 1][long, np.newaxis] - usual) * grid.interval
+        ringing, before = running[:m], previous[:m]
+        ringing *= step_phase
+        if some_differ[knot - 1]:
+            long = differs[:m, knot - 1]
+            phase = poles * (duration[:m, knot - 1][long, np.newaxis] - usual) * grid.interval
             ringing[long] *= np.exp(phase)
-        below = np.floor(exact + tolerance)
-        rounded = np.floor(exact + 0.5 - ringing.real @ share)
-        rounded = np.minimum(np.maximum(rounded, below), np.ceil(exact - tolerance))
-        rounded = np.minimum(np.maximum(rounded, previous[:m]), last[:m])
-        running[:m] = ringing + (rounded - exact)[:, np.newaxis]
-        previous[:m] = rounded
-        out[:m, column] = rounded
-    whole = np.empty((n, k), dtype=np.int64)
-    whole[order] = (out * direction[:, np.newaxis]).astype(np.int64)
+        rounded = np.floor(half[knot, :m] - ringing.real @ share)
+        np.maximum(rounded, below[knot, :m], out=rounded)
+        np.minimum(rounded, above[knot, :m], out=rounded)
+        np.maximum(rounded, before, out=before)
+        out[knot, :m] = before
+        ringing += (before - exact[knot, :m])[:, np.newaxis]
+    return _in_order(out, direction, order)
+
+
+def _in_order(out: Array, direction: Array, order: NDArray[np.intp]) -> Counts:
+    """Whole steps as the caller has them: one row a move, signed, in the moves' own order."""
+    whole = np.empty(out.shape[::-1], dtype=np.int64)
+    whole[order] = (out * direction).T.astype(np.int64)
     return whole
 
 

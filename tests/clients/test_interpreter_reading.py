@@ -115,8 +115,8 @@ def disagreements(data, moves, start, refused=False):
 def uses_other_files(data):
     """Whether lines of other files may run: their numbers would be taken for this file's."""
     defined = set(re.findall(rb"(?im)^\s*o\s*<?([^>\s]+)>?\s+sub", data))
-    called = set(re.findall(rb"(?im)^[^(;]*o\s*<?([^>\s]+)>?\s+call", data))
-    numbered = re.search(rb"(?im)^[^(;]*m98", data)
+    called = set(re.findall(rb"(?im)^[^(;\n]*o\s*<?([^>\s]+)>?\s+call", data))
+    numbered = re.search(rb"(?im)^[^(;\n]*m98", data)
     return bool(called - defined) or bool(numbered)
 
 

@@ -51,10 +51,11 @@ class Motion:
         self.acceleration = np.abs(np.concatenate([begin, end])).max()
         self.jerk = np.abs(j).max()
 
-    def response(self, pole, until):
-        """Of a mode at a time after the end: every jump and kink of the acceleration rings on."""
-        left = until - self.t
-        return np.sum((self.jumps / pole + self.kinks / pole**2) * np.exp(pole * left))
+    def response(self, poles, until):
+        """Of modes at a time after the end: every jump and kink of the acceleration rings on."""
+        pole = np.asarray(poles)[:, np.newaxis]
+        rung = (self.jumps / pole + self.kinks / pole**2) * np.exp(pole * (until - self.t))
+        return rung.sum(axis=1)
 
 
 def drawn_moves(machine, seed):
@@ -74,7 +75,7 @@ def drawn_moves(machine, seed):
 
 def frequencies(mode, band):
     """The mode's own frequency, and points within its band."""
-    return mode.frequency * np.linspace(1.0 - band, 1.0 + band, 41) if band else [mode.frequency]
+    return mode.frequency * (np.linspace(1.0 - band, 1.0 + band, 41) if band else np.ones(1))
 
 
 def worst(machine, share, motion, band):
@@ -82,12 +83,13 @@ def worst(machine, share, motion, band):
     largest = 0.0
     for _, mode in machine.all_modes():
         weight = sum(share[AXES.index(a)] * p for a, p in mode.participation)
-        for f in frequencies(mode, band) if weight else ():
-            omega = 2.0 * math.pi * f
-            damped = omega * math.sqrt(1.0 - mode.damping**2)
-            pole = complex(-mode.damping * omega, damped)
-            D = abs(motion.response(pole, motion.t[-1])) * abs(weight) / damped
-            largest = max(largest, D)
+        if not weight:
+            continue
+        omega = 2.0 * math.pi * frequencies(mode, band)
+        damped = omega * math.sqrt(1.0 - mode.damping**2)
+        poles = -mode.damping * omega + 1j * damped
+        D = np.abs(motion.response(poles, motion.t[-1])) * abs(weight) / damped
+        largest = max(largest, D.max())
     return largest
 
 

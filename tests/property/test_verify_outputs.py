@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.errors import GcodejerkError
@@ -21,9 +21,11 @@ from gcodejerk.testing.programs import programs
 from gcodejerk.testing.vocabulary import VOCABULARIES
 from gcodejerk.verification import verify, verify_files
 
+# A machine is a large thing to shrink: minutes for a smaller example that says no more.
 CALM = settings(
     deadline=None,
     max_examples=40,
+    phases=(Phase.explicit, Phase.reuse, Phase.generate),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 KNOWN = dict.fromkeys("XYZABC", 0.0)

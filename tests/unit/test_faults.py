@@ -60,15 +60,16 @@ def names(place="."):
     return sorted(os.listdir(place))
 
 
-# Kills itself before the n-th call that touches the folder: once the modules are there, only the
-# program's own calls are counted.
+# For each number read, a child that kills itself before that call that touches the folder. Once the
+# modules are there, only the program's own calls are counted.
 KILLED = """
 import os, signal, sys
 import gcodejerk.batch.inputs, gcodejerk.batch.jobs, gcodejerk.batch.workers
 import gcodejerk.cli, gcodejerk.machine
 import gcodejerk.emit.linuxcnc, gcodejerk.cli.programs
 
-number, left, here = int(sys.argv[1]), int(sys.argv[2]), os.getcwd()
+number, here = int(sys.argv[1]), os.getcwd()
+sys.argv[1:] = sys.argv[2:]
 
 def hook(event, arguments):
     global left
@@ -78,10 +79,43 @@ def hook(event, arguments):
             if left == 0:
                 os.kill(os.getpid(), number)
 
-sys.addaudithook(hook)
-sys.argv[1:] = sys.argv[3:]
-gcodejerk.cli.main()
+for line in iter(sys.stdin.readline, ""):
+    left = int(line)
+    child = os.fork()
+    if child == 0:
+        sys.addaudithook(hook)
+        gcodejerk.cli.main()
+        raise SystemExit
+    _, status = os.waitpid(child, 0)
+    print("ended", os.waitstatus_to_exitcode(status), file=sys.stderr, flush=True)
 """
+
+
+class Killed:
+    """Runs of one command, each killed before a call: only the first one imports the modules."""
+
+    def __init__(self, number, arguments):
+        self.master = subprocess.Popen(
+            [sys.executable, "-c", KILLED, str(int(number)), *arguments],
+            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.master.communicate()
+
+    def run(self, moment):
+        """Exit status and standard error of the run that ends before this call."""
+        self.master.stdin.write(f"{moment}\n")
+        self.master.stdin.flush()
+        said = []
+        for line in self.master.stderr:
+            if line.startswith("ended "):
+                return int(line.split()[1]), "".join(said)
+            said.append(line)
+        raise AssertionError("".join(said))
 
 
 STRIDE = 4
@@ -103,29 +137,27 @@ def test_killed_before_any_call_to_the_system_it_leaves_no_half_file(
     Path("part.nc").write_bytes(SMALL)
     arguments = ["process", "part.nc", "-m", "vmc", "--report", "part.json"]
     moments = range(1, 40) if request.config.getoption("--long") else range(first, 40, STRIDE)
-    for moment in moments:
-        for left in set(names()) - {"part.nc"}:
-            os.unlink(left)
-        if old is not None:
-            Path("part.jerk.nc").write_bytes(old)
-        run = subprocess.run(
-            [sys.executable, "-c", KILLED, str(int(number)), str(moment), *arguments],
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert Path("part.nc").read_bytes() == SMALL
-        assert "Traceback" not in run.stderr
-        found = Path("part.jerk.nc")
-        assert (found.read_bytes() if found.exists() else None) in (old, WHOLE)
-        hidden = set(names()) - {"part.nc", "part.jerk.nc", "part.json"}
-        assert all(name.startswith(PREFIX) for name in hidden)
-        assert [f.path for f in find_inputs(["."])[0]] == ["part.nc"]
-        if run.returncode == 0:
-            break
-        assert run.returncode == (-number if number == signal.SIGKILL else 128 + number)
-        if number == signal.SIGTERM:
-            assert not hidden
-    else:
-        pytest.fail("it never came to its end")
+    with Killed(number, arguments) as command:
+        for moment in moments:
+            for left in set(names()) - {"part.nc"}:
+                os.unlink(left)
+            if old is not None:
+                Path("part.jerk.nc").write_bytes(old)
+            status, said = command.run(moment)
+            assert Path("part.nc").read_bytes() == SMALL
+            assert "Traceback" not in said
+            found = Path("part.jerk.nc")
+            assert (found.read_bytes() if found.exists() else None) in (old, WHOLE)
+            hidden = set(names()) - {"part.nc", "part.jerk.nc", "part.json"}
+            assert all(name.startswith(PREFIX) for name in hidden)
+            assert [f.path for f in find_inputs(["."])[0]] == ["part.nc"]
+            if status == 0:
+                break
+            assert status == (-number if number == signal.SIGKILL else 128 + number)
+            if number == signal.SIGTERM:
+                assert not hidden
+        else:
+            pytest.fail("it never came to its end")
     assert moment > 6, "the moments before opening and before renaming were not among them"
     assert names() == ["part.jerk.nc", "part.json", "part.nc"]
 

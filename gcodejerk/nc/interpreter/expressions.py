@@ -14,6 +14,7 @@ import math
 import operator as operators
 import re
 from collections.abc import Callable, Mapping
+from functools import cache
 
 from gcodejerk.nc.dialects.dialect import Arithmetic
 
@@ -105,12 +106,9 @@ class _Reader:
 
     def operator(self) -> tuple[str, int]:
         """Look at the operator that stands here and how it binds; an empty one where none does."""
-        best, binds = "", -1
-        for level, names in enumerate(self.rules.levels):
-            for name in names:
-                if len(name) > len(best) and self.text.startswith(name.encode(), self.at):
-                    best, binds = name, len(self.rules.levels) - level
-        return best, binds
+        pattern, binds = _operators(self.rules.levels)
+        match = pattern.match(self.text, self.at)
+        return (match[0].decode(), binds[match[0]]) if match else ("", -1)
 
     def expression(self, least: int) -> float:
         """Read operands whose operators bind at least so much."""
@@ -209,6 +207,17 @@ class _Reader:
             raise _NotComputableError
         self.at += 1
         return 1.0 if known else NAN
+
+
+@cache
+def _operators(levels: tuple[tuple[str, ...], ...]) -> tuple[re.Pattern[bytes], dict[bytes, int]]:
+    """A pattern of all operators, the longest first, and how each binds."""
+    binds: dict[bytes, int] = {}
+    for level, names in enumerate(levels):
+        for name in names:
+            binds.setdefault(name.encode(), len(levels) - level)
+    longest = sorted(binds, key=len, reverse=True)
+    return re.compile(b"|".join(map(re.escape, longest)) or rb"(?!)"), binds
 
 
 def _apply(operator: str, a: float, b: float, rules: Arithmetic) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import entry_points
 from itertools import product
 from typing import BinaryIO
@@ -82,10 +82,19 @@ def read_stamp(processed: BinaryIO, machine: Machine) -> Stamp | None:
     found = match[1].decode()
     names = dict.fromkeys((machine.controller, *_controllers()))
     profiles = dict.fromkeys((machine.design.profile, *PROFILES))
-    settings_hash = machine.settings_hash
+    chosen = _choices(machine.settings_hash, tuple(names), tuple(profiles)).get(found)
+    return Stamp(found, True, *chosen) if chosen else Stamp(found)
+
+
+@lru_cache(maxsize=16)
+def _choices(
+    settings_hash: str, names: tuple[str, ...], profiles: tuple[str, ...]
+) -> dict[str, tuple[str, str, str | None, bool]]:
+    """Controller, profile, dialect and expansion by their hash: all that a user can choose."""
+    out: dict[str, tuple[str, str, str | None, bool]] = {}
     for dialect, expand, name, profile in product(
         (None, *DIALECTS, "auto"), (False, True), names, profiles
     ):
-        if choices_hash(settings_hash, name, profile, expand, dialect) == found:
-            return Stamp(found, True, name, profile, dialect, expand)
-    return Stamp(found)
+        found = choices_hash(settings_hash, name, profile, expand, dialect)
+        out.setdefault(found, (name, profile, dialect, expand))
+    return out
