@@ -43,6 +43,11 @@ def test_x_is_halved_under_diameter():
     assert end(b"G7 X10\nG91 X4\nG8 X1\n") == [8, 0, 0]
 
 
+def test_a_cycle_along_a_diameter_returns_to_an_unknown_place():
+    # LinuxCNC 2.9 halves X and the depth, not R: measured.
+    assert end(b"G7 G19 G0 X-1\nG99 G81 Z-0.5 X-15 R2 F9\nG80\n")[0] is None
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

@@ -60,6 +60,8 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     state.put("cycle", cycle)
     scale = state.scale(along)
     r, bottom = cycle[2] * scale, cycle[1] * scale
+    if along == 0 and state.diameter is not False:
+        r = NAN  # X is a diameter; whether R is, too, differs: LinuxCNC takes it as it is
     if state.distance == G91:
         r, bottom = r + state.cycle_level, r + state.cycle_level + bottom
     elif state.distance is None:

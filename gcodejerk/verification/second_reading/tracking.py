@@ -440,7 +440,9 @@ class Tracker(Codes):
             self.r = NAN
         self.cycle = code
         if "R" in block.values:
-            self.r = block.values["R"] * self.scale(along)
+            # Beside an X that is a diameter, R may be none.
+            radius = NAN if along == "X" and self.diameter is not False else 1.0
+            self.r = block.values["R"] * self.scale(along) * radius
 
 
 def _letters(axes: int) -> str:
