@@ -26,11 +26,7 @@ from gcodejerk.motion.sampling import (
     sampled_response,
     whole_intervals,
 )
-from gcodejerk.motion.search.condition3 import (
-    design_condition3,
-    design_four_segments,
-    four_segment_range,
-)
+from gcodejerk.motion.search.condition3 import design_four_segments, four_segment_range
 from gcodejerk.motion.search.objective import Objective
 
 __all__ = [
@@ -40,7 +36,6 @@ __all__ = [
     "Profiles",
     "SymmetricProfiles",
     "conventional_profiles",
-    "design_condition3",
     "design_four_segments",
     "four_segment_range",
     "grouped",

@@ -164,9 +164,13 @@ def knots_response(values: Array, grid: Grid, poles: Complex) -> Complex:
     with np.errstate(invalid="ignore", divide="ignore"):
         velocity = np.where(duration > 0.0, np.diff(values, axis=1) / duration, 0.0)
     steps = np.diff(velocity, axis=1, prepend=0.0, append=0.0)
+    # Laid out at every interval, so that all moves share the exponentials.
+    longest = int(grid.counts.max(initial=0))
+    every = np.zeros((len(values), longest + 1))
     left = grid.counts[:, np.newaxis] - grid.knots
-    response = np.empty((len(values), len(poles)), dtype=np.complex128)
-    table = np.arange(int(grid.counts.max(initial=0)) + 1) * grid.interval
-    for m, pole in enumerate(poles):
-        response[:, m] = np.einsum("ij,ij->i", steps, np.exp(pole * table)[left])
+    # Columns before a move has begun have no step.
+    begun = steps != 0.0
+    every[np.nonzero(begun)[0], left[begun]] = steps[begun]
+    decay = np.exp(poles * (np.arange(longest + 1) * grid.interval)[:, np.newaxis])
+    response: Complex = every @ decay.real + 1j * (every @ decay.imag)
     return response

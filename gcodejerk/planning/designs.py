@@ -10,185 +10,147 @@ Rule: a design changes no move's time, but for `shortest`, whose result the time
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import Machine
 from gcodejerk.motion import (
     Objective,
     Profiles,
-    SymmetricProfiles,
-    design_condition3,
     design_four_segments,
     four_segment_range,
-    whole_intervals,
+    joined,
 )
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.motion.search.cascade import design_cascade
+from gcodejerk.motion.search.cascade import design_cascade, leading_periods
 from gcodejerk.motion.search.conditions import design_condition
 from gcodejerk.motion.search.optimal import Move, Optimum, optimum_profiles
+from gcodejerk.motion.search.ramps import design_symmetric
 from gcodejerk.motion.search.socp import require_solver
-from gcodejerk.planning.conventional import conventional_limits, todays_profiles, unit_limits
 from gcodejerk.planning.optima import Progress, Question, answers
-from gcodejerk.planning.plans import Modes, Plans
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.task import Task, worst_in_band
 
 ALLOWED = 0.97
 """Share of the tolerance that a profile may use; rounding to the resolution needs some, too."""
+SEARCHED, FEWEST = 1.6, 1
+"""What a search looks at of a band: the distance of frequencies, times T_SUM/2, at most [rad], and
+so many on each side at least."""
+MOST_REMEMBERED = 50_000
+"""Profiles that a search remembers, a few hundred bytes each."""
 COARSE = 24
 """Moves of so few intervals may gain from segments that end between them."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Task:
-    """Moves to be designed, columns of n.
-
-    Attributes
-    ----------
-    counts : ndarray of int, shape (n,)
-        T_SUM. [intervals]
-    limits : tuple of ndarray, shape (n,)
-        Velocity, acceleration and jerk of the unit profiles. [1/s], [1/s^2], [1/s^3]
-    conventional : Profiles
-        What the controller does today.
-    symmetric : SymmetricProfiles
-        The fastest symmetric profiles within the same limits: what the controller does, but for a
-        bell.
-    objective : Objective
-        What they are judged by.
-    interval, band, tolerance : float
-        Of the machine. [s], [-], [mm]
-    progress : callable or None
-        For designs that take long.
-    """
-
-    counts: NDArray[np.int64]
-    limits: tuple[Array, Array, Array]
-    conventional: Profiles
-    symmetric: SymmetricProfiles
-    objective: Objective
-    interval: float
-    band: float
-    tolerance: float
-    progress: Progress | None = None
-
-    @classmethod
-    def of(
-        cls, machine: Machine, modes: Modes, share: Array, counts: NDArray[np.int64] | None = None,
-        progress: Progress | None = None, speed: Array | None = None,
-        lone: NDArray[np.bool_] | None = None,
-    ) -> Task:  # fmt: skip
-        """Moves on a machine.
-
-        Parameters
-        ----------
-        machine : Machine
-            Its limits and what it says of designs.
-        modes : Modes
-            Those that count, of that machine.
-        share : ndarray, shape (n, 9)
-            Displacement of each axis. [mm] or [deg]
-        counts : ndarray of int, shape (n,), optional
-            T_SUM; the conventional time rounded up by default. [intervals]
-        progress : callable, optional
-            See `Progress`.
-        speed : ndarray, shape (n,), optional
-            Speed that the program states, which no unit profile exceeds; NaN for none. [1/s]
-        lone : ndarray of bool, shape (n,), optional
-            No other motion follows directly (`Axis.conventional`); all of them by default.
-
-        Returns
-        -------
-        Task
-        """
-        rapid, limits = conventional_limits(machine, share, lone), unit_limits(machine, share)
-        if speed is not None:
-            rapid, limits = ((np.fmin(V, speed), A, J) for V, A, J in (rapid, limits))
-        symmetric, conventional = todays_profiles(machine, rapid)
-        if counts is None:
-            counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
-        weights = np.abs(share @ modes.participation.T)
-        return cls(
-            counts=counts,
-            limits=limits,
-            conventional=conventional,
-            symmetric=symmetric,
-            objective=Objective(modes.poles, weights, modes.group),
-            interval=machine.interval,
-            band=machine.design.band,
-            tolerance=machine.design.tolerance,
-            progress=progress,
-        )
-
-    def __len__(self) -> int:
-        return len(self.counts)
-
-    @property
-    def total(self) -> Array:
-        """T_SUM, shape (n,) [s]."""
-        return np.asarray(self.counts * self.interval, dtype=np.float64)
-
-    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Task:
-        """Some of the moves."""
-        return replace(
-            self,
-            counts=self.counts[index],
-            limits=(self.limits[0][index], self.limits[1][index], self.limits[2][index]),
-            conventional=self.conventional.take(index),
-            symmetric=self.symmetric.take(index),
-            objective=self.objective.take(index),
-        )
-
-    def after(self, counts: NDArray[np.int64]) -> Task:
-        """The same moves in other times."""
-        return replace(self, counts=counts)
-
-
 Design = Callable[[Task], tuple[Profiles, Array]]
-"""Profiles of the moves, and the largest residual of each [mm], infinite where there is none."""
+"""Profiles of the moves, and the largest residual of each over the band [mm], infinite where there
+is none."""
+
+Search = Callable[[Task, Objective], tuple[Profiles, NDArray[np.bool_]]]
+"""Profiles that leave the least of an objective, and whether there is one within the limits."""
 
 
 def condition3(task: Task) -> tuple[Profiles, Array]:
-    """Condition III, or its generalisation where a limit binds."""
-    V, A, J = task.limits
-    conventional, total = task.symmetric, task.total
-    # Four segments where the conventional profile has them: it is then a member of the family.
-    four = (conventional.Ta == 0.0) & (conventional.Tv == 0.0)
-    low, high = four_segment_range(total, V, A, J, task.interval)
+    """Condition III, or its generalisation where a limit binds.
+
+    Where the conventional profile has four segments, it is the paper's: T1 alone is free.
+    """
+    # The conventional profile is then a member of the family.
+    four = (task.symmetric.Ta == 0.0) & (task.symmetric.Tv == 0.0)
+    low, high = four_segment_range(task.total, *task.limits, task.interval)
     four &= low <= high
-    profiles, worst = conventional, np.full(len(task), np.inf)
-    index = np.nonzero(four)[0]
-    found, worst[index] = design_four_segments(
-        total[index], low[index], high[index], task.objective.take(index)
-    )
-    profiles = profiles.replaced(index, found)
-    index = np.nonzero(~four)[0]
-    found, worst[index], _ = design_condition3(
-        total[index], V[index], A[index], J[index], task.objective.take(index),
-        task.interval, conventional.take(index),
-    )  # fmt: skip
-    # A profile that is not feasible may have no shape at all.
-    feasible = index[np.isfinite(worst[index])]
-    profiles = profiles.replaced(feasible, found.take(np.isfinite(worst[index])))
-    return profiles.general(), worst
+    profiles, worst = task.conventional, np.full(len(task), np.inf)
+    for search, where in ((_four_segments, four), (_symmetric, ~four)):
+        index = np.nonzero(where)[0]
+        found, worst[index] = _searched(task.take(index), search)
+        profiles = profiles.replaced(index, found)
+    return profiles, worst
+
+
+def symmetric(task: Task) -> tuple[Profiles, Array]:
+    """The generalised Condition III for every move: T1, T2, Ta and Tv are all free."""
+    return _searched(task, _symmetric)
 
 
 def condition1(task: Task) -> tuple[Profiles, Array]:
     """Condition I at its best T1."""
-    return design_condition("I", task.total, *task.limits, task.objective, task.interval)
+    return _searched(task, _condition1)
 
 
 def condition2(task: Task) -> tuple[Profiles, Array]:
     """Condition II at its best T1."""
-    return design_condition("II", task.total, *task.limits, task.objective, task.interval)
+    return _searched(task, _condition2)
 
 
 def cascade(task: Task) -> tuple[Profiles, Array]:
     """Moving averages as wide as the modes' periods, in the unchanged time."""
-    profiles, worst = design_cascade(task.total, *task.limits, task.objective, task.interval)
-    return _with(task.conventional, np.isfinite(worst), profiles), worst
+    return _searched(task, _cascade)
+
+
+def _four_segments(task: Task, objective: Objective) -> tuple[Profiles, NDArray[np.bool_]]:
+    low, high = four_segment_range(task.total, *task.limits, task.interval)
+    profiles = design_four_segments(task.total, low, high, objective).general()
+    return profiles, np.ones(len(task), dtype=bool)
+
+
+def _symmetric(task: Task, objective: Objective) -> tuple[Profiles, NDArray[np.bool_]]:
+    found, feasible = design_symmetric(
+        task.total, *task.limits, objective, task.interval, [task.symmetric]
+    )
+    return task.symmetric.replaced(feasible, found.take(feasible)).general(), feasible
+
+
+def _condition(name: str, task: Task, objective: Objective) -> tuple[Profiles, NDArray[np.bool_]]:
+    profiles, worst = design_condition(name, task.total, *task.limits, objective, task.interval)
+    return profiles, np.isfinite(worst)
+
+
+_condition1, _condition2 = partial(_condition, "I"), partial(_condition, "II")
+
+
+def _cascade(task: Task, objective: Objective) -> tuple[Profiles, NDArray[np.bool_]]:
+    periods = leading_periods(task.objective)
+    return design_cascade(task.total, *task.limits, objective, task.interval, periods)
+
+
+def _searched(task: Task, search: Search) -> tuple[Profiles, Array]:
+    """What a search finds over the band, judged more finely than it looks."""
+    keys, first, same = task.distinct()
+    remembered = _remembered(search)
+    if len(remembered) + len(keys) > MOST_REMEMBERED:
+        remembered.clear()
+    new = np.array([k for k, key in enumerate(keys) if key not in remembered], dtype=np.intp)
+    few = task.take(first[new])
+    for index, longest in few.alike():
+        own = few.take(index)
+        own = replace(own, objective=own.objective.excited())
+        looked_at = own.objective.in_band(task.band, longest, SEARCHED, FEWEST)
+        found, feasible = search(own, looked_at)
+        for row, k in enumerate(new[index]):
+            own_profile = found.take(slice(row, row + 1))
+            remembered[keys[k]] = own_profile if feasible[row] else None
+    known = [remembered[key] for key in keys]
+    there = np.array([profile is not None for profile in known], dtype=bool)
+    profiles, worst = task.conventional, np.full(len(task), np.inf)
+    if there.any():
+        place = np.cumsum(there) - 1
+        judged = there[same]
+        chosen = joined([p for p in known if p is not None]).take(place[same[judged]])
+        profiles = profiles.replaced(judged, chosen)
+        worst[judged] = worst_in_band(task.take(judged), chosen)
+    return profiles, worst
+
+
+@cache
+def _remembered(search: Search) -> dict[bytes, Profiles | None]:
+    """What a search has found in this process: the rapids of a shop's programs are often the same.
+
+    None where there is nothing within the limits.
+    """
+    return {}
 
 
 def optimal(task: Task) -> tuple[Profiles, Array]:
@@ -204,20 +166,16 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     profiles, worst = _answered(task, rows, found, profiles, worst)
     everything = np.ones(len(task), dtype=bool)
     for rival, where in (
-        (condition3, everything),
+        (symmetric, everything),
         (cascade, everything),
         (condition1, task.counts <= COARSE),
         (condition2, task.counts <= COARSE),
     ):
         index = np.nonzero(where)[0]
-        others, nominal = rival(task.take(index))
-        residual = np.full(len(task), np.inf)
-        # The band is looked at only where the modes' own frequencies leave a hope.
-        hope = np.isfinite(nominal) & (nominal < worst[index])
-        residual[index[hope]] = worst_in_band(task.take(index[hope]), others.take(hope))
-        better = residual < worst
-        profiles = profiles.replaced(better, others.take(better[index]))
-        worst = np.where(better, residual, worst)
+        others, residual = rival(task.take(index))
+        better = residual < worst[index]
+        profiles = profiles.replaced(index[better], others.take(better))
+        worst[index[better]] = residual[better]
     return profiles, worst
 
 
@@ -266,11 +224,8 @@ def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Profiles, Array, N
 
 
 def _quiet(task: Task, reference: Array) -> tuple[Profiles, Array]:
-    """Profiles within the tolerance over the band, of Condition III or optimal; else infinite."""
-    profiles, nominal = condition3(task)
-    worst = np.full(len(task), np.inf)
-    hope = nominal <= task.tolerance
-    worst[hope] = worst_in_band(task.take(hope), profiles.take(hope))
+    """Profiles within the tolerance over the band, symmetric or optimal; else infinite."""
+    profiles, worst = symmetric(task)
     worst = np.where(worst <= task.tolerance, worst, np.inf)
     rows = np.nonzero(~np.isfinite(worst))[0]
     questions = [_question(task, k, float(reference[k]), task.tolerance) for k in rows]
@@ -347,32 +302,6 @@ def known_limits(plans: Plans, progress: Progress | None = None) -> Array | None
     return least_residuals(plans, progress)
 
 
-def worst_in_band(task: Task, profiles: Profiles) -> Array:
-    """Largest residual displacement of profiles with every frequency anywhere within the band.
-
-    Parameters
-    ----------
-    task : Task
-        The moves.
-    profiles : Profiles
-        One for each.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        [mm]
-    """
-    worst = np.zeros(len(task))
-    total = profiles.total
-    # A longer move needs more frequencies: moves of like duration together.
-    octave = np.frexp(total)[1]
-    for k in np.unique(octave):
-        index = np.nonzero(octave == k)[0]
-        objective = task.objective.take(index).in_band(task.band, float(total[index].max()))
-        worst[index] = objective.of(profiles.take(index))
-    return worst
-
-
 def _question(
     task: Task, row: np.intp, reference: float, allowed: float = 0.0, smooth: bool = False
 ) -> Question:
@@ -404,15 +333,11 @@ def _answered(
     return profiles.replaced(index, optimum_profiles(optima, task.interval)), worst
 
 
-def _with(profiles: Profiles, where: NDArray[np.bool_], others: Profiles) -> Profiles:
-    """These profiles with others in some places; both have a profile for each move."""
-    return profiles.replaced(where, others.take(where))
-
-
 DESIGNS: dict[str, Design] = {
     "condition1": condition1,
     "condition2": condition2,
     "condition3": condition3,
+    "symmetric": symmetric,
     "cascade": cascade,
     "optimal": optimal,
 }

@@ -6,10 +6,9 @@ This module owns `Plan`, a view of one row of `plans.Plans` with its stream, in 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
@@ -71,14 +70,9 @@ class Plan:
         return float(self.plans.length[0])
 
     @property
-    def stays_conventional(self) -> NDArray[np.bool_]:
-        """Whether the conventional profile is written, shape (1,)."""
-        return self.batch.stays_conventional
-
-    @property
     def profile(self) -> str:
-        """Name of the profile that is written."""
-        return "conventional" if self.batch.stays_conventional[0] else self.plans.designed
+        """Name of the profile that is written, or of what the controller does by itself."""
+        return self.plans.designed
 
     @property
     def profiles(self) -> Profiles:
@@ -176,20 +170,29 @@ def plan_move(
     row = displacement_row(displacement, machine)
     check_time(time)
     plans = plan_moves(row, machine, profile, time=time, T1=T1)
+    batches = _streams(plans)
     why = None if plans.reason[0] == CERTAIN else REASONS[plans.reason[0]]
     if why in (Reason.LIMITS, Reason.NOT_BETTER):
         plans = plan_moves(row, machine, "conventional", as_today=True)
+        # No stream is written: what is left is what the controller leaves.
+        batches = [replace(b, residual=b.conventional_residual) for b in _streams(plans)]
     elif why is not None:
         raise not_planned(why)
-    step = np.ones(len(AXES))
-    for described in machine.axes:
-        step[AXES.index(described.name)] = described.resolution
-    zero = np.zeros((1, len(AXES)))
-    ((batch,),) = make_streams(plans, NumberFormat(zero, step[np.newaxis, :], zero), 1)
     named = {a.upper(): float(x) for a, x in displacement.items()}
-    stays = bool(batch.stays_conventional[0]) and plans.designed != "conventional"
-    reason = why or (Reason.NOT_BETTER if stays else None)
-    return Plan(machine, named, plans, batch, why is None, None if reason is None else str(reason))
+    return Plan(machine, named, plans, batches[0], why is None, None if why is None else str(why))
+
+
+def _streams(plans: Plans) -> list[Batch]:
+    """The stream of one move, to the axes' resolutions; none where the move is not planned."""
+    step = np.ones((1, len(AXES)))
+    for described in plans.machine.axes:
+        step[0, AXES.index(described.name)] = described.resolution
+    zero = np.zeros((1, len(AXES)))
+    return [
+        batch
+        for window in make_streams(plans, NumberFormat(zero, step, zero), 1)
+        for batch in window
+    ]
 
 
 def not_planned(reason: str) -> PlanError:

@@ -25,18 +25,18 @@ from gcodejerk.motion import (
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.condition3 import TIE
 from gcodejerk.motion.shapers import SHAPERS, shaped_profile
-from gcodejerk.nc import Rapids
 from gcodejerk.planning.conventional import least_time
-from gcodejerk.planning.designs import DESIGNS, Task, shortest, worst_in_band
+from gcodejerk.planning.designs import DESIGNS, shortest
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.refusals import limit_error, time_error
+from gcodejerk.planning.task import Task, worst_at_arrival, worst_in_band
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
-FARTHEST = 1e8
-"""Where no axis ever is [mm] or [deg]; what is farther away could not be written exactly."""
+LEAST_GAIN = 0.02
+"""Share of today's residual that a profile has to win: less is not worth the blocks."""
 MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
 
@@ -103,10 +103,10 @@ def plan_moves(
     displacement = np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0)
     length = path_length(displacement, machine)
     known = np.array([axis in machine.axis_names for axis in AXES])
-    _rule_out(reason, (length == 0.0), Reason.NO_MOTION)
-    _rule_out(reason, (displacement[:, ~known] != 0.0).any(axis=1), Reason.AXIS_UNKNOWN)
+    rule_out(reason, (length == 0.0), Reason.NO_MOTION)
+    rule_out(reason, (displacement[:, ~known] != 0.0).any(axis=1), Reason.AXIS_UNKNOWN)
     longest = MOST_INTERVALS * machine.interval
-    _rule_out(reason, least_time(displacement, machine) > longest, Reason.TOO_LONG)
+    rule_out(reason, least_time(displacement, machine) > longest, Reason.TOO_LONG)
     if time is not None and time > longest:
         raise PlanError(
             f"the time is {time:g} s, more than {MOST_INTERVALS} intervals ({longest:g} s)",
@@ -117,91 +117,7 @@ def plan_moves(
     ).run()
 
 
-def plan_rapids(
-    rapids: Rapids,
-    machine: Machine,
-    profile: str | None = None,
-    progress: Progress | None = None,
-    unblended: str = "",
-    only_gains: bool = False,
-) -> Plans:
-    """Plan the rapids of a program, all of them together.
-
-    Parameters
-    ----------
-    rapids : Rapids
-        As `nc.read_program` finds them.
-    machine : Machine
-        Limits, modes, travel and interval.
-    profile : str, optional
-        The machine's own by default.
-    progress : callable, optional
-        Called while optima are computed.
-    unblended : str, optional
-        Axes whose rapids are left alone, since the controller stops between their blocks.
-    only_gains : bool, optional
-        Leave all rapids alone where nothing is known to vibrate, so that nothing can be gained.
-
-    Returns
-    -------
-    Plans
-        Row i is rapid i.
-
-    Raises
-    ------
-    PlanError
-        The profile is unknown, or adds time.
-    """
-    profile = profile or machine.design.profile
-    if profile in SHAPERS:
-        raise PlanError(
-            f"profile {profile!r} adds time to every rapid: it is there for comparison only",
-            f"choose one of {', '.join(p for p in PROFILES if p not in SHAPERS)}",
-        )
-    reason = rapids.reason.copy()
-    known = sum(1 << AXES.index(name) for name in machine.axis_names)
-    foreign = (rapids.words & ~np.uint16(known)) != 0
-    # The machine file is what the user can mend, whatever the program leaves open besides.
-    reason[foreign & (reason == REASONS.index(Reason.START_UNKNOWN))] = CERTAIN
-    turning = reason == REASONS.index(Reason.ROTARY_WAY)
-    reason[foreign & turning] = CERTAIN
-    # Whatever way an axis turns: where its blocks are not blended, nobody needs to know it.
-    stopping = sum(1 << AXES.index(axis) for axis in unblended)
-    reason[turning & ((rapids.words & np.uint16(stopping)) != 0)] = REASONS.index(
-        Reason.NO_BLENDING
-    )
-    _rule_out(reason, foreign, Reason.AXIS_UNKNOWN)
-    for axis in machine.axes:
-        if axis.travel is None:
-            continue
-        k = AXES.index(axis.name)
-        low, high = axis.travel[0] - axis.resolution, axis.travel[1] + axis.resolution
-        # Unknown offsets give NaN, and NaN is beyond nothing.
-        for position in (rapids.start[:, k], rapids.target[:, k]):
-            where = position + rapids.offset[:, k]
-            named = (rapids.words >> k & 1) != 0
-            _rule_out(reason, named & ((where < low) | (where > high)), Reason.BEYOND_TRAVEL)
-    for position in (rapids.start, rapids.target):
-        _rule_out(
-            reason, np.abs(np.nan_to_num(position)).max(axis=1) > FARTHEST, Reason.BEYOND_TRAVEL
-        )
-    displacement = np.where((reason == CERTAIN)[:, np.newaxis], rapids.target - rapids.start, 0.0)
-    length = path_length(np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0), machine)
-    _rule_out(reason, length == 0.0, Reason.NO_MOTION)
-    moves = np.abs(displacement) > STANDSTILL
-    stops: NDArray[np.bool_] = moves & np.array([axis in unblended for axis in AXES])
-    _rule_out(reason, np.asarray(stops.any(axis=1)), Reason.NO_BLENDING)
-    _rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
-    if only_gains and profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
-        # Those keep the profile or save time; all others do nothing but keep modes still.
-        _rule_out(reason, length > 0.0, Reason.NO_MODE)
-    return plan_moves(
-        displacement, machine, profile,
-        reason=reason, progress=progress, speed=rapids.speed, lone=rapids.lone,
-    )  # fmt: skip
-
-
-def _rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -> None:
+def rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -> None:
     """Give a reason to the moves that have none yet."""
     reason[where & (reason == CERTAIN)] = REASONS.index(why)
 
@@ -243,6 +159,8 @@ class _Planner:
             machine, self.modes, self.share, progress=progress, speed=cap, lone=alone
         )
         self.limits, self.conventional = self.task.limits, self.task.conventional
+        self.judged: tuple[Array, Array] | None = None
+        """What the profiles' moves leave at worst over the band, and what today's do [mm]."""
 
     def run(self) -> Plans:
         """Design every profile, then gather the moves."""
@@ -288,8 +206,7 @@ class _Planner:
                 f"the time of profile {self.profile} follows from its shaper",
                 "leave out --time, or choose another profile",
             )
-        profiles = self.conventional
-        modes = self.modes
+        profiles, modes = self.conventional, self.modes
         if len(modes.poles):
             frequency = np.abs(modes.poles[self.task.objective.dominant(profiles)]) / (2.0 * np.pi)
             profiles = joined(
@@ -352,17 +269,25 @@ class _Planner:
         """A profile of unchanged time; longer only where the limits leave no room."""
         profiles, worst = DESIGNS[self.profile](self.task.after(counts))
         stays_conventional = np.zeros(len(counts), dtype=bool)
-        fits = self._within_limits(self.conventional)
         if self.time is None:
-            reference = self._worst_of(self.task.after(counts), self.conventional)
-            keep = fits & (worst >= reference - self._worthwhile())
-            profiles = profiles.replaced(keep, self.conventional.take(keep))
-            worst = np.where(keep, reference, worst)
-            stays_conventional |= keep
+            reference = worst_in_band(self.task, self.conventional)
+            fits = self._within_limits(self.conventional)
+            # Where only today's rapid is within the limits, nothing is better, and none is longer.
+            alone = fits & ~np.isfinite(worst)
+            worst = np.where(alone, reference, worst)
             profiles, counts, worst = self._extend(profiles, counts, worst)
-            # A trapezoid cannot be written: where the design shakes more, it is left alone.
-            worse = ~fits & np.isfinite(worst) & (worst > reference)
-            self._rule_out_profiles(worse, Reason.NOT_BETTER)
+            useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
+            if self.machine.positioning != "linear":
+                # Axes that run on their own: one may keep what it has while another gains.
+                in_time = self.conventional.total <= counts * self.interval * (1.0 + 1e-9)
+                stays_conventional = useless & fits & (alone | in_time)
+                profiles = profiles.replaced(
+                    stays_conventional, self.conventional.take(stays_conventional)
+                )
+                worst, reference = self._at_arrival(profiles, worst)
+                useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
+            self._rule_out_profiles(useless, Reason.NOT_BETTER)
+            self.judged = worst, reference
         elif not np.isfinite(worst).all():
             row = int(np.nonzero(~np.isfinite(worst))[0][0])
             limits = tuple(limit[row : row + 1] for limit in self.limits)
@@ -370,10 +295,17 @@ class _Planner:
             raise time_error(self.machine, self.share[row], limits, total, self.profile)
         return profiles, counts, np.isfinite(worst), stays_conventional
 
-    def _worst_of(self, task: Task, profiles: Profiles) -> Array:
-        """Largest residual displacement of profiles, as the profile judges its own [mm]."""
-        nominal = task.objective.of(profiles)
-        return worst_in_band(task, profiles) if self.profile == "optimal" else nominal
+    def _at_arrival(self, profiles: Profiles, worst: Array) -> tuple[Array, Array]:
+        """What the profiles of a move leave together, and today's; of each profile [mm]."""
+        _, move = np.unique(self.move, return_inverse=True)
+        fits = np.ones(len(self.reason), dtype=bool)
+        fits[self.move[~np.isfinite(worst)]] = False
+        band = self.machine.design.band
+        left, today = (
+            worst_at_arrival(self.modes, band, move, self.share, own)[move]
+            for own in (profiles, self.conventional)
+        )
+        return np.where(fits[self.move], left, np.inf), today
 
     def _extend(
         self, profiles: Profiles, counts: NDArray[np.int64], worst: Array
@@ -400,26 +332,24 @@ class _Planner:
             counts[rows] += 1
         return profiles, counts, worst
 
-    def _worthwhile(self) -> Array:
-        """The gain below which the conventional profile stays: what rounding may add to it [mm].
-
-        The optimum promises the least there is; where rounding spoils it, its stream falls back.
-        """
-        if self.profile == "optimal":
-            return np.full(len(self.share), TIE)
+    def _worthwhile(self, worst: Array, reference: Array) -> NDArray[np.bool_]:
+        """Whether a gain is more than what judging at single frequencies and rounding may hide."""
         resolution = np.array(
             [self.machine.axis(a).resolution if a in self.machine.axis_names else 0.0 for a in AXES]
         )
         excited = np.abs(self.modes.participation) * np.abs(self.modes.poles)[:, np.newaxis]
         each = np.where(self.share != 0.0, 1.0, 0.0) @ (excited * resolution).T * self.interval
         noise: Array = np.minimum(each, 1.0).max(axis=1, initial=0.0)
-        return noise
+        # The optimum promises the least there is; what rounding spoils of it, its stream tells.
+        noise = np.full(len(noise), TIE) if self.profile == "optimal" else noise
+        better: NDArray[np.bool_] = worst < (1.0 - LEAST_GAIN) * reference - noise
+        return better
 
     def _rule_out_profiles(self, where: NDArray[np.bool_], why: Reason) -> None:
         """Give a reason to the moves of these profiles."""
         moves = np.zeros(len(self.reason), dtype=bool)
         moves[self.move[where]] = True
-        _rule_out(self.reason, moves, why)
+        rule_out(self.reason, moves, why)
 
     def _plans(
         self, profiles: Profiles, counts: NDArray[np.int64], stays_conventional: NDArray[np.bool_]
@@ -427,6 +357,9 @@ class _Planner:
         """The profiles of planned moves, and the moves' own columns."""
         conventional_time = np.zeros(len(self.reason))
         np.maximum.at(conventional_time, self.move, self.conventional.total)
+        in_band = np.full((2, len(self.reason)), np.nan)
+        if self.judged is not None:
+            in_band[:, self.move] = self.judged
         keep = np.nonzero(self.reason[self.move] == CERTAIN)[0]
         move_counts = np.zeros(len(self.reason), dtype=np.int64)
         np.maximum.at(move_counts, self.move[keep], counts[keep])
@@ -445,4 +378,7 @@ class _Planner:
             profile_counts=counts[keep],
             stays_conventional=stays_conventional[keep],
             designed=self.profile,
+            worst_in_band=in_band[0],
+            conventional_in_band=in_band[1],
+            has_to_gain=self.profile in DESIGNS and self.time is None and self.T1 is None,
         )

@@ -122,9 +122,15 @@ class Plans:
     profile_counts : ndarray of int, shape (l,)
         T_SUM of each profile. [intervals]
     stays_conventional : ndarray of bool, shape (l,)
-        The profile is the conventional one, because none is better.
+        The profile is the conventional one: because it was asked for, or because this axis, which
+        runs on its own, gains nothing by another.
     designed : str
         Name of all other profiles.
+    worst_in_band, conventional_in_band : ndarray, shape (n,)
+        Largest residual displacement with every frequency anywhere within `design.band`, of the
+        designed profiles and of the control's own rapid; NaN where they were not compared. [mm]
+    has_to_gain : bool
+        A stream that leaves more than the control's own rapid does is not written.
     """
 
     machine: Machine
@@ -141,6 +147,9 @@ class Plans:
     profile_counts: NDArray[np.int64]
     stays_conventional: NDArray[np.bool_]
     designed: str
+    worst_in_band: Array
+    conventional_in_band: Array
+    has_to_gain: bool
 
     def __len__(self) -> int:
         return len(self.reason)

@@ -20,8 +20,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.arrival import arrival_response
-from gcodejerk.planning.designs import Task
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans
+from gcodejerk.planning.task import Task
 from gcodejerk.reasons import REASONS, Reason
 
 KNOWN = tuple(

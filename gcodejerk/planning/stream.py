@@ -4,14 +4,15 @@ This module owns the step from profiles to written numbers: sampling at the inte
 whole steps, and the residual of exactly what was rounded. It works on batches, so that a program
 with a hundred thousand rapids needs no more memory than one with a thousand.
 
-Rule: a report speaks of the stream as written. Where rounding has made a design worse than the
-conventional profile, the conventional profile is written instead.
+Rule: a report speaks of the stream as written, and as written it has to be better: where a stream
+leaves more than the control's own rapid does, at the worst frequencies within the band, its move is
+taken out of the plan.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,9 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.motion import (
     Grid,
+    Objective,
     Profiles,
+    grouped,
     knots_response,
     residual_displacement,
     round_positions,
@@ -30,6 +33,7 @@ from gcodejerk.motion import (
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.planning.plans import Plans
+from gcodejerk.reasons import REASONS, Reason
 
 BATCH_SAMPLES = 400_000
 """Samples of a batch, about; each needs some 100 bytes while it is worked on."""
@@ -92,8 +96,9 @@ class Batch:
     residual, conventional_residual : ndarray, shape (b, m)
         Displacement envelope of each mode at arrival, of the stream as written and of the
         controller's own rapid sampled at the interval. [mm]
-    stays_conventional : ndarray of bool, shape (b,)
-        The stream is the conventional profile.
+    worst_in_band : ndarray, shape (b,)
+        The largest that any mode keeps with every frequency anywhere within `design.band`, with
+        what rounding may add; NaN where the plans do not say. [mm]
     profiles : Profiles
         The profiles that are written, one for each of the plans' profiles of these moves.
     """
@@ -108,7 +113,7 @@ class Batch:
     velocity: dict[int, Array]
     residual: Array
     conventional_residual: Array
-    stays_conventional: NDArray[np.bool_]
+    worst_in_band: Array
     profiles: Profiles
 
     def __len__(self) -> int:
@@ -151,7 +156,8 @@ def make_streams(plans: Plans, number_format: NumberFormat, stride: int) -> Iter
     ------
     list of Batch
         The moves of a window, each once; windows come in the order of the moves. A batch is a
-        matrix as wide as its longest move, so those of a window hold moves of like duration.
+        matrix as wide as its longest move, so those of a window hold moves of like duration. Moves
+        whose stream is not better than today's rapid are in none, and `plans.reason` says so.
     """
     planned = np.nonzero(plans.planned)[0]
     samples = np.cumsum(plans.counts[planned])
@@ -162,37 +168,27 @@ def make_streams(plans: Plans, number_format: NumberFormat, stride: int) -> Iter
         window = planned[begin:end]
         # Of like duration: within a factor of two.
         octave = np.frexp(plans.counts[window].astype(float))[1]
-        yield [
-            _make_batch(plans, moves, number_format.take(moves), stride)
+        made = (
+            _make_batch(plans, moves, number_format, stride)
             for moves in (window[octave == k] for k in np.unique(octave))
-        ]
+        )
+        if batches := [batch for batch in made if len(batch)]:
+            yield batches
         begin = end
 
 
 def _make_batch(
     plans: Plans, moves: NDArray[np.int64], number_format: NumberFormat, stride: int
 ) -> Batch:
-    """One batch; a move that rounding made worse than the conventional profile gets that one."""
-    rows = np.concatenate([np.arange(*_bounds(plans, move)) for move in moves]).astype(np.int64)
-    row_of = np.searchsorted(moves, plans.move[rows])
-    # Of axes that run on their own, some may keep the conventional profile: the move has not kept
-    # it.
-    stays_conventional = np.ones(len(moves), dtype=bool)
-    np.logical_and.at(stays_conventional, row_of, plans.stays_conventional[rows])
-    made = _Maker(plans, moves, rows, row_of, number_format, stride)
-    conventional = made.conventional_residual()
-    batch = made.batch(plans.profiles.take(rows), stays_conventional, conventional)
-    worst = plans.modes.grouped(batch.residual).max(axis=1, initial=0.0)
-    reference = plans.modes.grouped(conventional).max(axis=1, initial=0.0)
-    worse = (worst > reference) & made.writable(plans.conventional.take(rows)) & ~stays_conventional
-    if worse.any():
-        profiles = plans.profiles.take(rows)
-        again = worse[row_of]
-        profiles = profiles.replaced(again, plans.conventional.take(rows[again]))
-        batch = made.batch(profiles, stays_conventional | worse, conventional)
-    # What is written as the conventional profile is the conventional profile, rounding included.
-    same = batch.stays_conventional[:, np.newaxis]
-    return replace(batch, conventional_residual=np.where(same, batch.residual, conventional))
+    """One batch, without the moves that it would make worse; these are ruled out."""
+    batch = _Maker(plans, moves, number_format.take(moves), stride).batch()
+    if not plans.has_to_gain:
+        return batch
+    worse = batch.worst_in_band > plans.conventional_in_band[moves]
+    if not worse.any():
+        return batch
+    plans.reason[moves[worse]] = REASONS.index(Reason.NOT_BETTER)
+    return _make_batch(plans, moves[~worse], number_format, stride)
 
 
 def _bounds(plans: Plans, move: int) -> tuple[int, int]:
@@ -202,23 +198,23 @@ def _bounds(plans: Plans, move: int) -> tuple[int, int]:
 
 
 class _Maker:
-    """The parts of a batch that do not depend on which profile is written."""
+    """What is needed to make a batch."""
 
     def __init__(
-        self,
-        plans: Plans,
-        moves: NDArray[np.int64],
-        rows: NDArray[np.int64],
-        row_of: NDArray[np.int64],
-        number_format: NumberFormat,
-        stride: int,
+        self, plans: Plans, moves: NDArray[np.int64], number_format: NumberFormat, stride: int
     ) -> None:
-        self.plans, self.moves, self.rows, self.row_of = plans, moves, rows, row_of
-        self.share = plans.share[rows]
+        self.plans, self.moves = plans, moves
+        bounds = [np.arange(*_bounds(plans, move)) for move in moves]
+        self.rows = np.concatenate([np.zeros(0, np.int64), *bounds]).astype(np.int64)
+        self.row_of = np.searchsorted(moves, plans.move[self.rows])
+        self.share = plans.share[self.rows]
         self.axes = [a for a in range(len(AXES)) if self.share[:, a].any()]
         self.modes = plans.modes
         self.interval = plans.machine.interval
         self.grid = Grid.every(plans.counts[moves], stride, self.interval)
+        # Rounding is kept away from the modes' own frequencies: it is loudest at the band's ends.
+        every = Objective(self.modes.poles, self.modes.participation.T, self.modes.group)
+        self.around = every.in_band(plans.machine.design.band, 0.0, fewest=1)
         size = np.abs(plans.displacement[moves])
         fine = (size > 0.0) & (size < FEW_STEPS * number_format.step) & number_format.finer
         self.fine = fine
@@ -229,38 +225,16 @@ class _Maker:
             number_format.finer,
         )
 
-    def writable(self, profiles: Profiles) -> NDArray[np.bool_]:
-        """Whether the moves' profiles, all of them, fit the time and keep the limits of jerk."""
-        out = np.ones(len(self.moves), dtype=bool)
-        room = self.grid.counts[self.row_of] * self.interval * (1.0 + 1e-9)
-        np.logical_and.at(out, self.row_of, profiles.total <= room)
-        jerk = profiles.peak_jerk
-        finite = np.isfinite(jerk)
-        np.logical_and.at(out, self.row_of, finite)
-        jerk = np.where(finite, jerk, 0.0)
-        for axis in self.plans.machine.axes:
-            size = np.abs(self.share[:, AXES.index(axis.name)])
-            np.logical_and.at(out, self.row_of, jerk * size <= axis.limit.jerk * (1.0 + 1e-9))
-        return out
-
-    def conventional_residual(self) -> Array:
-        """Of the controller's own rapid, sampled at the interval, shape (b, m) [mm]."""
-        profiles = self.plans.conventional.take(self.rows)
-        counts = whole_intervals(profiles.total, self.interval)
-        longest = np.zeros(len(self.moves), dtype=np.int64)
-        np.maximum.at(longest, self.row_of, counts)
-        return residual_displacement(self._response(profiles, longest), self.modes.poles)
-
-    def batch(
-        self, profiles: Profiles, stays_conventional: NDArray[np.bool_], conventional: Array
-    ) -> Batch:
+    def batch(self) -> Batch:
         """Sample, round, and see what is left in the modes."""
+        profiles = self.plans.profiles.take(self.rows)
         moments = self.grid.knots[self.row_of]
         unit, speed = sample_profiles(profiles, moments, self.interval)
         exact: dict[int, Array] = {}
         whole: dict[int, NDArray[np.int64]] = {}
         velocity: dict[int, Array] = {}
-        response = self._response(profiles, self.grid.counts)
+        written = self._response(profiles, self.grid.counts)
+        noise = np.zeros((len(self.moves), len(self.around.poles)), dtype=np.complex128)
         for axis in self.axes:
             # Where an axis stands still its position may be unknown, and nothing is written of it.
             moving = self.plans.displacement[self.moves, axis] != 0.0
@@ -279,8 +253,15 @@ class _Maker:
             error = np.where(
                 begun & (self.grid.knots < self.grid.counts[:, np.newaxis]), error, 0.0
             )
-            noise = knots_response(error * moving[:, np.newaxis], self.grid, self.modes.poles)
-            response = response + noise * self.modes.participation[:, axis]
+            error = error * moving[:, np.newaxis]
+            for response, poles, participation in (
+                (written, self.modes.poles, self.modes.participation[:, axis]),
+                (noise, self.around.poles, self.around.weights[axis]),
+            ):
+                felt = participation != 0.0
+                found = knots_response(error, self.grid, poles[felt])
+                response[:, felt] += found * participation[felt]
+        noise_in_band = grouped(residual_displacement(noise, self.around.poles), self.around.group)
         return Batch(
             moves=self.moves,
             plans=self.plans,
@@ -290,11 +271,20 @@ class _Maker:
             number_format=self.number_format,
             fine=self.fine,
             velocity=velocity,
-            residual=residual_displacement(response, self.modes.poles),
-            conventional_residual=conventional,
-            stays_conventional=stays_conventional,
+            residual=residual_displacement(written, self.modes.poles),
+            conventional_residual=self._conventional_residual(),
+            worst_in_band=self.plans.worst_in_band[self.moves]
+            + noise_in_band.max(axis=1, initial=0.0),
             profiles=profiles,
         )
+
+    def _conventional_residual(self) -> Array:
+        """Of the controller's own rapid, sampled at the interval, shape (b, m) [mm]."""
+        profiles = self.plans.conventional.take(self.rows)
+        counts = whole_intervals(profiles.total, self.interval)
+        longest = np.zeros(len(self.moves), dtype=np.int64)
+        np.maximum.at(longest, self.row_of, counts)
+        return residual_displacement(self._response(profiles, longest), self.modes.poles)
 
     def _displaced(self, unit: Array, axis: int) -> Array:
         """Sum of an axis's profiles times its share of each, shape (b, k)."""
@@ -321,10 +311,8 @@ class Residuals:
         shape = (len(plans), len(plans.modes.poles))
         self.residual = np.full(shape, np.nan)
         self.conventional = np.full(shape, np.nan)
-        self.stays_conventional = np.zeros(len(plans), dtype=bool)
 
     def add(self, batch: Batch) -> None:
         """Note one batch."""
         self.residual[batch.moves] = batch.residual
         self.conventional[batch.moves] = batch.conventional_residual
-        self.stays_conventional[batch.moves] = batch.stays_conventional

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
@@ -39,14 +38,13 @@ class Records:
     def __init__(
         self,
         plans: Plans,
-        stays_conventional: NDArray[np.bool_],
         residual: Array,
         conventional: Array,
         limit: Array | None = None,
         deviation: Array | None = None,
         rest: Left | None = None,
     ) -> None:
-        self.plans, self.stays_conventional = plans, stays_conventional
+        self.plans, self.profiles = plans, plans.profiles
         self.deviation = np.zeros(len(plans)) if deviation is None else deviation
         self.limit = np.full(len(plans), np.nan) if limit is None else limit
         modes = plans.modes
@@ -57,8 +55,6 @@ class Records:
         usual = whole_intervals(plans.conventional_time, interval)
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
         self.extension = extra * interval
-        written = stays_conventional[plans.move] if len(plans) else np.zeros(0, dtype=bool)
-        self.profiles = plans.profiles.replaced(written, plans.conventional.take(written))
         self.rest = rest
         self.oscillators = (residual, conventional)
         self.peaks = (
@@ -129,11 +125,10 @@ class Records:
         }
         if planned:
             of_move = plans.profiles_of(row)
-            stays = bool(self.stays_conventional[row])
             record |= {
                 "time": number(float(plans.counts[row]) * plans.machine.interval),
                 "extension": number(float(self.extension[row])),
-                "profile": "conventional" if stays else plans.profile_name(of_move.start),
+                "profile": plans.designed,
                 "segments": self._segments(row, of_move),
                 "peak": self._peak(of_move),
                 "residual": self._residual(row),
@@ -207,7 +202,6 @@ def summary_of(result: Result) -> Record:
     """The summary of a report, without the records of its rapids."""
     records = Records(
         result.plans,
-        result.stays_conventional,
         result.residual,
         result.conventional_residual,
         rest=result.rest,
@@ -250,7 +244,6 @@ def process_record(
     plans = result.plans
     records = Records(
         plans,
-        result.stays_conventional,
         result.residual,
         result.conventional_residual,
         limit,
@@ -284,7 +277,6 @@ def move_record(plan: Plan) -> Record:
     deviation = path_deviation(plan.batch)
     records = Records(
         plan.plans,
-        plan.stays_conventional,
         plan.residual,
         plan.conventional_residual,
         limit,
@@ -314,12 +306,8 @@ def move_record(plan: Plan) -> Record:
 def conventional_motion(plan: Plan) -> Record:
     """Time, segments and peaks of the controller's own G0, as the `motion` of a record has them."""
     plans = plan.plans
-    usual = replace(
-        plans,
-        profiles=plans.conventional,
-        stays_conventional=np.ones_like(plans.stays_conventional),
-    )
-    records = Records(usual, np.ones(1, dtype=bool), plan.residual, plan.conventional_residual)
+    usual = replace(plans, profiles=plans.conventional)
+    records = Records(usual, plan.residual, plan.conventional_residual)
     motion = records.motion(0) | {"time": number(plan.conventional_time)}
     if isinstance(motion["segments"], list):
         motion["segments"] = _scaled(plans.conventional.segments(0), plan.length, 0.0)

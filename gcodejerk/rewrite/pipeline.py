@@ -25,8 +25,8 @@ from gcodejerk.machine import LINUXCNC, Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
-from gcodejerk.planning.plan import plan_rapids
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
 from gcodejerk.rewrite.expanded import (
@@ -215,7 +215,6 @@ def _process(
         form=settings.form,
         residual=collected.residual,
         conventional_residual=collected.conventional,
-        stays_conventional=collected.stays_conventional,
         deviation=deviation,
         rest=left_alone(program.rapids, plans),
         verification=verification,

@@ -43,7 +43,6 @@ class RapidResult:
 def rapid_results(
     program: Program,
     plans: Plans,
-    stays_conventional: NDArray[np.bool_],
     residual: Array,
     conventional: Array,
 ) -> tuple[RapidResult, ...]:
@@ -55,8 +54,6 @@ def rapid_results(
         n rapids.
     plans : Plans
         Row i is rapid i.
-    stays_conventional : ndarray of bool, shape (n,)
-        The stream is the conventional profile.
     residual, conventional : ndarray, shape (n, m)
         Displacement of each mode, NaN where not planned. [mm]
 
@@ -74,14 +71,13 @@ def rapid_results(
         rewritten = bool(plans.reason[row] == CERTAIN)
         usual = float(plans.conventional_time[row])
         moved = np.flatnonzero(plans.displacement[row]).tolist()
-        stays = bool(stays_conventional[row])
         out.append(
             RapidResult(
                 line=line,
                 rewritten=rewritten,
                 reason=None if rewritten else str(REASONS[plans.reason[row]]),
                 displacement={AXES[k]: float(plans.displacement[row, k]) for k in moved},
-                profile=("conventional" if stays else plans.designed) if rewritten else None,
+                profile=plans.designed if rewritten else None,
                 time=float(plans.counts[row]) * interval if rewritten else None,
                 conventional_time=usual if usual > 0.0 else None,
                 residual=float(worst[row]) if rewritten else None,
@@ -106,8 +102,6 @@ class Result:
         The emitter that wrote.
     residual, conventional_residual : ndarray, shape (n, m)
         Displacement envelopes of every rapid and mode, NaN where not planned. [mm]
-    stays_conventional : ndarray of bool, shape (n,)
-        The stream is the conventional profile: nothing better was found.
     deviation : ndarray, shape (n,)
         Under independent positioning, how far the path leaves the control's own, at most. [mm]
     rest : Left
@@ -134,7 +128,6 @@ class Result:
     form: str
     residual: Array
     conventional_residual: Array
-    stays_conventional: NDArray[np.bool_]
     deviation: Array
     rest: Left
     verification: Verification | None
@@ -150,10 +143,7 @@ class Result:
     @property
     def rapids(self) -> tuple[RapidResult, ...]:
         """Every rapid of the program, one record each, in the order of the file."""
-        return rapid_results(
-            self.program, self.plans, self.stays_conventional, self.residual,
-            self.conventional_residual,
-        )  # fmt: skip
+        return rapid_results(self.program, self.plans, self.residual, self.conventional_residual)
 
     @property
     def planned(self) -> int:

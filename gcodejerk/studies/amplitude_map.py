@@ -32,8 +32,8 @@ from gcodejerk.motion.profiles.conditions import (
     limit_use,
 )
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.planning.designs import Task
 from gcodejerk.planning.plans import Modes
+from gcodejerk.planning.task import Task
 
 ALL = "all"
 """In place of a mode: the worst displacement over all of them."""

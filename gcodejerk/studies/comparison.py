@@ -28,14 +28,15 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.motion.shapers import SHAPERS, shaped_profile
 from gcodejerk.planning.arrival import arrival_response, worst_in_bands
-from gcodejerk.planning.designs import Task, condition1, condition2, known_limits
+from gcodejerk.planning.designs import condition1, condition2, known_limits
 from gcodejerk.planning.move import check_time, displacement_row
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
-from gcodejerk.reasons import CERTAIN, REASONS
+from gcodejerk.planning.task import Task
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
-DESIGNED = ("condition3", "cascade", "optimal", "shortest")
+DESIGNED = ("condition3", "symmetric", "cascade", "optimal", "shortest")
 """Profiles that the planner makes, within the limits."""
 CONTENDERS = ("conventional", "condition1", "condition2", *DESIGNED, *SHAPERS)
 """Everyone, in that order."""
@@ -287,6 +288,10 @@ class _Field:
                 refused.append(error)
                 self.absent[name] = error.problem
                 continue
+            if plans.reason[0] == REASONS.index(Reason.NOT_BETTER):
+                self.profiles[name] = self.conventional
+                self.notes[name] = "no better profile within the limits: the rapid stays as it is"
+                continue
             if plans.reason[0] != CERTAIN:
                 self.absent[name] = str(REASONS[plans.reason[0]])
                 continue
@@ -294,14 +299,12 @@ class _Field:
             self.notes[name] = self._note(plans, name)
         # With a time of the user's choice: if nobody makes it, the time is what is wrong.
         if refused and not any(
-            name in self.profiles for name in ("condition3", "cascade", "optimal")
+            name in self.profiles for name in ("condition3", "symmetric", "cascade", "optimal")
         ):
             raise refused[0]
 
     def _note(self, plans: Plans, name: str) -> str:
         """What the planner had to do about it."""
-        if plans.stays_conventional.all():
-            return "no better law within the limits: the conventional one is kept"
         extra = int(plans.counts[0] - self.task.counts.max())
         if name != "shortest" and extra > 0:
             return f"{1e3 * extra * self.machine.interval:g} ms longer to keep the limits"
@@ -355,6 +358,9 @@ class _Field:
             profile_counts=counts,
             stays_conventional=np.zeros(n * each, dtype=bool),
             designed=self.machine.design.profile,
+            worst_in_band=np.full(n, np.nan),
+            conventional_in_band=np.full(n, np.nan),
+            has_to_gain=False,
         )
 
     def _candidate(self, name: str, limit: float) -> Candidate:

@@ -169,12 +169,18 @@ class Output:
 OUTPUTS = {}
 
 
-# The rapids of a machine without rapid.jerk are trapezoids, which are no stream.
+# The rapids of a machine without rapid.jerk are trapezoids, which are no stream; on the others
+# Conditions I and II are no better than they.
 WITH_STREAMS = [
     (name, profile)
     for name, machine in SHIPPED.items()
     for profile in WRITTEN
-    if profile != "conventional" or np.isfinite(machine.axis("Z").rapid.jerk)
+    if profile
+    not in (
+        ("condition1", "condition2")
+        if np.isfinite(machine.axis("Z").rapid.jerk)
+        else ("conventional",)
+    )
 ]
 
 

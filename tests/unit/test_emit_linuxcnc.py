@@ -16,8 +16,15 @@ axes:
     resolution: 0.001
     rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}
     modes: [{frequency: 22, damping: 0.02}]
-  Z: {resolution: 0.001, rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}}
-  A: {wrap: none, resolution: 0.01, rapid: {velocity: 90, acceleration: 2000, jerk: 5.0e+4}}
+  Z:
+    resolution: 0.001
+    rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}
+    modes: [{frequency: 30, damping: 0.02}]
+  A:
+    wrap: none
+    resolution: 0.01
+    rapid: {velocity: 90, acceleration: 2000, jerk: 5.0e+4}
+    modes: [{frequency: 30, damping: 0.02}]
 program: {start: {X: 0, Z: 0, A: 0}}
 """
 MACHINE = Machine.loads(TEXT)

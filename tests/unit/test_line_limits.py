@@ -20,7 +20,7 @@ HEADS = {
     "grbl": ("G21 G17 G90 G94 F100", ""),
     "fanuc": ("G21 G17 G40 G90 G94 G64 F100.", ""),
     "siemens": ("G710 G17 G40 G90 G94 G64 F100", ""),
-    "marlin": ("G21\nG90\nG0 X0 Y0 Z0 F3000", "marlin"),
+    "marlin": ("G21\nG90\nG0 X0 Y0 Z0 F30000", "marlin"),
 }
 
 

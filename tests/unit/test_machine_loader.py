@@ -85,7 +85,7 @@ def test_the_example_of_the_contract_is_read_as_it_stands():
 def test_defaults_of_design_and_program_are_those_of_the_contract():
     machine = Machine.loads(MILL)
     design = machine.design
-    assert (design.profile, design.band, design.tolerance) == ("condition3", 0.05, 0.001)
+    assert (design.profile, design.band, design.tolerance) == ("condition3", 0.1, 0.001)
     assert (design.minimum_length, design.max_extension) == (0.05, 0.1)
     assert (machine.program.start, machine.program.offsets) == ({}, {})
     assert (machine.program.tool_lengths, machine.program.startup) == ({}, "")

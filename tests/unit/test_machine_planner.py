@@ -7,9 +7,9 @@ import pytest
 
 from gcodejerk.machine import BELL, LINUXCNC, Machine, MachineFileError, machine_yaml
 from gcodejerk.motion import mode_poles, profiles_response
-from gcodejerk.planning.designs import Task
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plans import Modes
+from gcodejerk.planning.task import Task
 from gcodejerk.rewrite.pipeline import process
 
 HEAD = "interval: 0.001\npositioning: linear\n"

@@ -34,7 +34,7 @@ INDEPENDENT = Machine.loads(
     "interval: 0.001\npositioning: independent\naxes:\n"
     "  X: {resolution: 0.001, rapid: {velocity: 500, acceleration: 4000, jerk: 2.0e+5}}\n"
     "  Z: {resolution: 0.001, rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}}\n"
-    "modes: [{frequency: 13, damping: 0.01, participation: {X: 0.2, Z: -0.3}}]\n"
+    "modes: [{frequency: 33, damping: 0.01, participation: {X: 0.2, Z: -0.3}}]\n"
 )
 X, Z = AXES.index("X"), AXES.index("Z")
 
@@ -73,8 +73,7 @@ def one_batch(displacement, machine=MACHINE, stride=1, profile=None, **number_fo
     """All planned moves in one batch, short ones behind much padding."""
     plans = plan_moves(displacement, machine, profile)
     moves = np.nonzero(plans.planned)[0]
-    number_format = spelling_of(displacement, **number_format).take(moves)
-    return stream._make_batch(plans, moves, number_format, stride)
+    return stream._make_batch(plans, moves, spelling_of(displacement, **number_format), stride)
 
 
 @pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
@@ -83,21 +82,21 @@ def test_points_are_whole_steps_between_exact_ends(machine, stride):
     displacement = drawn_moves(30)
     start = np.random.default_rng(2).uniform(-9, 9, displacement.shape)
     batch = one_batch(displacement, machine, stride, start=start)
-    assert batch.moves.tolist() == list(range(30))
-    for row in range(30):
+    assert len(batch) > 20
+    for row, move in enumerate(batch.moves):
         t, q = batch.positions(row)
-        np.testing.assert_allclose(q[0], start[row], atol=0)
-        np.testing.assert_allclose(q[-1], start[row] + displacement[row], atol=0)
+        np.testing.assert_allclose(q[0], start[move], atol=0)
+        np.testing.assert_allclose(q[-1], start[move] + displacement[move], atol=0)
         assert t[0] == 0.0
-        assert t[-1] == pytest.approx(batch.plans.counts[row] * 0.001)
+        assert t[-1] == pytest.approx(batch.plans.counts[move] * 0.001)
         assert np.diff(t).min() >= stride * 0.001 - 1e-9
         for axis in (X, Z):
-            if displacement[row, axis] == 0.0:
-                assert (q[:, axis] == start[row, axis]).all()
+            if displacement[move, axis] == 0.0:
+                assert (q[:, axis] == start[move, axis]).all()
                 continue
             steps = q[1:-1, axis] / 0.001
             np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
-            assert (np.diff(q[:, axis]) * np.sign(displacement[row, axis]) >= -1e-9).all()
+            assert (np.diff(q[:, axis]) * np.sign(displacement[move, axis]) >= -1e-9).all()
 
 
 @pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
@@ -105,7 +104,8 @@ def test_the_residual_is_that_of_the_points_as_written(machine):
     displacement = drawn_moves(12, seed=5)
     batch = one_batch(displacement, machine, start=0.00037)
     modes = batch.plans.modes
-    for row in range(12):
+    assert len(batch) > 8
+    for row in range(len(batch)):
         t, q = batch.positions(row)
         driven = q @ modes.participation.T
         for m, pole in enumerate(modes.poles):
@@ -117,9 +117,9 @@ def test_the_conventional_residual_is_that_of_the_controller_s_samples():
     displacement = drawn_moves(12, seed=6)
     batch = one_batch(displacement, INDEPENDENT)
     plans, modes = batch.plans, batch.plans.modes
-    assert np.count_nonzero(~batch.stays_conventional) >= 6
-    for row in range(12):
-        profiles = list(plans.profiles_of(row))
+    assert len(batch) >= 6
+    for row, move in enumerate(batch.moves):
+        profiles = list(plans.profiles_of(move))
         counts = [int(np.ceil(plans.conventional.total[k] / 0.001 - 1e-6)) for k in profiles]
         moments = np.arange(max(counts) + 1)
         driven = np.zeros(len(moments))
@@ -129,16 +129,13 @@ def test_the_conventional_residual_is_that_of_the_controller_s_samples():
             )
             driven += unit[0] * (plans.share[k] @ modes.participation[0])
         D = np.abs(polyline_response(moments * 1e-3, driven, modes.poles)) / modes.poles.imag
-        if not batch.stays_conventional[row]:
-            assert float(batch.conventional_residual[row, 0]) == pytest.approx(
-                float(D[0]), rel=1e-7
-            )
+        assert float(batch.conventional_residual[row, 0]) == pytest.approx(float(D[0]), rel=1e-7)
 
 
 def test_velocities_are_those_of_the_profile():
     batch = one_batch(drawn_moves(10, seed=7))
     for axis, velocity in batch.velocity.items():
-        for row in range(10):
+        for row in range(len(batch)):
             t, _ = batch.positions(row)
             n = len(t)
             q, v = batch.exact[axis][row, -n:], velocity[row, -n:]
@@ -156,10 +153,11 @@ def test_many_small_batches_are_the_same_as_one(machine, samples, monkeypatch):
     monkeypatch.setattr(stream, "BATCH_SAMPLES", samples)
     parts = streams(displacement, machine, 2)
     assert len(parts) > 3
-    if samples == 1:
-        assert [len(part) for part in parts] == [1] * 24
+    assert samples > 1 or {len(part) for part in parts} == {1}
     made = by_move(parts)
-    assert sorted(made) == sorted(whole) == [k for k in range(25) if k != 4]
+    assert sorted(made) == sorted(whole)
+    assert len(made) > 15
+    assert 4 not in made
     for move, (part, k) in made.items():
         other, row = whole[move]
         (t, q), (expected_t, expected_q) = part.positions(k), other.positions(row)
@@ -169,7 +167,7 @@ def test_many_small_batches_are_the_same_as_one(machine, samples, monkeypatch):
         np.testing.assert_allclose(
             part.conventional_residual[k], other.conventional_residual[row], rtol=1e-6
         )
-        assert part.stays_conventional[k] == other.stays_conventional[row]
+        assert part.worst_in_band[k] == pytest.approx(other.worst_in_band[row], rel=1e-6)
 
 
 def test_a_window_holds_about_as_many_samples_as_it_may(monkeypatch):
@@ -216,7 +214,8 @@ def test_increments_are_counted_from_the_start():
     displacement = drawn_moves(5, seed=9)
     start = np.full(displacement.shape, 1.23456)
     batch = one_batch(displacement, start=start, origin=start)
-    for row in range(5):
+    assert len(batch) > 2
+    for row in range(len(batch)):
         _, q = batch.positions(row)
         for axis in (X, Z):
             steps = (q[1:-1, axis] - 1.23456) / 0.001
@@ -235,35 +234,59 @@ def test_an_axis_that_stands_at_an_unknown_place_spoils_nothing():
     assert np.isnan(q[:, Z]).all()
 
 
-def test_where_rounding_spoils_a_design_the_conventional_profile_is_written():
+def test_a_move_that_rounding_spoils_is_taken_out_of_the_plan():
     # Steps of 1 mm: whatever was designed, the rounding decides, and never for the worse.
     displacement = np.zeros((40, len(AXES)))
     displacement[:, Z] = np.linspace(9.0, 60.0, 40)
-    batch = one_batch(displacement, step=1.0)
-    design_kept = batch.plans.stays_conventional
-    fallen_back = batch.stays_conventional & ~design_kept
-    assert fallen_back.any(), "no case of the fallback among these moves"
-    for row in np.nonzero(fallen_back)[0]:
-        assert batch.profiles.segments(row) == batch.plans.conventional.segments(row)
-        np.testing.assert_array_equal(batch.residual[row], batch.conventional_residual[row])
-    stays_conventional = batch.stays_conventional
-    assert (
-        batch.residual[~stays_conventional].max(axis=1)
-        <= batch.conventional_residual[~stays_conventional].max(axis=1)
-    ).all()
+    plans = plan_moves(displacement, MACHINE)
+    assert plans.planned.all()
+    (batches,) = make_streams(plans, spelling_of(displacement, step=1.0), 1)
+    written = np.concatenate([batch.moves for batch in batches])
+    assert 0 < len(written) < 40
+    assert sorted(written) == np.flatnonzero(plans.planned).tolist()
+    assert {REASONS[r] for r in plans.reason[~plans.planned]} == {Reason.NOT_BETTER}
+    for batch in batches:
+        assert (batch.worst_in_band <= plans.conventional_in_band[batch.moves]).all()
 
 
-def test_a_kept_profile_reaches_its_end_before_the_last_interval_has_passed():
+@pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
+def test_what_is_written_is_better_at_every_frequency_of_the_band(machine):
+    displacement = drawn_moves(20, seed=11)
+    for batch in streams(displacement, machine):
+        modes = batch.plans.modes
+        for row, move in enumerate(batch.moves):
+            t, q = batch.positions(row)
+            driven = (q - q[0]) @ modes.participation.T
+            rows = list(batch.plans.profiles_of(move))
+            today = batch.plans.conventional.take(np.array(rows))
+            end = np.ceil(today.total.max() / 0.001 - 1e-6)
+            unit, _ = sample_profiles(
+                today, np.tile(np.arange(end + 1, dtype=np.int64), (len(rows), 1)), 1e-3
+            )
+            usual = unit.T @ batch.plans.share[rows] @ modes.participation.T
+            left = np.zeros((2, len(modes.poles)))
+            for m, pole in enumerate(modes.poles):
+                around = pole * np.linspace(0.9, 1.1, 401)
+                for k, (moments, moved) in enumerate(
+                    ((t, driven), (np.arange(end + 1) * 1e-3, usual))
+                ):
+                    response = polyline_response(moments, moved[:, m], around)
+                    left[k, m] = (np.abs(response) / around.imag).max()
+            assert left[0].max() < left[1].max(), displacement[move]
+            assert left[0].max() <= 1.02 * batch.worst_in_band[row] + 1e-5
+            assert left[1].max() == pytest.approx(batch.plans.conventional_in_band[move], rel=0.03)
+
+
+def test_a_conventional_profile_reaches_its_end_before_the_last_interval_has_passed():
     displacement = np.zeros((1, len(AXES)))
     displacement[0, Z] = 1.07
     batch = one_batch(displacement, profile="conventional")
-    assert batch.stays_conventional.all()
     t, q = batch.positions(0)
     assert t[-1] == pytest.approx(np.ceil(float(batch.plans.conventional_time[0]) * 1e3) / 1e3)
     assert q[-1, Z] == 1.07
 
 
-def test_a_move_has_kept_the_conventional_profile_only_if_all_of_its_axes_have():
+def test_of_independent_axes_one_may_keep_what_it_has_while_another_gains():
     axis = "rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}"
     machine = Machine.loads(
         "interval: 0.001\npositioning: independent\naxes:\n"
@@ -273,7 +296,6 @@ def test_a_move_has_kept_the_conventional_profile_only_if_all_of_its_axes_have()
     plan = plan_move({"X": 5.0, "Z": 1.0}, machine)
     # X shakes nothing and keeps its profile; Z does not.
     assert plan.plans.stays_conventional.tolist() == [True, False]
-    assert plan.stays_conventional.tolist() == [False]
     assert plan.profile == "condition3"
     assert plan.residual.max() < 0.5 * plan.conventional_residual.max()
 

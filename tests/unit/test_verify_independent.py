@@ -60,6 +60,6 @@ def test_what_an_end_between_two_steps_leaves_for_the_last_block_is_no_delay(end
     axes = tuple(replace(a, resolution=0.01 if a.name == "Z" else 0.001) for a in MACHINE.axes)
     coarse = replace(MACHINE, axes=axes)
     program = PROGRAM.replace(b"X150. Y20. Z6.", b"X800. Y20. Z%g" % end)
-    made = process(program, coarse, verify=False)
+    made = process(program, coarse, verify=False, profile="conventional")
     assert made.planned == 1
     assert verify(program, made.output, coarse).violations == ()

@@ -19,7 +19,8 @@ from gcodejerk.machine.parts import PLANNERS
 SCHEMA_VERSION = 1
 
 PROFILES = (
-    "conventional", "condition1", "condition2", "condition3", "cascade", "optimal", "shortest",
+    "conventional", "condition1", "condition2", "condition3", "symmetric", "cascade", "optimal",
+    "shortest",
     "zv", "zvd", "ei", "mzv", "fir", "posicast",
 )  # fmt: skip
 
@@ -266,8 +267,8 @@ _DESIGN = Section(
     (
         Key("profile", Choice(PROFILES), "How a rapid moves.", default="condition3"),
         Key("band", Number("-", at_least=0.0, below=1.0),
-            "Relative frequency error to be robust to, for the profiles that can.",
-            default=0.05, example="0.05"),
+            "Relative frequency error to be robust to, for every profile; 0 where the modes are "
+            "exact.", default=0.10, example="0.10"),
         Key("tolerance", Number("mm", above=0.0), "Residual that counts as settled.",
             default=0.001, example="0.001"),
         Key("minimum_length", Number("mm", at_least=0.0), "Shorter rapids are left alone.",

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.boxes import box_profiles
 from gcodejerk.motion.profiles.profile import Array, Profiles
-from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.search.candidates import cascade_worst
 from gcodejerk.motion.search.objective import Objective
 from gcodejerk.motion.search.rows import ROUNDING, best_in_rows, parts
 
@@ -39,8 +39,8 @@ STEPS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]], float)
 
 def design_cascade(
     total: Array, velocity: Array, acceleration: Array, jerk: Array,
-    objective: Objective, interval: float,
-) -> tuple[Profiles, Array]:  # fmt: skip
+    objective: Objective, interval: float, periods: Array,
+) -> tuple[Profiles, NDArray[np.bool_]]:  # fmt: skip
     """The cascade of three boxes in the given time with the least worst residual.
 
     Parameters
@@ -53,17 +53,18 @@ def design_cascade(
         Of n moves.
     interval : float
         The least width of a box. [s]
+    periods : ndarray, shape (p,)
+        Of modes: boxes as wide as these are tried. [s]
 
     Returns
     -------
     profiles : Profiles
-        n profiles; meaningless where none is feasible.
-    worst : ndarray, shape (n,)
-        Largest residual displacement, infinite where no cascade keeps the limits. [mm]
+        n profiles; meaningless where `feasible` is False.
+    feasible : ndarray of bool, shape (n,)
+        Whether any cascade keeps the limits.
     """
     n = len(total)
     w2, w3, worst = (np.empty(n) for _ in range(3))
-    periods = 2.0 * np.pi / objective.poles.imag[_leading(objective)]
     boxes = np.concatenate([k * periods for k in range(1, PERIODS + 1)])
     width = GRID * GRID + len(boxes) ** 2 + GRID * len(boxes)
     for part in parts(n, width):
@@ -74,25 +75,19 @@ def design_cascade(
         w2[part], w3[part], worst[part] = search.run(boxes)
     feasible = np.isfinite(worst)
     w2, w3 = np.where(feasible, w2, total / 3.0), np.where(feasible, w3, total / 6.0)
-    return box_profiles(total - w2 - w3, w2, w3), worst
+    return box_profiles(total - w2 - w3, w2, w3), feasible
 
 
-def box_response(width: Array, poles: Complex) -> Complex:
-    """What a box of unit area does to a mode, seen from its end; width (...), poles (m,)."""
-    x = width[..., np.newaxis] * poles
-    response: Complex = np.expm1(x) / x
-    return response
-
-
-def _leading(objective: Objective) -> NDArray[np.intp]:
-    """The pole with the largest weight of each group, and of these the `MODES` largest."""
+def leading_periods(objective: Objective) -> Array:
+    """Periods of the pole with the largest weight of each group, of the `MODES` largest [s]."""
     size = objective.weights.max(axis=0, initial=0.0)
     # In order of the group, the largest first: the first of each group leads it.
     order = np.lexsort((-size, objective.group))
     first = np.flatnonzero(np.diff(objective.group[order], prepend=-1))
     leading = order[first]
     leading = leading[np.argsort(-size[leading], kind="stable")]
-    return leading[:MODES]
+    periods: Array = 2.0 * np.pi / objective.poles.imag[leading[:MODES]]
+    return periods
 
 
 class _Search:
@@ -153,11 +148,8 @@ class _Search:
             J = np.where(overlap > 1e-12, 2.0, 1.0) / (w1 * w2 * w3)
             legal = (w1 >= w2 * edge) & (w2 >= w3 * edge) & (w3 >= self.interval * edge)
             legal &= (V <= self.V) & (1.0 / (w1 * w2) <= self.A) & (J <= self.J)
-        rows = np.nonzero(legal)[0]
-        poles = self.objective.poles
-        product = poles * np.ones((len(rows), 1))
-        for width in (w1, w2, w3):
-            product = product * box_response(width[legal], poles)
-        value = np.full(w2.shape, np.inf)
-        value[legal] = self.objective.take(rows).worst(np.abs(product) / poles.imag)
-        return value
+            # What is not legal is evaluated as something harmless.
+            worst = cascade_worst(
+                tuple(np.where(legal, width, 1.0) for width in (w1, w2, w3)), self.objective
+            )
+        return np.where(legal, worst, np.inf)

@@ -19,9 +19,12 @@ from gcodejerk.motion.profiles.symmetric import SymmetricProfiles
 from gcodejerk.motion.residual import Complex, grouped, profiles_response, symmetric_response
 
 DENSE = 0.06
-"""Distance of frequencies, times T_SUM/2, at which a band is judged at most. [rad]"""
+"""Distance of frequencies, times T_SUM/2, at which a band is judged at most: the largest residual
+between two of them is larger by less than 0.1 % of the largest there is anywhere. [rad]"""
 FEWEST = 10
 """Frequencies on each side of a mode's own at least."""
+JUDGED, JUDGED_FEWEST = 0.2, 4
+"""The same two for judging a plan: right to 0.5 % of the largest residual anywhere."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +57,15 @@ class Objective:
         """Some of the moves; one may stand several times."""
         return Objective(self.poles, self.weights[index], self.group)
 
-    def in_band(self, band: float, total: float) -> Objective:
+    def excited(self) -> Objective:
+        """The same moves, without the modes that none of them excites."""
+        used = self.weights.any(axis=0)
+        _, group = np.unique(self.group[used], return_inverse=True)
+        return Objective(self.poles[used], self.weights[:, used], group)
+
+    def in_band(
+        self, band: float, total: float, dense: float = DENSE, fewest: int = FEWEST
+    ) -> Objective:
         """The same moves, every mode at many frequencies within a relative band.
 
         Parameters
@@ -64,6 +75,10 @@ class Objective:
         total : float
             Duration of the longest move: residuals of longer moves change faster with the
             frequency. [s]
+        dense : float
+            Distance of the frequencies at most, times T_SUM/2. [rad]
+        fewest : int
+            Frequencies on each side of a mode's own at least.
 
         Returns
         -------
@@ -71,8 +86,8 @@ class Objective:
             Groups of several modes have no band: they are spectra, which are broad by themselves.
         """
         size = np.bincount(self.group, minlength=1)[self.group]
-        half = np.ceil(0.5 * band * np.abs(self.poles) * total / DENSE).astype(np.int64)
-        half = np.where((size == 1) & (band > 0.0), np.maximum(half, FEWEST), 0)
+        half = np.ceil(0.5 * band * np.abs(self.poles) * total / dense).astype(np.int64)
+        half = np.where((size == 1) & (band > 0.0), np.maximum(half, fewest), 0)
         count = 2 * half + 1
         relative = [np.linspace(1.0 - band, 1.0 + band, n) if n > 1 else np.ones(1) for n in count]
         index = np.repeat(np.arange(len(self.poles)), count)

@@ -17,9 +17,9 @@ ROUNDING = 1e-9
 """Relative tolerance on limits, for the rounding of floating-point numbers."""
 
 
-def parts(n: int, width: int) -> list[slice]:
-    """Rows of `width` candidates each, cut into parts of about `CELLS` candidates."""
-    rows = max(1, CELLS // max(width, 1))
+def parts(n: int, width: int, cells: int = CELLS) -> list[slice]:
+    """Rows of `width` candidates each, cut into parts of about so many candidates."""
+    rows = max(1, cells // max(width, 1))
     return [slice(begin, min(begin + rows, n)) for begin in range(0, n, rows)]
 
 

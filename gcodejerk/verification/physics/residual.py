@@ -13,9 +13,10 @@ trapezoid. The stream is judged by its points as they are written, straight line
 sum of its velocity steps, each times :math:`e^{\lambda (T - t)}`.
 
 Rule: a stream is refused only if it leaves more than the controller's own rapid in every reading
-that is fair: more than that rapid in closed form, and more than it through straight lines at the
-same moments, by more than what rounding and the distance of the points may make of it. Of a mode
-of which points tell less than two in a period, they tell nothing.
+that is fair: more than that rapid in closed form at the worst frequencies within the band, which is
+what designs are judged by, and more than it through straight lines at the same moments, by more
+than what rounding and the distance of the points may make of it. Of a mode of which points tell
+less than two in a period, they tell nothing.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ RELATIVE = 0.02
 """Share by which a stream may leave more: straight lines filter both motions nearly alike."""
 SIGMAS = 3.0
 """Roundings of points add up at random, of up to a step each: so many of their deviations."""
-BAND_POINTS = 9
-"""Frequencies at which a band is judged."""
+BAND_POINTS, BAND_STEP = 9, 0.25
+"""Frequencies at which a band is judged at least, and how far apart they are at most, times half of
+the longest duration. [rad]"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,9 +86,9 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
     sampled = streams.largest(modes, np.abs(own))
     allowed = np.maximum(allowed, (1.0 + RELATIVE) * sampled + streams.noise(modes))
     allowed = allowed + streams.largest(modes, streams.coarseness(modes))
-    for factor in np.linspace(1.0 - machine.design.band, 1.0 + machine.design.band, BAND_POINTS):
+    for factor in streams.band(modes):
         near = streams.largest(modes, np.abs(streams.own(modes.at(float(factor)))))
-        allowed = np.where(streams.banded, np.maximum(allowed, (1.0 + RELATIVE) * near), allowed)
+        allowed = np.maximum(allowed, (1.0 + RELATIVE) * near)
     suspects = np.flatnonzero(left > allowed)
     return Excess(suspects.astype(np.int64), left[suspects], allowed[suspects])
 
@@ -118,17 +120,13 @@ class _Streams:
         shown = np.abs(modes.poles) * self.spacing[:, np.newaxis] < np.pi
         return modes.largest(np.where(shown, amplitude, 0.0))
 
-    @property
-    def banded(self) -> NDArray[np.bool_]:
-        """Streams whose own rapid no stream can be: a design need be better over the band only."""
-        out = np.zeros(len(self.count), dtype=np.bool_)
-        for axis in self.machine.axes:
-            own, limit = axis.conventional(lone=False), axis.limit
-            fits = np.isfinite(own.jerk) and own.jerk <= limit.jerk
-            fits = fits and own.acceleration <= limit.acceleration
-            moves = self.paths.displacement[:, AXES.index(axis.name)] != 0.0
-            out |= moves & (not (fits and own.velocity <= limit.velocity))
-        return out
+    def band(self, modes: Oscillators) -> Array:
+        """Frequencies of the band, relative to the modes' own."""
+        band = self.machine.design.band
+        longest = 0.5 * float(self.t.max(initial=0.0))
+        phase = band * longest * float(np.abs(modes.poles).max(initial=0.0))
+        half = max(BAND_POINTS // 2, int(np.ceil(phase / BAND_STEP)))
+        return np.linspace(1.0 - band, 1.0 + band, 2 * half + 1)
 
     def lines(self, modes: Oscillators, position: Array) -> NDArray[np.complex128]:
         """Vibration left by straight lines through positions, shape (streams, m) [mm]."""

@@ -1,0 +1,164 @@
+"""What many candidates leave, fast: symmetric profiles and cascades by the thousand.
+
+This module owns the evaluation that searches are made of: hundreds of candidates a move, at many
+frequencies within a band each. It computes in single precision, which costs a fiftieth of double
+precision and errs by some 1e-5 of what a candidate does to a mode; what a search has chosen is
+judged again in double precision, and nothing that is reported comes from here.
+
+Rule: only magnitudes are computed, squared, and no complex number is built.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.search.objective import Objective
+
+Single = NDArray[np.float32]
+
+FEW_POLES = 12
+"""So many poles can be evaluated in double precision, or for many more candidates."""
+BLOCK = 1 << 14
+"""Numbers in an array at a time, about: a dozen of them stay in the processor's cache."""
+
+
+def symmetric_worst(T1: Array, Ta: Array, T2: Array, total: Array, objective: Objective) -> Single:
+    r"""Largest residual displacement of symmetric profiles.
+
+    Parameters
+    ----------
+    T1, Ta, T2 : ndarray, shape (n, k)
+        Of the ramps of k profiles for each of n moves; T1 and T2 above zero. [s]
+    total : ndarray, shape (n,)
+        T_SUM. [s]
+    objective : Objective
+        Of the n moves.
+
+    Returns
+    -------
+    ndarray of float32, shape (n, k)
+        [mm]
+
+    Notes
+    -----
+    The jerk is even about the middle, so its steps come in pairs of opposite sign, at t and T - t.
+    With y = T/2 - t a pair adds :math:`q e^{j\omega_d y} - p e^{-j\omega_d y}` times its step, seen
+    from the middle, where :math:`p = e^{-\sigma t}` and :math:`q = e^{-\sigma (T - t)}` are what is
+    left of the two at the end.
+    """
+    n, k = T1.shape
+    T1, Ta, T2 = (x.ravel() for x in (T1, Ta, T2))
+    whole = np.repeat(total, k)
+    ramp, area = T1 + Ta + T2, Ta + 0.5 * (T1 + T2)
+    moment = T1 * T1 / 3.0 + Ta * (T1 + 0.5 * Ta) + 0.5 * T2 * (T1 + Ta + T2 / 3.0)
+    acceleration = 1.0 / (area * whole - 2.0 * moment)
+    up, down = (acceleration / T1).astype(np.float32), (acceleration / T2).astype(np.float32)
+    pairs = [
+        (t.astype(np.float32), (whole - t).astype(np.float32), jerk)
+        for t, jerk in ((T1, -up), (T1 + Ta, -down), (ramp, down))
+    ]
+    middle = (0.5 * total).astype(np.float32)
+    found = _Worst(objective, n, k)
+    for block, sigma, omega, scale in found.blocks():
+        # The first pair, at the beginning and the end, depends on the move alone.
+        phase, late = middle * omega, np.exp(-sigma * (2.0 * middle))
+        real = np.repeat((late - 1.0) * np.cos(phase), k, axis=1) * up
+        imaginary = np.repeat((late + 1.0) * np.sin(phase), k, axis=1) * up
+        for t, rest, jerk in pairs:
+            phase = (rest - t) * (np.float32(0.5) * omega)
+            if not sigma.any():
+                imaginary += np.float32(2.0) * np.sin(phase) * jerk
+                continue
+            early, late = np.exp(t * -sigma), np.exp(rest * -sigma)
+            real += (late - early) * np.cos(phase) * jerk
+            imaginary += (late + early) * np.sin(phase) * jerk
+        found.add(block, real * real + imaginary * imaginary, scale**2 * omega)
+    return found.displacement()
+
+
+def cascade_worst(widths: tuple[Array, ...], objective: Objective) -> Single:
+    r"""Largest residual displacement of cascades of moving averages.
+
+    Parameters
+    ----------
+    widths : tuple of ndarray, shape (n, k)
+        Of the boxes, above zero. [s]
+    objective : Objective
+        Of n moves.
+
+    Returns
+    -------
+    ndarray of float32, shape (n, k)
+        [mm]
+
+    Notes
+    -----
+    A box of width w leaves :math:`|1 - e^{\lambda w}| / |\lambda w|` of a mode, the square of whose
+    numerator is :math:`(1 - e)^2 + 4 e \sin^2(\omega_d w/2)` with :math:`e = e^{-\sigma w}`: no
+    difference of nearly equal numbers where a box is as wide as a period.
+    """
+    single = [w.ravel().astype(np.float32) for w in widths]
+    found = _Worst(objective, *widths[0].shape)
+    for block, sigma, omega, scale in found.blocks():
+        square = np.ones(1, dtype=np.float32)
+        for w in single:
+            sine = np.sin(w * (np.float32(0.5) * omega))
+            sine *= sine
+            if sigma.any():
+                rest = np.exp(w * -sigma)
+                sine *= np.float32(4.0) * rest
+                sine += (np.float32(1.0) - rest) ** 2
+            else:
+                sine *= np.float32(4.0)
+            square = square * (sine / (w * scale) ** 2)
+        found.add(block, square, omega / scale)
+    return found.displacement()
+
+
+class _Worst:
+    """The largest of the groups of poles, of which a block at a time is evaluated."""
+
+    def __init__(self, objective: Objective, n: int, k: int) -> None:
+        self.poles, self.weights = objective.poles, objective.weights
+        self.shape, self.each = (n, k), k
+        self.starts = np.diff(objective.group, prepend=-1) != 0
+        self.worst = np.zeros(n * k, dtype=np.float32)
+        self.carried: Single = self.worst
+
+    def blocks(self) -> Iterator[tuple[slice, Single, Single, Single]]:
+        """Poles in blocks, with -Re, Im and modulus of each, shape (p, 1) [1/s]."""
+        size = max(1, BLOCK // max(self.worst.size, 1))
+        for begin in range(0, len(self.poles), size):
+            block = slice(begin, begin + size)
+            poles = self.poles[block, np.newaxis]
+            sigma, omega, scale = (
+                x.astype(np.float32) for x in (-poles.real, poles.imag, np.abs(poles))
+            )
+            yield block, sigma, omega, scale
+
+    def add(self, block: slice, square: Single, scale: Single) -> None:
+        """Take the squared responses of a block, shape (p, n k).
+
+        Divided by the square of `scale`, shape (p, 1), they are squares of displacements.
+        """
+        weight = self.weights[:, block].T.astype(np.float32) / scale
+        square = square * np.repeat(weight * weight, self.each, axis=1)
+        starts = self.starts[block].copy()
+        continued, starts[0] = not starts[0], True
+        together = square
+        if not starts.all():
+            together = np.add.reduceat(square, np.flatnonzero(starts), axis=0)
+        if continued:
+            together[0] += self.carried
+        self.carried = together[-1]
+        # A sum that goes on in the next block is no larger than the whole, so it may be compared.
+        for each in together:
+            np.maximum(self.worst, each, out=self.worst)
+
+    def displacement(self) -> Single:
+        """The worst of each candidate [mm]."""
+        return np.sqrt(self.worst).reshape(self.shape)

@@ -1,0 +1,256 @@
+"""Tasks: moves as a design gets them, whatever the design is.
+
+This module owns what a move is to a design: its time, its limits, what it excites, what the control
+does today; and the one measure that all designs are judged by, the largest residual over the band.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.machine import Machine
+from gcodejerk.motion import (
+    Objective,
+    Profiles,
+    SymmetricProfiles,
+    grouped,
+    profiles_response,
+    whole_intervals,
+)
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
+from gcodejerk.motion.search.rows import parts
+from gcodejerk.planning.conventional import conventional_limits, todays_profiles, unit_limits
+from gcodejerk.planning.optima import Progress
+from gcodejerk.planning.plans import Modes
+
+AT_ONCE = 1 << 21
+"""Residuals, of moves at frequencies, that are judged at a time: some 100 MB."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """Moves to be designed, columns of n.
+
+    Attributes
+    ----------
+    counts : ndarray of int, shape (n,)
+        T_SUM. [intervals]
+    limits : tuple of ndarray, shape (n,)
+        Velocity, acceleration and jerk of the unit profiles. [1/s], [1/s^2], [1/s^3]
+    conventional : Profiles
+        What the controller does today.
+    symmetric : SymmetricProfiles
+        The fastest symmetric profiles within the same limits: what the controller does, but for a
+        bell.
+    objective : Objective
+        What they are judged by.
+    interval, band, tolerance : float
+        Of the machine. [s], [-], [mm]
+    progress : callable or None
+        For designs that take long.
+    """
+
+    counts: NDArray[np.int64]
+    limits: tuple[Array, Array, Array]
+    conventional: Profiles
+    symmetric: SymmetricProfiles
+    objective: Objective
+    interval: float
+    band: float
+    tolerance: float
+    progress: Progress | None = None
+
+    @classmethod
+    def of(
+        cls, machine: Machine, modes: Modes, share: Array, counts: NDArray[np.int64] | None = None,
+        progress: Progress | None = None, speed: Array | None = None,
+        lone: NDArray[np.bool_] | None = None,
+    ) -> Task:  # fmt: skip
+        """Moves on a machine.
+
+        Parameters
+        ----------
+        machine : Machine
+            Its limits and what it says of designs.
+        modes : Modes
+            Those that count, of that machine.
+        share : ndarray, shape (n, 9)
+            Displacement of each axis. [mm] or [deg]
+        counts : ndarray of int, shape (n,), optional
+            T_SUM; the conventional time rounded up by default. [intervals]
+        progress : callable, optional
+            See `Progress`.
+        speed : ndarray, shape (n,), optional
+            Speed that the program states, which no unit profile exceeds; NaN for none. [1/s]
+        lone : ndarray of bool, shape (n,), optional
+            No other motion follows directly (`Axis.conventional`); all of them by default.
+
+        Returns
+        -------
+        Task
+        """
+        rapid, limits = conventional_limits(machine, share, lone), unit_limits(machine, share)
+        if speed is not None:
+            rapid, limits = ((np.fmin(V, speed), A, J) for V, A, J in (rapid, limits))
+        symmetric, conventional = todays_profiles(machine, rapid)
+        if counts is None:
+            counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
+        weights = np.abs(share @ modes.participation.T)
+        return cls(
+            counts=counts,
+            limits=limits,
+            conventional=conventional,
+            symmetric=symmetric,
+            objective=Objective(modes.poles, weights, modes.group),
+            interval=machine.interval,
+            band=machine.design.band,
+            tolerance=machine.design.tolerance,
+            progress=progress,
+        )
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    @property
+    def total(self) -> Array:
+        """T_SUM, shape (n,) [s]."""
+        return np.asarray(self.counts * self.interval, dtype=np.float64)
+
+    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Task:
+        """Some of the moves."""
+        return replace(
+            self,
+            counts=self.counts[index],
+            limits=(self.limits[0][index], self.limits[1][index], self.limits[2][index]),
+            conventional=self.conventional.take(index),
+            symmetric=self.symmetric.take(index),
+            objective=self.objective.take(index),
+        )
+
+    def distinct(self) -> tuple[list[bytes], NDArray[np.intp], NDArray[np.intp]]:
+        """Kinds of moves: those of a kind have the same best profile, though not the same residual.
+
+        Returns
+        -------
+        keys : list of bytes, length k
+            Of each kind, the same for the same kind in any task.
+        first : ndarray of int, shape (k,)
+            A move of each kind.
+        same : ndarray of int, shape (n,)
+            The kind of each move.
+        """
+        total = self.total
+        V, A, J = self.limits
+        scale = self.objective.weights.max(axis=1, initial=0.0)
+        weights = self.objective.weights / np.where(scale > 0.0, scale, 1.0)[:, np.newaxis]
+        today = [column / total for column in self.symmetric.columns()]
+        numbers = np.column_stack(
+            [self.counts, V * total, A * total**2, J * total**3, *today, weights]
+        )
+        # Rounded: the same move computed in another order is of the same kind.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            digits = 10.0 ** (9.0 - np.ceil(np.log10(np.abs(numbers))))
+            rounded = np.where(np.isfinite(digits), np.rint(numbers * digits) / digits, numbers)
+        rounded += 0.0  # no -0
+        rows, first, same = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        objective = self.objective
+        common = hashlib.blake2b(objective.poles.tobytes() + objective.group.tobytes())
+        common.update(np.array([self.band, self.interval]).tobytes())
+        return [common.digest() + row.tobytes() for row in rows], first, same.reshape(-1)
+
+    def alike(self) -> Iterator[tuple[NDArray[np.intp], float]]:
+        """Moves that excite the same modes and take about as long, and a time that none exceeds.
+
+        A longer move has to be looked at more frequencies. The time [s] is that of the class, a
+        factor of 1.4 wide, so that no move is designed otherwise because of what stands beside it.
+        """
+        duration = np.floor(2.0 * np.log2(self.counts)).astype(np.int64)
+        kinds = np.column_stack([duration, self.objective.weights != 0.0])
+        _, kind = np.unique(kinds, axis=0, return_inverse=True)
+        order = np.argsort(kind.reshape(-1), kind="stable")
+        bounds = np.flatnonzero(np.diff(kind.reshape(-1)[order], prepend=-1))
+        for index in np.split(order, bounds[1:]) if len(order) else ():
+            yield index, self.interval * 2.0 ** (0.5 * float(duration[index[0]] + 1))
+
+    def after(self, counts: NDArray[np.int64]) -> Task:
+        """The same moves in other times."""
+        return replace(self, counts=counts)
+
+
+def worst_in_band(task: Task, profiles: Profiles) -> Array:
+    """Largest residual displacement of profiles with every frequency anywhere within the band.
+
+    Parameters
+    ----------
+    task : Task
+        The moves.
+    profiles : Profiles
+        One for each.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        [mm]
+    """
+    worst = np.zeros(len(task))
+    # A longer move needs more frequencies: moves of like duration together.
+    octave = np.frexp(profiles.total)[1]
+    for k in np.unique(octave):
+        index = np.nonzero(octave == k)[0]
+        own = profiles.take(index)
+        objective = task.objective.take(index).excited()
+        width = len(objective.in_band(task.band, 2.0 ** float(k), JUDGED, JUDGED_FEWEST).poles)
+        for part in parts(len(index), width, AT_ONCE):
+            around = objective.take(part).in_band(task.band, 2.0 ** float(k), JUDGED, JUDGED_FEWEST)
+            worst[index[part]] = around.of(own.take(np.arange(len(index))[part]))
+    return worst
+
+
+def worst_at_arrival(
+    modes: Modes, band: float, move: NDArray[np.int64], share: Array, profiles: Profiles
+) -> Array:
+    """The same for moves of several profiles: what is left when the last of them has ended.
+
+    Parameters
+    ----------
+    modes : Modes
+        The machine's modes.
+    band : float
+        Relative error of their frequencies. [-]
+    move : ndarray of int, shape (l,)
+        The move of each profile, counted from 0, ascending.
+    share : ndarray, shape (l, 9)
+        Displacement of each axis that the profile carries. [mm] or [deg]
+    profiles : Profiles
+        l unit profiles; those of a move begin together.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        [mm]
+    """
+    arrival = np.zeros(int(move.max(initial=-1)) + 1)
+    np.maximum.at(arrival, move, profiles.total)
+    worst = np.zeros(len(arrival))
+    every = Objective(modes.poles, modes.participation.T, modes.group)
+    octave = np.frexp(arrival)[1]
+    for k in np.unique(octave):
+        around = every.in_band(band, 2.0 ** float(k), JUDGED, JUDGED_FEWEST)
+        alike = np.nonzero(octave == k)[0]
+        for part in parts(len(alike), len(around.poles), AT_ONCE):
+            chosen = alike[part]
+            index = np.nonzero(np.isin(move, chosen))[0]
+            left = arrival[move[index]] - profiles.total[index]
+            each = profiles_response(profiles.take(index), around.poles)
+            each *= np.exp(around.poles * left[:, np.newaxis]) * (share[index] @ around.weights)
+            response = np.zeros((len(chosen), len(around.poles)), dtype=np.complex128)
+            np.add.at(response, np.searchsorted(chosen, move[index]), each)
+            displacement = np.abs(response) / around.poles.imag
+            worst[chosen] = grouped(displacement, around.group).max(axis=1, initial=0.0)
+    return worst
