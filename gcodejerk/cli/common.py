@@ -25,7 +25,8 @@ ProfileOption = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
-        help="condition3 (default), cascade, optimal, shortest, conventional, condition1 or 2",
+        help="condition3 (default), symmetric, cascade, optimal, shortest, conventional, "
+        "condition1 or 2",
     ),
 ]
 
