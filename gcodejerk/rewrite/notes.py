@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
 from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.emit import Controller
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.nc import Program
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.stream import Residuals
 
 
 def operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[str]:
@@ -40,6 +43,27 @@ def program_notes(program: Program, expansion: Expansion | None, emitter: Contro
             "how the program's control follows its streams was not measured"
         )
     return notes
+
+
+def band_notes(plans: Plans, residuals: Residuals) -> list[str]:
+    """That some rapids leave more at the file's own frequencies, where today's are lucky there."""
+    if not plans.has_to_gain:
+        return []
+    own, today = (
+        plans.modes.grouped(each).max(axis=1, initial=0.0)
+        for each in (residuals.residual, residuals.conventional)
+    )
+    with np.errstate(invalid="ignore"):
+        more = plans.planned & (own > today)
+    count = int(np.count_nonzero(more))
+    if not count:
+        return []
+    rapids = "1 rapid leaves" if count == 1 else f"{count} rapids leave"
+    band = f"{100.0 * plans.machine.design.band:.3g} %"
+    return [
+        f"{rapids} more than today's at exactly the file's frequencies, and less at the worst "
+        f"within {band} of them, which all are designed for (design.band)"
+    ]
 
 
 def _finding(line: int | None, message: str) -> str:

@@ -36,7 +36,7 @@ from gcodejerk.rewrite.expanded import (
     written_out,
 )
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
-from gcodejerk.rewrite.notes import operator_notes, program_notes
+from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes
 from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.stamp import stamp_text
@@ -225,6 +225,7 @@ def _process(
             *operator_notes(emitter, machine, plans),
             *program_notes(program, expansion, emitter),
             *dogleg_notes(plans, deviation),
+            *band_notes(plans, collected),
             *emitter.notes(program.rapids, plans),
         ),
     )

@@ -161,3 +161,18 @@ def test_results_are_shown_in_one_short_line():
     assert repr(result) == f"<Result part.ngc: {result.planned} of {count} rapids rewritten>"
     assert repr(result.plans) == f"<Plans: {result.planned} of {count} moves, condition3>"
     assert len(repr(result.plans.profiles)) < 80
+
+
+def test_where_todays_rapid_is_lucky_at_the_file_s_frequencies_it_is_said():
+    centre = Machine.load(find_machine("centre"))
+    program = b"G21 G90 G94\nG1 X0 Y0 Z50 F900\nG0 X10\nG0 Z2\nM2\n"
+    made = process(program, centre)
+    lucky = made.rapids[0]
+    assert lucky.rewritten
+    assert lucky.residual > lucky.conventional_residual
+    assert made.rapids[1].residual < made.rapids[1].conventional_residual
+    said = [note for note in made.notes if note.startswith("1 rapid leaves more than today's")]
+    assert len(said) == 1
+    assert "within 5 % of them" in said[0]
+    assert made.plans.worst_in_band[0] < 0.98 * made.plans.conventional_in_band[0]
+    assert not any("leaves more" in note for note in process(PROGRAM, VMC).notes)
