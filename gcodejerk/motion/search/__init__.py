@@ -1,6 +1,7 @@
 """Searches: for each kind of profile, the member of its family that leaves the modes most still.
 
-`condition3` chooses T1 as the paper has it; `conditions` does so for the other two families,
-`cascade` chooses boxes, and `optimal` every jerk on the command grid, by the cone programmes of
-`socp`. All are judged by the one `objective`, and take moves in `rows`.
+`condition3` chooses T1 as the paper has it, `ramps` all that is free where there are more segments
+than four; `conditions` chooses T1 for the other two families, `cascade` chooses boxes, and
+`optimal` every jerk on the command grid, by the cone programmes of `socp`. All are judged by the
+one `objective`, evaluate `candidates` by the thousand, and take moves in `rows`.
 """
