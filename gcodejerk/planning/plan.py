@@ -261,6 +261,11 @@ class _Planner:
         )
         task = self.task.after(whole_intervals(fastest, self.interval))
         profiles, worst, counts = shortest(task, longest)
+        if self.machine.positioning != "linear":
+            # Each axis is quiet enough by itself: together they may not be.
+            joint, today = self._at_arrival(profiles, worst)
+            loud = np.isfinite(joint) & (joint > np.maximum(today, self.machine.design.tolerance))
+            self._rule_out_profiles(loud, Reason.NOT_BETTER)
         return profiles, counts, np.isfinite(worst)
 
     def _designed(
