@@ -164,10 +164,6 @@ class Plans:
         planned: NDArray[np.bool_] = self.reason == CERTAIN
         return planned
 
-    def profile_name(self, entry: int) -> str:
-        """Name of one of the l profiles: what was designed, or conventional."""
-        return "conventional" if self.stays_conventional[entry] else self.designed
-
     def excited(self, move: int) -> list[int]:
         """The entries of the modes that a move excites."""
         moving = self.displacement[move] != 0.0

@@ -87,6 +87,8 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
     allowed = np.maximum(allowed, (1.0 + RELATIVE) * sampled + streams.noise(modes))
     allowed = allowed + streams.largest(modes, streams.coarseness(modes))
     for factor in streams.band(modes):
+        if (left <= allowed).all():
+            return none
         near = streams.largest(modes, np.abs(streams.own(modes.at(float(factor)))))
         allowed = np.maximum(allowed, (1.0 + RELATIVE) * near)
     suspects = np.flatnonzero(left > allowed)
@@ -121,12 +123,16 @@ class _Streams:
         return modes.largest(np.where(shown, amplitude, 0.0))
 
     def band(self, modes: Oscillators) -> Array:
-        """Frequencies of the band, relative to the modes' own."""
+        """Frequencies of the band, relative to the modes' own, its ends first.
+
+        A null that a rapid has at the mode's own frequency is farthest from them.
+        """
         band = self.machine.design.band
         longest = 0.5 * float(self.t.max(initial=0.0))
         phase = band * longest * float(np.abs(modes.poles).max(initial=0.0))
         half = max(BAND_POINTS // 2, int(np.ceil(phase / BAND_STEP)))
-        return np.linspace(1.0 - band, 1.0 + band, 2 * half + 1)
+        factors = np.linspace(1.0 - band, 1.0 + band, 2 * half + 1)
+        return factors[np.argsort(-np.abs(factors - 1.0), kind="stable")]
 
     def lines(self, modes: Oscillators, position: Array) -> NDArray[np.complex128]:
         """Vibration left by straight lines through positions, shape (streams, m) [mm]."""
