@@ -10,7 +10,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import mode_poles, profiles_response
-from gcodejerk.motion.search.optimal import Move, least_residual
+from gcodejerk.motion.search.optimal import least_residual
+from gcodejerk.motion.search.unit_move import Move
 from gcodejerk.planning.designs import bounds, known_limits, least_residuals
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import PROFILES, plan_moves

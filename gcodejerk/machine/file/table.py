@@ -269,6 +269,9 @@ _DESIGN = Section(
         Key("band", Number("-", at_least=0.0, below=1.0),
             "Relative frequency error to be robust to, for every profile; 0 where the modes are "
             "exact.", default=0.10, example="0.10"),
+        Key("guard", Number("-", at_least=0.0),
+            "What frequencies that the file does not name may keep after an optimal rapid, times "
+            "what today's leaves there; 0: anything.", default=1.0, example="1"),
         Key("tolerance", Number("mm", above=0.0), "Residual that counts as settled.",
             default=0.001, example="0.001"),
         Key("minimum_length", Number("mm", at_least=0.0), "Shorter rapids are left alone.",
