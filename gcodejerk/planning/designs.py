@@ -253,12 +253,12 @@ def _quiet(task: Task, reference: Array) -> tuple[Profiles, Array]:
 
 
 def bounds(task: Task) -> Array:
-    """The least residual that any profile within the limits leaves, at the modes' own frequencies.
+    """The least residual that any profile within the limits leaves over the task's band.
 
     Parameters
     ----------
     task : Task
-        The moves.
+        The moves; with a band of 0, at the modes' own frequencies.
 
     Returns
     -------
@@ -270,17 +270,16 @@ def bounds(task: Task) -> Array:
     PlanError
         scipy or clarabel is not installed.
     """
-    nominal = replace(task, band=0.0)
     least = np.where(task.objective.weights.any(axis=1), np.nan, 0.0)
     rows = np.nonzero(np.isnan(least))[0]
     reference = task.objective.of(task.conventional)
-    found = answers([_question(nominal, k, float(reference[k])) for k in rows], task.progress)
+    found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
     for k, optimum in zip(rows, found, strict=True):
         least[k] = np.nan if optimum is None else optimum.worst
     return least
 
 
-def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
+def least_residuals(plans: Plans, progress: Progress | None = None, band: float = 0.0) -> Array:
     """How still the tool could be at best after each planned move, in the time that it has.
 
     Parameters
@@ -289,11 +288,13 @@ def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
         n moves.
     progress : callable, optional
         See `Progress`.
+    band : float, optional
+        Relative error of the modes' frequencies; their own by default. [-]
 
     Returns
     -------
     ndarray, shape (n,)
-        Largest residual displacement over the modes, at their own frequencies; NaN where a move is
+        Largest residual displacement over the modes, and over the band; NaN where a move is
         not planned or no profile on the grid keeps the limits. Of axes that move each on its own, a
         mode that several of them excite is left out: they might cancel each other. [mm]
 
@@ -306,20 +307,20 @@ def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
     excited = np.zeros((len(plans), len(plans.modes.poles)), dtype=np.int64)
     np.add.at(excited, plans.move, task.objective.weights > 0.0)
     weights = np.where(excited[plans.move] > 1, 0.0, task.objective.weights)
-    task = replace(task, objective=replace(task.objective, weights=weights))
+    task = replace(task, objective=replace(task.objective, weights=weights), band=band)
     least = np.where(plans.planned, 0.0, np.nan)
     with np.errstate(invalid="ignore"):
         np.maximum.at(least, plans.move, bounds(task))
     return least
 
 
-def known_limits(plans: Plans, progress: Progress | None = None) -> Array | None:
+def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0.0) -> Array | None:
     """The same for reports: None where the solver is not installed, since all else is known."""
     try:
         require_solver()
     except PlanError:
         return None
-    return least_residuals(plans, progress)
+    return least_residuals(plans, progress, band)
 
 
 def _question(

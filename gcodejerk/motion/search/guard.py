@@ -30,9 +30,11 @@ CEILING = 0.25
 """Highest guarded frequency, times the interval: above it, four commands a period shape little."""
 WINDOW = 0.15
 """Part of a frequency on each side of it in which today's largest response is its envelope."""
-FINE, MOST = 0.4, 400
+FINE, MOST = 0.15, 800
 """Distance of frequencies, times the half of a duration, at which a response is looked at [rad],
 and how many at most: a ramp of a second has more than it can be designed for."""
+FEWEST = 200
+"""Frequencies at which an envelope is looked at, at least."""
 
 
 def guarded_frequencies(poles: Complex, band: float, interval: float, duration: float) -> Array:
@@ -61,9 +63,11 @@ def guarded_frequencies(poles: Complex, band: float, interval: float, duration: 
         return np.zeros(0)
     begin, end = lowest[highest > lowest].min(), highest.max()
     count = min(int(np.ceil(0.5 * (end - begin) * duration / FINE)), MOST) + 1
-    omega = np.linspace(begin, end, count)[:, np.newaxis]
+    # The ends of what is known and of what is guarded are looked at as well.
+    ends = [(1.0 - band) * modes, (1.0 + band) * modes, lowest, highest]
+    omega = np.unique(np.concatenate([np.linspace(begin, end, count), *ends]))[:, np.newaxis]
     inside = ((omega >= lowest) & (omega <= highest)).any(axis=1)
-    known = (np.abs(omega / modes - 1.0) <= band).any(axis=1)
+    known = (np.abs(omega / modes - 1.0) < band * (1.0 - 1e-9)).any(axis=1)
     guarded: Array = omega[inside & ~known, 0]
     return guarded
 
@@ -86,15 +90,15 @@ def envelope(today: Profiles, omega: Array) -> Array:
     if not len(omega):
         return np.zeros(0)
     halves = split_at_peak(today)
-    low, high = omega[0] * (1.0 - WINDOW), omega[-1] * (1.0 + WINDOW)
-    longest = max(float(half.total[0]) for half in halves)
-    count = max(int(np.ceil(0.5 * (high - low) * longest / FINE)), 200) + 1
-    every = np.linspace(low, high, count)
-    response = sum(undamped_response(half, every) for half in halves)
     ends = np.column_stack([omega * (1.0 - WINDOW), omega * (1.0 + WINDOW)])
+    low, high = ends[0, 0], ends[-1, 1]
+    longest = max(float(half.total[0]) for half in halves)
+    count = max(int(np.ceil(0.5 * (high - low) * longest / FINE)), FEWEST)
+    every = np.union1d(np.linspace(low, high, count), ends)
+    response = np.add(*(undamped_response(half, every) for half in halves))
     index = np.searchsorted(every, ends)
-    index[:, 1] = np.minimum(np.maximum(index[:, 1], index[:, 0] + 1), count - 1)
-    largest: Array = np.maximum.reduceat(response, np.minimum(index.ravel(), count - 1))[::2]
+    index[:, 1] = np.minimum(index[:, 1] + 1, len(every) - 1)
+    largest: Array = np.maximum.reduceat(response, index.ravel())[::2]
     return largest
 
 

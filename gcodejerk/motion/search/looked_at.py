@@ -115,7 +115,7 @@ class LookedAt:
     @property
     def sparse(self) -> NDArray[np.bool_]:
         """Some of the groups: guarded frequencies side by side say nearly the same, shape (g,)."""
-        stride = max(3, int(np.count_nonzero(self.source < 0)) // 48)
+        stride = max(8, int(np.count_nonzero(self.source < 0)) // 48)
         sparse: NDArray[np.bool_] = np.arange(len(self.source)) % stride == 0
         return sparse
 
