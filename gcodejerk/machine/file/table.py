@@ -215,7 +215,7 @@ def _mode(participation: Kind, doc: str, required: bool) -> Section:
                 "Damping ratio: 0 rings for ever, machine tools have 0.01 to 0.1.",
                 default=0.0, example="0.02"),
             Key("participation", participation, doc, required,
-                None if required else 1.0, example="{Y: 0.4, Z: 1.0}" if required else "1.0"),
+                example="{Y: 0.4, Z: 1.0}" if required else "1.0"),
         )
     )  # fmt: skip
 
@@ -254,7 +254,12 @@ _AXIS = Section(
             example="[-400, 50]"),
         Key("modes", OrMapping(
             ListOf(
-                _mode(Number("-", at_least=0.0), "How strongly the axis excites the mode.", False),
+                _mode(
+                    Number("-", at_least=0.0),
+                    "How strongly the axis excites the mode: mm at the tool for each mm, or each "
+                    "degree, of the axis. Left out: 1, but a rotary axis has to say it.",
+                    False,
+                ),
                 at_most=100),
             Section((replace(_SPECTRUM, required=True),))),
             "Modes that this axis alone excites, as a list; or {spectrum: FILE}, which is the key "
