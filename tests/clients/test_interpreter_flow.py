@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from interpreter import run_oracle
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
@@ -41,11 +42,8 @@ def interpret(path):
     """Moves: (line, what, X Y Z), and the refusal."""
     table = path.with_suffix(".tbl")
     table.write_text("T1 P1 Z0 D5\n")
-    command = ["/usr/bin/python3", str(HERE / "oracle.py"), str(path), "--startup", STARTUP]
     try:
-        done = subprocess.run(
-            [*command, "--tool-table", str(table)], capture_output=True, text=True, timeout=2
-        )
+        done = run_oracle(path, "--startup", STARTUP, "--tool-table", table, timeout=2)
     except subprocess.TimeoutExpired:
         return [], "endless"
     moves = []
