@@ -23,7 +23,7 @@ INSTALLED = (Path("/usr/share/linuxcnc"), Path("/usr/share/doc/linuxcnc"))
 STARTUP = "G17 G21 G40 G49 G54 G64 G80 G90 G94 G97"
 TOLERANCE = 2e-6
 STILL = 1e-7
-CYCLES = re.compile(rb"(?im)^[^(;]*g(73|8[1-9])\b")
+CYCLES = re.compile(rb"(?im)^[^(;\n]*g(73|8[1-9])\b")
 
 pytestmark = [
     pytest.mark.linuxcnc,
