@@ -5,7 +5,7 @@ import tempfile
 
 from hypothesis import settings
 
-LONG = 100
+LONG = 250
 """How many times more examples `--long` draws."""
 
 

@@ -48,7 +48,7 @@ KNOWN = dict.fromkeys("XYZABC", 0.0)
 # A machine is a large thing to shrink: minutes for a smaller example that says no more.
 CALM = settings(
     deadline=None,
-    max_examples=8,
+    max_examples=4,
     phases=(Phase.explicit, Phase.reuse, Phase.generate),
     suppress_health_check=list(HealthCheck),
 )
