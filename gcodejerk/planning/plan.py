@@ -168,10 +168,8 @@ class _Planner:
             self.conventional.total if self.time is None else np.full(len(self.share), self.time)
         )
         counts = np.maximum(whole_intervals(total, self.interval), 1)
-        stays_conventional = np.zeros(len(counts), dtype=bool)
         if self.profile == "conventional":
             profiles, feasible = self._conventional(counts)
-            stays_conventional[:] = True
         elif self.profile in SHAPERS:
             profiles, counts, feasible = self._shaped()
         elif self.T1 is not None:
@@ -179,9 +177,9 @@ class _Planner:
         elif self.profile == "shortest":
             profiles, counts, feasible = self._shortest(counts)
         else:
-            profiles, counts, feasible, stays_conventional = self._designed(counts)
+            profiles, counts, feasible = self._designed(counts)
         self._rule_out_profiles(~feasible, Reason.LIMITS)
-        return self._plans(profiles, counts, stays_conventional)
+        return self._plans(profiles, counts)
 
     def _conventional(self, counts: NDArray[np.int64]) -> tuple[Profiles, NDArray[np.bool_]]:
         """The controller's own profiles; a trapezoid cannot be written with finite jerk."""
@@ -270,10 +268,9 @@ class _Planner:
 
     def _designed(
         self, counts: NDArray[np.int64]
-    ) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    ) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_]]:
         """A profile of unchanged time; longer only where the limits leave no room."""
         profiles, worst = DESIGNS[self.profile](self.task.after(counts))
-        stays_conventional = np.zeros(len(counts), dtype=bool)
         if self.time is None:
             reference = worst_in_band(self.task, self.conventional)
             fits = self._within_limits(self.conventional)
@@ -285,10 +282,8 @@ class _Planner:
             if self.machine.positioning != "linear":
                 # Axes that run on their own: one may keep what it has while another gains.
                 in_time = self.conventional.total <= counts * self.interval * (1.0 + 1e-9)
-                stays_conventional = useless & fits & (alone | in_time)
-                profiles = profiles.replaced(
-                    stays_conventional, self.conventional.take(stays_conventional)
-                )
+                keeps = useless & fits & (alone | in_time)
+                profiles = profiles.replaced(keeps, self.conventional.take(keeps))
                 worst, reference = self._at_arrival(profiles, worst)
                 useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
             self._rule_out_profiles(useless, Reason.NOT_BETTER)
@@ -298,7 +293,7 @@ class _Planner:
             limits = tuple(limit[row : row + 1] for limit in self.limits)
             total = float(counts[row] * self.interval)
             raise time_error(self.machine, self.share[row], limits, total, self.profile)
-        return profiles, counts, np.isfinite(worst), stays_conventional
+        return profiles, counts, np.isfinite(worst)
 
     def _at_arrival(self, profiles: Profiles, worst: Array) -> tuple[Array, Array]:
         """What the profiles of a move leave together, and today's; of each profile [mm]."""
@@ -356,9 +351,7 @@ class _Planner:
         moves[self.move[where]] = True
         rule_out(self.reason, moves, why)
 
-    def _plans(
-        self, profiles: Profiles, counts: NDArray[np.int64], stays_conventional: NDArray[np.bool_]
-    ) -> Plans:
+    def _plans(self, profiles: Profiles, counts: NDArray[np.int64]) -> Plans:
         """The profiles of planned moves, and the moves' own columns."""
         conventional_time = np.zeros(len(self.reason))
         np.maximum.at(conventional_time, self.move, self.conventional.total)
@@ -381,7 +374,6 @@ class _Planner:
             profiles=profiles.take(keep),
             conventional=self.conventional.take(keep),
             profile_counts=counts[keep],
-            stays_conventional=stays_conventional[keep],
             designed=self.profile,
             worst_in_band=in_band[0],
             conventional_in_band=in_band[1],

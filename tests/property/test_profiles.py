@@ -133,7 +133,7 @@ def test_every_profile_keeps_what_it_promises(part, machine, seed):
             share, key = own.share[k], (own.move[k], tuple(np.nonzero(own.share[k])[0]))
             left = worst(machine, share, motion, band)
             today = worst(machine, share, Motion(own.conventional, k), band)
-            if own.stays_conventional[k]:
+            if own.profiles.segments(k) == own.conventional.segments(k):
                 assert machine.positioning == "independent", name
                 assert left <= today * (1.0 + 1e-9), name
             else:
