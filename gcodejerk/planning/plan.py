@@ -7,6 +7,8 @@ stays, and why a move cannot be planned. Numbers are columns: one row a move, on
 
 from __future__ import annotations
 
+from dataclasses import InitVar, dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -113,7 +115,17 @@ def plan_moves(
             "give a shorter one",
         )
     return _Planner(
-        machine, profile, displacement, length, reason, time, T1, progress, speed, lone, as_today
+        machine=machine,
+        profile=profile,
+        displacement=displacement,
+        length=length,
+        reason=reason,
+        time=time,
+        T1=T1,
+        as_today=as_today,
+        progress=progress,
+        speed=speed,
+        lone=lone,
     ).run()
 
 
@@ -122,45 +134,49 @@ def rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -
     reason[where & (reason == CERTAIN)] = REASONS.index(why)
 
 
+@dataclass(kw_only=True, slots=True, eq=False)
 class _Planner:
     """One call of `plan_moves`: its profiles, from limits to designs."""
 
-    def __init__(
-        self,
-        machine: Machine,
-        profile: str,
-        displacement: Array,
-        length: Array,
-        reason: NDArray[np.uint8],
-        time: float | None,
-        T1: float | None,
-        progress: Progress | None,
-        speed: Array | None,
-        lone: NDArray[np.bool_] | None,
-        as_today: bool,
+    machine: Machine
+    profile: str
+    displacement: Array
+    length: Array
+    reason: NDArray[np.uint8]
+    time: float | None
+    T1: float | None
+    as_today: bool
+    progress: InitVar[Progress | None]
+    speed: InitVar[Array | None]
+    lone: InitVar[NDArray[np.bool_] | None]
+    modes: Modes = field(init=False)
+    interval: float = field(init=False)
+    move: NDArray[np.int64] = field(init=False)
+    share: Array = field(init=False)
+    task: Task = field(init=False)
+    limits: tuple[Array, Array, Array] = field(init=False)
+    conventional: Profiles = field(init=False)
+    judged: tuple[Array, Array] | None = field(init=False, default=None)
+    """What the profiles' moves leave at worst over the band, and what today's do [mm]."""
+
+    def __post_init__(
+        self, progress: Progress | None, speed: Array | None, lone: NDArray[np.bool_] | None
     ) -> None:
-        self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
-        self.as_today = as_today
-        self.displacement, self.length, self.reason = displacement, length, reason
-        self.modes = Modes.of(machine)
-        self.interval = machine.interval
-        rows = np.nonzero(reason == CERTAIN)[0]
-        if machine.positioning == "linear":
-            self.move, self.share = rows, displacement[rows]
+        self.modes, self.interval = Modes.of(self.machine), self.machine.interval
+        rows = np.nonzero(self.reason == CERTAIN)[0]
+        if self.machine.positioning == "linear":
+            self.move, self.share = rows.astype(np.int64), self.displacement[rows]
         else:
-            index, axis = np.nonzero(displacement[rows] != 0.0)
-            self.move = rows[index]
+            index, axis = np.nonzero(self.displacement[rows] != 0.0)
+            self.move = rows[index].astype(np.int64)
             self.share = np.zeros((len(index), len(AXES)))
-            self.share[np.arange(len(index)), axis] = displacement[self.move, axis]
-        self.move = self.move.astype(np.int64)
-        cap = None if speed is None else speed[self.move] / length[self.move]
+            self.share[np.arange(len(index)), axis] = self.displacement[self.move, axis]
+        cap = None if speed is None else speed[self.move] / self.length[self.move]
         alone = None if lone is None else lone[self.move]
         self.task = Task.of(
-            machine, self.modes, self.share, progress=progress, speed=cap, lone=alone
+            self.machine, self.modes, self.share, progress=progress, speed=cap, lone=alone
         )
         self.limits, self.conventional = self.task.limits, self.task.conventional
-        self.judged: tuple[Array, Array] | None = None
-        """What the profiles' moves leave at worst over the band, and what today's do [mm]."""
 
     def run(self) -> Plans:
         """Design every profile, then gather the moves."""
