@@ -1,10 +1,10 @@
 """Damage of every kind, done to processed programs of every dialect: `verify` notices each.
 
 Damage is done in two ways: as it is, where the sum in the stamp shows any change of any byte; and
-with the sum put right by this file, so that what the other checks notice is known too. The first
-way is looked at for every fourth kind, another fourth from program to program, and for all kinds
-with the programs that have room for all.
-`SUM_ALONE` lists what they cannot notice, with the reason.
+with the sum put right by this file, so that what the other checks notice is known too. The drawn
+programs get every other kind, and every fourth in the first way, others from program to program;
+the programs that have room for all get all. `SUM_ALONE` lists what the other checks cannot notice,
+with the reason.
 """
 
 import hashlib
@@ -480,8 +480,8 @@ APPLIED = set()
 """Kinds of damage that some drawn program of this run had room for."""
 
 
-STRIDE = 4
-"""Kinds of damage from one that is looked at as it is, its sum wrong, to the next."""
+STRIDE = 2
+"""Kinds of damage from one that a drawn program gets to the next."""
 
 
 def missed(dialect, program, pick, stride=1):
@@ -493,13 +493,15 @@ def missed(dialect, program, pick, stride=1):
         return None
     assert verify(program, output, machine, dialect=dialect).ok
     out = []
-    turn = pick.randrange(stride)
+    turn = pick.randrange(stride**2)
     for k, (name, damage) in enumerate(DAMAGE.items()):
+        if k % stride != turn % stride:
+            continue
         damaged = damage(text, pick.choice(text.inner), pick.choice(text.tails))
         if damaged is None or damaged == output:
             continue
         APPLIED.add(name)
-        as_it_is = k % stride == turn
+        as_it_is = k % stride**2 == turn
         if as_it_is and verify(program, damaged, machine, dialect=dialect, most=1).ok:
             out.append(f"{name}, by the sum too")
         if name not in SUM_ALONE:
