@@ -12,6 +12,9 @@ Rule 2: a rounded move never goes backwards and never passes its end.
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,9 +86,13 @@ def round_positions(
     step_phase = np.exp(poles * usual * grid.interval)
     differs = (duration != usual) & (np.arange(n)[:, np.newaxis] < under_way)
     some_differ = differs.any(axis=0)
-    for knot, m in enumerate(under_way[:-1].tolist(), 1):
-        if m == 0:
-            continue
+    begin, together = (int(np.searchsorted(under_way[:-1], m)) for m in (1, 2))
+    if begin < together:
+        knots = slice(1 + begin, 1 + together)
+        longer = np.where(differs[0], duration[0] - usual, 0)[begin:together]
+        columns = (exact[knots, 0], half[knots, 0], below[knots, 0], above[knots, 0], longer)
+        out[knots, 0] = _alone(columns, previous, running, share, step_phase, poles, grid.interval)
+    for knot, m in enumerate(under_way[together:-1].tolist(), 1 + together):
         ringing, before = running[:m], previous[:m]
         ringing *= step_phase
         if some_differ[knot - 1]:
@@ -99,6 +106,30 @@ def round_positions(
         out[knot, :m] = before
         ringing += (before - exact[knot, :m])[:, np.newaxis]
     return _in_order(out, direction, order)
+
+
+def _alone(
+    columns: tuple[NDArray[Any], ...], previous: Array, running: Complex, share: Array,
+    step_phase: Complex, poles: Complex, interval: float,
+) -> list[float]:  # fmt: skip
+    """The knots at which the longest move alone is under way: without arrays of a single number.
+
+    What has been rounded last, and what rings of it, stays in the first rows of `previous` and
+    `running`. The columns are the exact positions, those plus 0.5, the neighbours below and above,
+    and how much longer than usual the block before each is. [intervals]
+    """
+    ringing, before = running[:1], float(previous[0])
+    written = []
+    for exact, half, below, above, longer in zip(*(c.tolist() for c in columns), strict=True):
+        ringing *= step_phase
+        if longer:
+            ringing *= np.exp(poles * longer * interval)
+        nearest = float(math.floor(half - (ringing.real @ share).item()))
+        before = max(min(max(nearest, below), above), before)
+        written.append(before)
+        ringing += before - exact
+    previous[0] = before
+    return written
 
 
 def _in_order(out: Array, direction: Array, order: NDArray[np.intp]) -> Counts:

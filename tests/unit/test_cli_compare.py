@@ -221,7 +221,7 @@ def test_axes_on_their_own_are_compared_too(run, tmp_path):
 
 
 def test_a_measured_spectrum_is_compared_and_drawn(run, tmp_path):
-    lines = [f"{f},{1.0 / ((1 - (f / 40) ** 2) ** 2 + 0.01)}\n" for f in range(10, 121, 2)]
+    lines = [f"{f},{1.0 / ((1 - (f / 40) ** 2) ** 2 + 0.01)}\n" for f in range(10, 121, 10)]
     (tmp_path / "x.csv").write_text("".join(lines))
     (tmp_path / "m.yaml").write_text(
         "interval: 0.001\npositioning: linear\naxes:\n"
