@@ -148,8 +148,13 @@ def test_every_profile_keeps_what_it_promises(part, machine, seed):
             if name == "optimal":
                 best[key] = left, own.profile_counts[k]
             elif key not in best:
-                # The optimum was not worth it, so no other profile may be.
-                assert not fits[own.move[k]] or today <= left * 1.03 + slack, name
+                # The optimum was not worth it, so no other profile may be; but where axes run on
+                # their own, the best of each are not the best together.
+                assert (
+                    machine.positioning == "independent"
+                    or not fits[own.move[k]]
+                    or today <= left * 1.03 + slack
+                ), name
             elif best[key][1] == own.profile_counts[k]:
                 # Points beside those that the optimum was judged on may be worse by a little.
                 assert best[key][0] <= left * 1.03 + slack, name
