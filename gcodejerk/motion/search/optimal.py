@@ -218,6 +218,8 @@ class _Search:
         self.unit = max(unit, 1e-12 * float(weights.max(initial=0.0)))
         self.weights = weights / self.unit
         self.total = move.count * move.interval
+        # Where one programme had to hold the velocity between its knots, the next will have to.
+        self.curved = False
         self.ramp = self._ramp()
         self.halves = move.count > HALVES
 
@@ -325,7 +327,8 @@ class _Search:
         while rounds > 0:
             rounds -= 1
             problem = self._problem(looked_at, blocks, active)
-            solution = solve(problem, USED * allowed, cost)
+            solution = solve(problem, USED * allowed, cost, self.curved)
+            self.curved |= solution is not None and solution.curved
             if solution is None or (enough and solution.worst > allowed):
                 return best
             # Little jerk has cost at most this; where that is too much, it is made cheaper.

@@ -93,11 +93,14 @@ class Solution:
         Largest residual over the groups without a cap. [-]
     peak : float
         Largest jerk as a share of its limit. [-]
+    curved : bool
+        The velocity had to be held between the knots, too.
     """
 
     jerk: Array
     worst: float
     peak: float
+    curved: bool
 
 
 def require_solver() -> None:
@@ -115,7 +118,7 @@ def require_solver() -> None:
 
 
 def solve(
-    problem: Problem, allowed: float, jerk_cost: float, accuracy: float = ACCURACY
+    problem: Problem, allowed: float, jerk_cost: float, curved: bool = False
 ) -> Solution | None:
     """The profile that has the least sum of residual above what is allowed and cost of its jerk.
 
@@ -127,8 +130,9 @@ def solve(
         Residual that costs nothing. [-]
     jerk_cost : float
         What the full jerk costs: it decides among profiles that leave the same. [-]
-    accuracy : float, optional
-        Asked of the solver. [-]
+    curved : bool, optional
+        Hold the velocity between the knots from the beginning; else only where it is beyond its
+        bounds there, which costs a second call of the solver.
 
     Returns
     -------
@@ -140,7 +144,7 @@ def solve(
     PlanError
         scipy or clarabel is not installed.
     """
-    return _solve(problem, allowed, jerk_cost, accuracy)
+    return _solve(problem, allowed, jerk_cost, curved)
 
 
 def smoothest_null(problem: Problem) -> Solution | None:
@@ -161,22 +165,21 @@ def smoothest_null(problem: Problem) -> Solution | None:
     PlanError
         scipy or clarabel is not installed.
     """
-    return _solve(problem, None, 1.0, ACCURACY)
+    return _solve(problem, None, 1.0, False)
 
 
 def _solve(
-    problem: Problem, allowed: float | None, jerk_cost: float, accuracy: float
+    problem: Problem, allowed: float | None, jerk_cost: float, curved: bool
 ) -> Solution | None:
     """Residual and jerk are minimised, or where nothing is allowed the jerk of a null."""
-    found = _solve_once(problem, allowed, jerk_cost, accuracy, curved=False)
-    if found is not None and not _Unknowns(problem).keeps_velocity(found.jerk):
-        # Seldom: between two knots the velocity goes beyond its bounds.
-        return _solve_once(problem, allowed, jerk_cost, accuracy, curved=True)
-    return found
+    found = _solve_once(problem, allowed, jerk_cost, curved)
+    if curved or found is None or _Unknowns(problem).keeps_velocity(found.jerk):
+        return found
+    return _solve_once(problem, allowed, jerk_cost, True)
 
 
 def _solve_once(
-    problem: Problem, allowed: float | None, jerk_cost: float, accuracy: float, curved: bool
+    problem: Problem, allowed: float | None, jerk_cost: float, curved: bool
 ) -> Solution | None:
     """One call of the solver."""
     require_solver()
@@ -215,12 +218,12 @@ def _solve_once(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = accuracy
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = ACCURACY
     none = sparse.csc_matrix((width, width))
     found = clarabel.DefaultSolver(none, cost, matrix, bound, cones, settings).solve()
     if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None
-    return unknowns.solution(np.array(found.x), null=allowed is None)
+    return unknowns.solution(np.array(found.x), curved, null=allowed is None)
 
 
 def residuals(problem: Problem, jerk: Array) -> Array:
@@ -351,7 +354,7 @@ class _Unknowns:
             return folded
         return response
 
-    def solution(self, x: Array, null: bool) -> Solution:
+    def solution(self, x: Array, curved: bool, null: bool) -> Solution:
         """The solver's answer, mended to the last digit where it must be exact."""
         problem = self.problem
         a = self.sign * np.append(x, 0.0)[np.where(self.at_a < 0, len(x), self.at_a)]
@@ -365,7 +368,7 @@ class _Unknowns:
         mended: Array = jerk + correction
         counts = np.isnan(problem.cap)
         worst = float(residuals(problem, mended)[counts].max(initial=0.0))
-        return Solution(mended, worst, float(x[self.peak]))
+        return Solution(mended, worst, float(x[self.peak]), curved)
 
     def _correction(self, jerk: Array, exact: Array) -> Array:
         """The least change of the jerk that makes rows exact: 0, but for the third, the length."""
