@@ -8,6 +8,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion import Grid
 from gcodejerk.planning.lines import Play, block_times, missing_times, played_positions
+from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.stream import NumberFormat, make_streams
 
@@ -111,3 +112,15 @@ def test_a_mode_near_half_the_sampling_rate_is_judged_by_the_stream():
     both = [each for each in left.values() if len(each) == 2]
     assert len(both) > 5
     assert any(each[Play.HELD] > 2.0 * each[Play.PROFILE] for each in both)
+
+
+def test_a_plan_is_judged_in_the_form_of_its_control_and_has_a_point_for_every_interval():
+    move = {"X": 37.3, "Z": -20.0}
+    table = plan_move(move, MACHINE)
+    held = plan_move(move, MACHINE, stride=2, play=Play.HELD)
+    assert held.planned
+    np.testing.assert_array_equal(held.t, table.t)
+    np.testing.assert_array_equal(held.positions["X"], table.positions["X"])
+    (batch,) = batches([[37.3, -20.0]], Play.HELD)
+    np.testing.assert_array_equal(held.residual, batch.residual)
+    assert abs(held.residual[0, 1] - table.residual[0, 1]) > 5e-4

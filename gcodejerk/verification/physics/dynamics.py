@@ -23,7 +23,7 @@ from gcodejerk.machine import BELL, Machine
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.physics.conventional import rapid_time
 from gcodejerk.verification.physics.feeds import NOT_OWN, check_feeds, rapid_limits
-from gcodejerk.verification.physics.held import Blocks, check_held
+from gcodejerk.verification.physics.held import MIRRORED, Blocks, check_held, check_mirror
 from gcodejerk.verification.physics.independent import check_axes
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import Array, Index, Paths
@@ -200,6 +200,8 @@ def _check_points(
         feeds = check_feeds(paths, machine, t, limits_of(machine))
     else:
         feeds = check_held(paths, machine.interval, clock.moment) if has_feeds else []
+        if has_feeds and not independent and machine.design.profile in MIRRORED:
+            feeds.append(check_mirror(paths, clock.moment))
     for kind, rows, problem in (
         *(check_axes(paths, machine, t, *_own_times(paths, machine)) if independent else ()),
         *_limits(paths, machine, t, end_speeds),

@@ -7,7 +7,9 @@ when it is where. This module owns what follows:
 - a block without length takes no time, and says the F of the next block that has a length, or of
   the last one that has; in the middle of the motion the next block takes its time as well;
 - all blocks together last as long as the rapid, less what is lost in front of the motion and behind
-  it to blocks without length.
+  it to blocks without length;
+- of a profile that is its own mirror image the points are too, up to their rounding: two increments
+  that changed places with their F words are a motion, but not that one.
 
 Rule: the length is that between the points as they are written, never that of a profile.
 """
@@ -21,7 +23,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Kind
-from gcodejerk.verification.physics.points import Array, Index, Paths
+from gcodejerk.verification.physics.points import TINY, Array, Index, Paths
 
 Rows = NDArray[np.bool_]
 
@@ -31,6 +33,8 @@ FLOAT = 4e-12
 """Rounding of float64 in a length. [mm] or [deg]"""
 NO_LENGTH = 1e-5
 """A block in which no axis moves this share of a step has no length. [steps]"""
+MIRRORED = ("condition3", "symmetric", "cascade")
+"""Profiles that are their own mirror image, over the whole time of the rapid."""
 DRIFT = 0.5
 """What the digits of all F words together may make of the time. [intervals]"""
 
@@ -129,3 +133,27 @@ def check_held(paths: Paths, interval: float, moment: Index) -> list[tuple[Kind,
     late = np.zeros(len(owner), dtype=np.bool_)
     late[paths.end - 1] = ~(excess <= DRIFT * interval + np.add.reduceat(known, begin))
     return [*out, (Kind.TIME, late, "the blocks do not add up to the time of the rapid")]
+
+
+def check_mirror(paths: Paths, moment: Index) -> tuple[Kind, Rows, str]:
+    """Compare the points of streams with their mirror images, where there is a point at that time.
+
+    Parameters
+    ----------
+    paths : Paths
+        The streams, of straight lines with a profile of `MIRRORED`.
+    moment : ndarray of int, shape (rows,)
+        When each point is reached, rising within each stream. [intervals]
+    """
+    owner = paths.owner
+    total = moment[paths.end - 1]
+    # All streams on one clock, on which none meets another.
+    clock = np.cumsum(total + 1) - total - 1
+    wanted = (clock + total)[owner] - moment
+    at = np.minimum(np.searchsorted(clock[owner] + moment, wanted), len(owner) - 1)
+    known = (clock[owner] + moment)[at] == wanted
+    moved = paths.position - paths.start[owner]
+    left = paths.displacement[owner] - moved[at]
+    steps = 2.0 * paths.step[owner] + TINY
+    bad: Rows = known & np.any(np.abs(moved - left) > steps, axis=1)
+    return Kind.FEED, bad, "the points are not those of a profile that is its own mirror image"
