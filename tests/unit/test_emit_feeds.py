@@ -1,5 +1,6 @@
 """F of the blocks: the mean speed for controls that hold it, speeds at the ends for LinuxCNC."""
 
+import io
 import itertools
 import re
 from dataclasses import replace
@@ -13,7 +14,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.emit.feeds import end_feeds, mean_feeds
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.stream import NumberFormat, make_streams
-from gcodejerk.verification import Kind, verify
+from gcodejerk.verification import Kind, verify, verify_files
 
 TEXT = """
 interval: 0.002
@@ -205,3 +206,27 @@ def test_a_machine_that_runs_another_control_s_streams_would_run_them_otherwise(
         assert {v.kind for v in found.violations} == {Kind.FEED}
         assert verify(program, text, changed, controller=own).ok
         assert verify(program, text, replace(changed, controller=own)).ok
+
+
+@pytest.mark.parametrize("controller", ["mach", "csv"])
+def test_a_block_with_a_whole_step_more_than_the_limit_allows_is_refused(controller):
+    # 600.6 steps in a block: 601 are rounding, 602 are not.
+    machine = Machine.loads(TEXT.replace("velocity: 300", "velocity: 300.3"))
+    program = HEAD + b"G0 X300\nM2\n"
+    text = process(program, machine, controller=controller).output
+    number = rb"(?m)^G1 X([0-9.]+) F.*$" if controller == "mach" else rb"(?m)^2,[0-9.]+,([0-9.]+),"
+    found = [(float(m[1]), m.span(1)) for m in re.finditer(number, text)]
+    steps = np.rint(np.diff([round(x * 1e3) for x, _ in found])).astype(int)
+    assert set(steps[len(steps) // 2 - 20 : len(steps) // 2 + 20].tolist()) == {600, 601}
+    assert steps.max() == 601
+    k = len(steps) // 2 + int(np.argmax(steps[len(steps) // 2 :] == 601)) + 1
+    x, (begin, end) = found[k]
+    damaged = text[:begin] + b"%.3f" % (x + 1e-3) + text[end:]
+    table = {"table": True} if controller == "csv" else {}
+    own = replace(machine, controller=controller)
+    good, bad = (
+        verify_files(io.BytesIO(program), io.BytesIO(data), own, **table)
+        for data in (text, damaged)
+    )
+    assert good.ok
+    assert Kind.VELOCITY in {v.kind for v in bad.violations}
