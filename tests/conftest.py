@@ -5,7 +5,7 @@ import tempfile
 
 from hypothesis import settings
 
-LONG = 100
+LONG = 250
 """How many times more examples `--long` draws."""
 
 
@@ -28,7 +28,8 @@ def pytest_addoption(parser):
     parser.addoption(
         "--long",
         action="store_true",
-        help=f"draw {LONG} times as many examples in property tests: hours, on demand",
+        help=f"draw {LONG} times as many examples in property tests, and take all of what other "
+        "tests take in strides: hours, on demand",
     )
 
 

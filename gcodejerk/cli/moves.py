@@ -85,7 +85,7 @@ def plan(
         screen = console()
         for table in move_tables(record, conventional_motion(planned)):
             screen.print(table)
-        if limit := move_limit(record):
+        if limit := move_limit(record, 100.0 * described.design.band):
             print(limit)
         for note in record["notes"]:
             print(note)

@@ -162,6 +162,9 @@ class Design:
     profile: str
     band: float
     """Relative frequency error to be robust to. [-]"""
+    guard: float
+    """What frequencies that the file does not name may keep after an optimal rapid, times the
+    envelope of what today's leaves; 0: anything. [-]"""
     tolerance: float
     """Residual displacement that counts as settled. [mm]"""
     minimum_length: float

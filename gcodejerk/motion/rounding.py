@@ -13,6 +13,9 @@ Rule 3: where the points set the speed, no block is faster than the highest spee
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -98,9 +101,14 @@ def round_positions(
     step_phase = np.exp(poles * usual * grid.interval)
     differs = (duration != usual) & (np.arange(n)[:, np.newaxis] < under_way)
     some_differ = differs.any(axis=0)
-    for knot, m in enumerate(under_way[:-1].tolist(), 1):
-        if m == 0:
-            continue
+    begin, together = (int(np.searchsorted(under_way[:-1], m)) for m in (1, 2))
+    if begin < together:
+        knots = slice(1 + begin, 1 + together)
+        longer = np.where(differs[0], duration[0] - usual, 0)[begin:together]
+        reach = np.full(together - begin, np.inf) if most is None else most[begin:together, 0]
+        columns = (exact[knots, 0], half[knots, 0], below[knots, 0], above[knots, 0], longer, reach)
+        out[knots, 0] = _alone(columns, previous, running, share, step_phase, poles, grid.interval)
+    for knot, m in enumerate(under_way[together:-1].tolist(), 1 + together):
         ringing, before = running[:m], previous[:m]
         ringing *= step_phase
         if some_differ[knot - 1]:
@@ -123,6 +131,32 @@ def _most_steps(speed: Array, duration: Counts, grid: Grid) -> Array:
     exact = speed[:, np.newaxis] * (duration * grid.interval)
     most: Array = np.ascontiguousarray(np.ceil(exact - 1e-9).T)
     return most
+
+
+def _alone(
+    columns: tuple[NDArray[Any], ...], previous: Array, running: Complex, share: Array,
+    step_phase: Complex, poles: Complex, interval: float,
+) -> list[float]:  # fmt: skip
+    """The knots at which the longest move alone is under way: without arrays of a single number.
+
+    What has been rounded last, and what rings of it, stays in the first rows of `previous` and
+    `running`. The columns are the exact positions, those plus 0.5, the neighbours below and above,
+    how much longer than usual the block before each is [intervals], and its steps at most.
+    """
+    ringing, before = running[:1], float(previous[0])
+    written = []
+    for exact, half, below, above, longer, reach in zip(
+        *(c.tolist() for c in columns), strict=True
+    ):
+        ringing *= step_phase
+        if longer:
+            ringing *= np.exp(poles * longer * interval)
+        nearest = float(math.floor(half - (ringing.real @ share).item()))
+        before = max(min(max(nearest, below), above, before + reach), before)
+        written.append(before)
+        ringing += before - exact
+    previous[0] = before
+    return written
 
 
 def _in_order(out: Array, direction: Array, order: NDArray[np.intp]) -> Counts:

@@ -27,9 +27,10 @@ from gcodejerk.motion import (
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.cascade import design_cascade, leading_periods
 from gcodejerk.motion.search.conditions import design_condition
-from gcodejerk.motion.search.optimal import Move, Optimum, optimum_profiles
+from gcodejerk.motion.search.guard import keeps_guard
 from gcodejerk.motion.search.ramps import design_symmetric
 from gcodejerk.motion.search.socp import require_solver
+from gcodejerk.motion.search.unit_move import Move, Optimum, optimum_profiles
 from gcodejerk.planning.optima import Progress, Question, answers
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.task import Task, worst_in_band
@@ -41,6 +42,9 @@ SEARCHED, FEWEST = 1.6, 1
 so many on each side at least."""
 MOST_REMEMBERED = 50_000
 """Profiles that a search remembers, a few hundred bytes each."""
+NEXT_TO_NOTHING, SETTLED = 0.01, 0.1
+"""A residual does not matter below this share of what today's rapid leaves, or below this one of
+the tolerance, whichever is more."""
 COARSE = 24
 """Moves of so few intervals may gain from segments that end between them."""
 
@@ -154,16 +158,25 @@ def _remembered(search: Search) -> dict[bytes, Profiles | None]:
 
 
 def optimal(task: Task) -> tuple[Profiles, Array]:
-    """The least worst residual over the band, of all profiles there are.
+    """The least worst residual over the band, of all profiles that keep the guard.
 
-    The programme knows jerks that change at whole intervals only. Where a profile of another
-    design, whose segments need not end there, is better still, that one is taken.
+    Of those that leave next to no more, it is the smoothest. The programme knows jerks that change
+    at whole intervals only: where a profile of another design, whose segments need not end there,
+    leaves less still, that one is taken.
     """
     profiles, worst = task.conventional, np.full(len(task), np.inf)
     rows = np.nonzero(task.objective.weights.any(axis=1))[0]
     reference = task.objective.of(task.conventional)
-    found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
-    profiles, worst = _answered(task, rows, found, profiles, worst)
+    slack = np.maximum(
+        NEXT_TO_NOTHING * worst_in_band(task, task.conventional), SETTLED * task.tolerance
+    )
+    questions = [
+        _question(task, k, float(reference[k]), slack=float(slack[k]), guard=task.guard)
+        for k in rows
+    ]
+    profiles, worst = _answered(task, rows, answers(questions, task.progress), profiles, worst)
+    found = np.isfinite(worst)
+    worst[found] = worst_in_band(task.take(found), profiles.take(found))
     everything = np.ones(len(task), dtype=bool)
     for rival, where in (
         (symmetric, everything),
@@ -173,10 +186,19 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     ):
         index = np.nonzero(where)[0]
         others, residual = rival(task.take(index))
-        better = residual < worst[index]
+        better = np.nonzero(residual + slack[index] < worst[index])[0]
+        better = better[_guarding(task.take(index[better]), others.take(better))]
         profiles = profiles.replaced(index[better], others.take(better))
         worst[index[better]] = residual[better]
     return profiles, worst
+
+
+def _guarding(task: Task, profiles: Profiles) -> NDArray[np.bool_]:
+    """Whether profiles keep the guard of their moves."""
+    if not task.guard:
+        return np.ones(len(task), dtype=bool)
+    poles = [task.objective.poles[weights > 0.0] for weights in task.objective.weights]
+    return keeps_guard(profiles, task.conventional, poles, task.band, task.interval, task.guard)
 
 
 def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Profiles, Array, NDArray[np.int64]]:
@@ -217,9 +239,7 @@ def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Profiles, Array, N
     profiles, worst = _quiet(final, reference)
     # Within the tolerance all are equal: the smoothest is taken.
     rows = np.nonzero(possible & task.objective.weights.any(axis=1))[0]
-    questions = [
-        _question(final, k, float(reference[k]), task.tolerance, smooth=True) for k in rows
-    ]
+    questions = [_question(final, k, float(reference[k]), task.tolerance) for k in rows]
     return *_answered(final, rows, answers(questions, task.progress), profiles, worst), high
 
 
@@ -233,12 +253,12 @@ def _quiet(task: Task, reference: Array) -> tuple[Profiles, Array]:
 
 
 def bounds(task: Task) -> Array:
-    """The least residual that any profile within the limits leaves, at the modes' own frequencies.
+    """The least residual that any profile within the limits leaves over the task's band.
 
     Parameters
     ----------
     task : Task
-        The moves.
+        The moves; with a band of 0, at the modes' own frequencies.
 
     Returns
     -------
@@ -250,17 +270,16 @@ def bounds(task: Task) -> Array:
     PlanError
         scipy or clarabel is not installed.
     """
-    nominal = replace(task, band=0.0)
     least = np.where(task.objective.weights.any(axis=1), np.nan, 0.0)
     rows = np.nonzero(np.isnan(least))[0]
     reference = task.objective.of(task.conventional)
-    found = answers([_question(nominal, k, float(reference[k])) for k in rows], task.progress)
+    found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
     for k, optimum in zip(rows, found, strict=True):
         least[k] = np.nan if optimum is None else optimum.worst
     return least
 
 
-def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
+def least_residuals(plans: Plans, progress: Progress | None = None, band: float = 0.0) -> Array:
     """How still the tool could be at best after each planned move, in the time that it has.
 
     Parameters
@@ -269,11 +288,13 @@ def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
         n moves.
     progress : callable, optional
         See `Progress`.
+    band : float, optional
+        Relative error of the modes' frequencies; their own by default. [-]
 
     Returns
     -------
     ndarray, shape (n,)
-        Largest residual displacement over the modes, at their own frequencies; NaN where a move is
+        Largest residual displacement over the modes, and over the band; NaN where a move is
         not planned or no profile on the grid keeps the limits. Of axes that move each on its own, a
         mode that several of them excite is left out: they might cancel each other. [mm]
 
@@ -286,33 +307,39 @@ def least_residuals(plans: Plans, progress: Progress | None = None) -> Array:
     excited = np.zeros((len(plans), len(plans.modes.poles)), dtype=np.int64)
     np.add.at(excited, plans.move, task.objective.weights > 0.0)
     weights = np.where(excited[plans.move] > 1, 0.0, task.objective.weights)
-    task = replace(task, objective=replace(task.objective, weights=weights))
+    task = replace(task, objective=replace(task.objective, weights=weights), band=band)
     least = np.where(plans.planned, 0.0, np.nan)
     with np.errstate(invalid="ignore"):
         np.maximum.at(least, plans.move, bounds(task))
     return least
 
 
-def known_limits(plans: Plans, progress: Progress | None = None) -> Array | None:
+def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0.0) -> Array | None:
     """The same for reports: None where the solver is not installed, since all else is known."""
     try:
         require_solver()
     except PlanError:
         return None
-    return least_residuals(plans, progress)
+    return least_residuals(plans, progress, band)
 
 
 def _question(
-    task: Task, row: np.intp, reference: float, allowed: float = 0.0, smooth: bool = False
+    task: Task,
+    row: np.intp,
+    reference: float,
+    allowed: float = 0.0,
+    slack: float = 0.0,
+    guard: float = 0.0,
 ) -> Question:
     """What is asked about one of the moves."""
     V, A, J = (float(limit[row]) for limit in task.limits)
     objective = task.objective
+    today = task.conventional.take(slice(row, row + 1))
     move = Move(
         int(task.counts[row]), V, A, J, objective.poles, objective.weights[row], objective.group,
-        task.band, task.interval,
+        task.band, task.interval, today, guard,
     )  # fmt: skip
-    return Question(move, reference, allowed, smooth)
+    return Question(move, reference, allowed, slack)
 
 
 def _answered(

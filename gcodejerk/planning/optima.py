@@ -27,16 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
-from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.motion.search.optimal import (
-    Move,
-    Optimum,
-    least_residual,
-    optimum_profiles,
-    quiet_enough,
-    smoothest_within,
-)
+from gcodejerk.motion.profiles.profile import Array, Profiles
+from gcodejerk.motion.search.optimal import least_residual, near_least, smoothest_within
 from gcodejerk.motion.search.socp import require_solver
+from gcodejerk.motion.search.unit_move import Move, Optimum, optimum_profiles
 from gcodejerk.planning.solution_cache import cache_file, read_solutions, write_solutions
 
 if TYPE_CHECKING:
@@ -65,15 +59,16 @@ class Question:
     reference : float
         Residual of the controller's own profile: the measure for what is small. [mm]
     allowed : float
-        0: the least residual. Above: a profile that leaves no more. [mm]
-    smooth : bool
-        Of those that leave no more than allowed, the one with the least peak jerk.
+        Above 0: the smoothest profile that leaves no more than this. [mm]
+    slack : float
+        Else, above 0: the smoothest of those that leave no more than this above the least; 0: the
+        one that leaves least. [mm]
     """
 
     move: Move
     reference: float
     allowed: float = 0.0
-    smooth: bool = False
+    slack: float = 0.0
 
     def key(self) -> tuple[bytes, float]:
         """A digest that equal problems share, and the weight [mm] that solutions are scaled by."""
@@ -81,16 +76,24 @@ class Question:
         scale = float(move.weights.max(initial=0.0)) or 1.0
         T = move.count * move.interval
         limits = (move.velocity * T, move.acceleration * T**2, move.jerk * T**3)
+        measures = (self.reference / scale, self.allowed / scale, self.slack / scale)
         numbers = np.concatenate(
             [
-                [move.count, *limits, self.reference / scale, self.allowed / scale],
-                [self.smooth, move.band, move.interval],
+                [move.count, *limits, *measures, move.band, move.interval, move.guard],
                 move.poles.real * T, move.poles.imag * T, move.weights / scale, move.group,
+                *_columns(move.today, T),
             ]
         )  # fmt: skip
         # Rounded: the same move computed in another order is the same problem.
         text = ",".join([__version__, *(f"{x:.10g}" for x in numbers)])
         return hashlib.blake2b(text.encode(), digest_size=16).digest(), scale
+
+
+def _columns(today: Profiles | None, T: float) -> list[Array]:
+    """What tells one controller's profile from another, time in units of the move's."""
+    if today is None:
+        return []
+    return [today.duration / T, today.acceleration * T**2, today.jerk * T**3]
 
 
 Progress = Callable[[int, int], None]
@@ -200,13 +203,13 @@ def _solved(question: Question) -> Optimum | None:
     move = question.move
     scale = float(move.weights.max(initial=0.0)) or 1.0
     unit = replace(move, weights=move.weights / scale)
-    reference, allowed = question.reference / scale, question.allowed / scale
-    if not allowed:
-        found = least_residual(unit, reference)
-    elif question.smooth:
-        found = smoothest_within(unit, allowed, reference)
+    reference = question.reference / scale
+    if question.allowed:
+        found = smoothest_within(unit, question.allowed / scale)
+    elif question.slack:
+        found = near_least(unit, question.slack / scale, reference)
     else:
-        found = quiet_enough(unit, allowed, reference)
+        found = least_residual(unit, reference)
     return found if found is not None and _holding([found], [move])[0] else None
 
 

@@ -7,6 +7,8 @@ stays, and why a move cannot be planned. Numbers are columns: one row a move, on
 
 from __future__ import annotations
 
+from dataclasses import InitVar, dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -113,7 +115,17 @@ def plan_moves(
             "give a shorter one",
         )
     return _Planner(
-        machine, profile, displacement, length, reason, time, T1, progress, speed, lone, as_today
+        machine=machine,
+        profile=profile,
+        displacement=displacement,
+        length=length,
+        reason=reason,
+        time=time,
+        T1=T1,
+        as_today=as_today,
+        progress=progress,
+        speed=speed,
+        lone=lone,
     ).run()
 
 
@@ -122,45 +134,49 @@ def rule_out(reason: NDArray[np.uint8], where: NDArray[np.bool_], why: Reason) -
     reason[where & (reason == CERTAIN)] = REASONS.index(why)
 
 
+@dataclass(kw_only=True, slots=True, eq=False)
 class _Planner:
     """One call of `plan_moves`: its profiles, from limits to designs."""
 
-    def __init__(
-        self,
-        machine: Machine,
-        profile: str,
-        displacement: Array,
-        length: Array,
-        reason: NDArray[np.uint8],
-        time: float | None,
-        T1: float | None,
-        progress: Progress | None,
-        speed: Array | None,
-        lone: NDArray[np.bool_] | None,
-        as_today: bool,
+    machine: Machine
+    profile: str
+    displacement: Array
+    length: Array
+    reason: NDArray[np.uint8]
+    time: float | None
+    T1: float | None
+    as_today: bool
+    progress: InitVar[Progress | None]
+    speed: InitVar[Array | None]
+    lone: InitVar[NDArray[np.bool_] | None]
+    modes: Modes = field(init=False)
+    interval: float = field(init=False)
+    move: NDArray[np.int64] = field(init=False)
+    share: Array = field(init=False)
+    task: Task = field(init=False)
+    limits: tuple[Array, Array, Array] = field(init=False)
+    conventional: Profiles = field(init=False)
+    judged: tuple[Array, Array] | None = field(init=False, default=None)
+    """What the profiles' moves leave at worst over the band, and what today's do [mm]."""
+
+    def __post_init__(
+        self, progress: Progress | None, speed: Array | None, lone: NDArray[np.bool_] | None
     ) -> None:
-        self.machine, self.profile, self.time, self.T1 = machine, profile, time, T1
-        self.as_today = as_today
-        self.displacement, self.length, self.reason = displacement, length, reason
-        self.modes = Modes.of(machine)
-        self.interval = machine.interval
-        rows = np.nonzero(reason == CERTAIN)[0]
-        if machine.positioning == "linear":
-            self.move, self.share = rows, displacement[rows]
+        self.modes, self.interval = Modes.of(self.machine), self.machine.interval
+        rows = np.nonzero(self.reason == CERTAIN)[0]
+        if self.machine.positioning == "linear":
+            self.move, self.share = rows.astype(np.int64), self.displacement[rows]
         else:
-            index, axis = np.nonzero(displacement[rows] != 0.0)
-            self.move = rows[index]
+            index, axis = np.nonzero(self.displacement[rows] != 0.0)
+            self.move = rows[index].astype(np.int64)
             self.share = np.zeros((len(index), len(AXES)))
-            self.share[np.arange(len(index)), axis] = displacement[self.move, axis]
-        self.move = self.move.astype(np.int64)
-        cap = None if speed is None else speed[self.move] / length[self.move]
+            self.share[np.arange(len(index)), axis] = self.displacement[self.move, axis]
+        cap = None if speed is None else speed[self.move] / self.length[self.move]
         alone = None if lone is None else lone[self.move]
         self.task = Task.of(
-            machine, self.modes, self.share, progress=progress, speed=cap, lone=alone
+            self.machine, self.modes, self.share, progress=progress, speed=cap, lone=alone
         )
         self.limits, self.conventional = self.task.limits, self.task.conventional
-        self.judged: tuple[Array, Array] | None = None
-        """What the profiles' moves leave at worst over the band, and what today's do [mm]."""
 
     def run(self) -> Plans:
         """Design every profile, then gather the moves."""
@@ -168,10 +184,8 @@ class _Planner:
             self.conventional.total if self.time is None else np.full(len(self.share), self.time)
         )
         counts = np.maximum(whole_intervals(total, self.interval), 1)
-        stays_conventional = np.zeros(len(counts), dtype=bool)
         if self.profile == "conventional":
             profiles, feasible = self._conventional(counts)
-            stays_conventional[:] = True
         elif self.profile in SHAPERS:
             profiles, counts, feasible = self._shaped()
         elif self.T1 is not None:
@@ -179,9 +193,9 @@ class _Planner:
         elif self.profile == "shortest":
             profiles, counts, feasible = self._shortest(counts)
         else:
-            profiles, counts, feasible, stays_conventional = self._designed(counts)
+            profiles, counts, feasible = self._designed(counts)
         self._rule_out_profiles(~feasible, Reason.LIMITS)
-        return self._plans(profiles, counts, stays_conventional)
+        return self._plans(profiles, counts)
 
     def _conventional(self, counts: NDArray[np.int64]) -> tuple[Profiles, NDArray[np.bool_]]:
         """The controller's own profiles; a trapezoid cannot be written with finite jerk."""
@@ -270,10 +284,9 @@ class _Planner:
 
     def _designed(
         self, counts: NDArray[np.int64]
-    ) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    ) -> tuple[Profiles, NDArray[np.int64], NDArray[np.bool_]]:
         """A profile of unchanged time; longer only where the limits leave no room."""
         profiles, worst = DESIGNS[self.profile](self.task.after(counts))
-        stays_conventional = np.zeros(len(counts), dtype=bool)
         if self.time is None:
             reference = worst_in_band(self.task, self.conventional)
             fits = self._within_limits(self.conventional)
@@ -285,10 +298,8 @@ class _Planner:
             if self.machine.positioning != "linear":
                 # Axes that run on their own: one may keep what it has while another gains.
                 in_time = self.conventional.total <= counts * self.interval * (1.0 + 1e-9)
-                stays_conventional = useless & fits & (alone | in_time)
-                profiles = profiles.replaced(
-                    stays_conventional, self.conventional.take(stays_conventional)
-                )
+                keeps = useless & fits & (alone | in_time)
+                profiles = profiles.replaced(keeps, self.conventional.take(keeps))
                 worst, reference = self._at_arrival(profiles, worst)
                 useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
             self._rule_out_profiles(useless, Reason.NOT_BETTER)
@@ -298,7 +309,7 @@ class _Planner:
             limits = tuple(limit[row : row + 1] for limit in self.limits)
             total = float(counts[row] * self.interval)
             raise time_error(self.machine, self.share[row], limits, total, self.profile)
-        return profiles, counts, np.isfinite(worst), stays_conventional
+        return profiles, counts, np.isfinite(worst)
 
     def _at_arrival(self, profiles: Profiles, worst: Array) -> tuple[Array, Array]:
         """What the profiles of a move leave together, and today's; of each profile [mm]."""
@@ -356,9 +367,7 @@ class _Planner:
         moves[self.move[where]] = True
         rule_out(self.reason, moves, why)
 
-    def _plans(
-        self, profiles: Profiles, counts: NDArray[np.int64], stays_conventional: NDArray[np.bool_]
-    ) -> Plans:
+    def _plans(self, profiles: Profiles, counts: NDArray[np.int64]) -> Plans:
         """The profiles of planned moves, and the moves' own columns."""
         conventional_time = np.zeros(len(self.reason))
         np.maximum.at(conventional_time, self.move, self.conventional.total)
@@ -381,7 +390,6 @@ class _Planner:
             profiles=profiles.take(keep),
             conventional=self.conventional.take(keep),
             profile_counts=counts[keep],
-            stays_conventional=stays_conventional[keep],
             designed=self.profile,
             worst_in_band=in_band[0],
             conventional_in_band=in_band[1],

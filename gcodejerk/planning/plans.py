@@ -121,11 +121,9 @@ class Plans:
         The designed profiles, and those of the controller's own G0.
     profile_counts : ndarray of int, shape (l,)
         T_SUM of each profile. [intervals]
-    stays_conventional : ndarray of bool, shape (l,)
-        The profile is the conventional one: because it was asked for, or because this axis, which
-        runs on its own, gains nothing by another.
     designed : str
-        Name of all other profiles.
+        Name of the profiles. Of axes that run on their own, one that gains nothing by it keeps the
+        conventional profile.
     worst_in_band, conventional_in_band : ndarray, shape (n,)
         Largest residual displacement with every frequency anywhere within `design.band`, of the
         designed profiles and of the control's own rapid; NaN where they were not compared. [mm]
@@ -145,7 +143,6 @@ class Plans:
     profiles: Profiles
     conventional: Profiles
     profile_counts: NDArray[np.int64]
-    stays_conventional: NDArray[np.bool_]
     designed: str
     worst_in_band: Array
     conventional_in_band: Array

@@ -50,8 +50,8 @@ class Task:
         bell.
     objective : Objective
         What they are judged by.
-    interval, band, tolerance : float
-        Of the machine. [s], [-], [mm]
+    interval, band, guard, tolerance : float
+        Of the machine. [s], [-], [-], [mm]
     progress : callable or None
         For designs that take long.
     """
@@ -63,6 +63,7 @@ class Task:
     objective: Objective
     interval: float
     band: float
+    guard: float
     tolerance: float
     progress: Progress | None = None
 
@@ -110,6 +111,7 @@ class Task:
             objective=Objective(modes.poles, weights, modes.group),
             interval=machine.interval,
             band=machine.design.band,
+            guard=machine.design.guard,
             tolerance=machine.design.tolerance,
             progress=progress,
         )

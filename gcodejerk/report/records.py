@@ -271,6 +271,18 @@ def process_record(
     }
 
 
+def _within_band(plan: Plan) -> Record:
+    """What one planned move leaves over the band of its machine, and could leave at best."""
+    worst = float(plan.plans.worst_in_band[0])
+    least = known_limits(plan.plans, band=plan.machine.design.band)
+    if least is None or not np.isfinite(worst):
+        return {}
+    return {
+        "worst_in_band": number(worst),
+        "limit_in_band": number(float(np.fmin(least[0], worst))),
+    }
+
+
 def move_record(plan: Plan) -> Record:
     """The report on one planned move, in the same form."""
     limit = known_limits(plan.plans)
@@ -292,6 +304,8 @@ def move_record(plan: Plan) -> Record:
     for entry, (own, usual) in zip(row["residual"], plan.unsampled(), strict=True):
         entry["profile_acceleration"] = number(own)
         entry["conventional_profile_acceleration"] = number(usual)
+    if row["limit"] is not None:
+        row |= _within_band(plan)
     return _head(plan.machine, "csv", "stream", plan.profile) | {
         "input": None,
         "output": None,

@@ -150,17 +150,21 @@ def move_tables(record: Record, conventional: Record) -> list[Table]:
     return [table, _residual_table(row["residual"])]
 
 
-def move_limit(record: Record) -> str:
-    """One line on a planned move: how far it is from the least that any profile could leave."""
+def move_limit(record: Record, band: float) -> str:
+    """How far a planned move is from the least that any profile could leave; `band` in percent."""
     row = record["rapids"][0]
     if row["limit"] is None or not row["residual"]:
         return ""
     worst = max(entry["displacement"] for entry in row["residual"]) * UM_PER_MM
     least = row["limit"] * UM_PER_MM
-    return (
+    line = (
         f"the worst mode keeps {worst:.2f} um; at exactly these frequencies no profile of this "
         f"time can leave less than {least:.2f} um"
     )
+    if "limit_in_band" not in row:
+        return line
+    worst, least = (row[key] * UM_PER_MM for key in ("worst_in_band", "limit_in_band"))
+    return f"{line}\nwithin {band:.3g} % of them: {worst:.2f} um, and no less than {least:.2f} um"
 
 
 def _segments(segments: Sequence[Record]) -> str:

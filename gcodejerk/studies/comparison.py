@@ -356,7 +356,6 @@ class _Field:
             profiles=profiles,
             conventional=joined([self.conventional] * n),
             profile_counts=counts,
-            stays_conventional=np.zeros(n * each, dtype=bool),
             designed=self.machine.design.profile,
             worst_in_band=np.full(n, np.nan),
             conventional_in_band=np.full(n, np.nan),

@@ -73,6 +73,7 @@ def machines(
     lines += [
         "design:",
         f"  band: {draw(st.sampled_from([0.0, 0.02, 0.05, 0.1]))}",
+        f"  guard: {draw(st.sampled_from([0.0, 0.0, 0.0, 1.0]))}",
         f"  tolerance: {draw(_number(1e-4, 0.1))}",
         f"  minimum_length: {draw(_number(0.001, 0.5))}",
         f"  max_extension: {draw(st.sampled_from([0.0, 0.1, 0.5]))}",

@@ -1,13 +1,14 @@
 """What the profiles are worth: how much they leave when the frequencies are not those of the file.
 
     python tests/bench/bench_designs.py [--moves 50] [--machines vmc router drill]
-        [--profiles condition3 symmetric cascade optimal]
+        [--profiles condition3 symmetric cascade optimal/0 optimal]
 
 For moves of one to three axes of the shipped machines, drawn by length and direction: the largest
 displacement that any mode keeps, at the modes' own frequencies and at the worst within 5 and 10 %;
 the last beside today's rapid; how many moves are left alone because nothing is better, how many are
 worse than today at 10 %; and what a mode that the machine file does not name, at 2.7 times each of
-the file's, keeps beside today's rapid. The residual is computed here, from the jerk's steps.
+the file's, keeps beside today's rapid. `optimal/0` is the optimum without its
+guard. The residual is computed here, from the jerk's steps.
 """
 
 import argparse
@@ -63,7 +64,10 @@ def left(profiles, k, share, modes, relative):
 
 def row_of(machine, displacement, profile):
     """Figures of one profile over all moves, each of shape (n, ...)."""
-    plans = plan_moves(displacement, machine, profile, as_today=True)
+    name, *guard = profile.split("/")
+    if guard:
+        machine = replace(machine, design=replace(machine.design, guard=float(guard[0])))
+    plans = plan_moves(displacement, machine, name, as_today=True)
     place = {int(move): k for k, move in enumerate(plans.move)}
     today = plan_moves(displacement, machine, "conventional", as_today=True)
     figures, hidden = [], []
@@ -87,7 +91,9 @@ def main():
     parser.add_argument("--moves", type=int, default=50)
     parser.add_argument("--machines", nargs="+", default=["vmc", "router", "drill"])
     parser.add_argument(
-        "--profiles", nargs="+", default=["condition3", "symmetric", "cascade", "optimal"]
+        "--profiles",
+        nargs="+",
+        default=["condition3", "symmetric", "cascade", "optimal/0", "optimal"],
     )
     given = parser.parse_args()
     machines = [Machine.load(find_machine(name)) for name in given.machines]

@@ -2,6 +2,7 @@
 """What LinuxCNC's own interpreter makes of a program: every move, with its line and full precision.
 
     /usr/bin/python3 oracle.py part.ngc [--tool-table sim.tbl] [--modal]
+    /usr/bin/python3 oracle.py --serve
 
 One call per line on standard output: `line WHAT values`, positions in mm in program coordinates,
 angles in degrees, feed in mm/min. Exit status 0, or 1 with `file:line: message` where the
@@ -12,14 +13,18 @@ rs274 itself prints four decimals, and the module `gcode` alone crashes (signal 
 or M6: the tool data library has no table. AXIS and the controller open one made by another process;
 here it is made in this process before the interpreter starts, in a private $HOME, so that neither a
 running LinuxCNC nor another oracle shares it.
+
+With --serve it reads one line of JSON for each program (`arguments`, `timeout` in s, and where its
+output goes: `out`, `err`), interprets that program in a process of its own, and prints the exit
+status: null where time was out.
 """
 
 import argparse
-import atexit
 import ctypes
+import json
 import os
 import re
-import shutil
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -140,7 +145,8 @@ class Canon:
         return lambda *arguments: None
 
 
-def main():
+def main(arguments, home):
+    """Interpret one program; its exit status."""
     here = os.path.dirname(os.path.abspath(__file__))
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
@@ -149,9 +155,7 @@ def main():
     parser.add_argument(
         "--modal", action="store_true", help="also the active G codes of each line that acts"
     )
-    given = parser.parse_args()
-    home = tempfile.mkdtemp(prefix="oracle-")
-    atexit.register(shutil.rmtree, home, ignore_errors=True)
+    given = parser.parse_args(arguments)
     open_tool_data(home, given.tool_table)
     import gcode  # the interpreter; only now, since it needs the tool data
 
@@ -166,5 +170,40 @@ def main():
     return 0
 
 
+def serve():
+    """One process for each program that is asked for, until no more are."""
+    for line in sys.stdin:
+        asked = json.loads(line)
+        with tempfile.TemporaryDirectory(prefix="oracle-") as home:
+            child = os.fork()
+            if child == 0:
+                interpret(asked, home)
+            _, ended = os.waitpid(child, 0)
+        status = os.waitstatus_to_exitcode(ended)
+        print(json.dumps(None if status == -signal.SIGALRM else status), flush=True)  # noqa: T201
+
+
+def interpret(asked, home):
+    """The whole life of a process that interprets one program."""
+    signal.alarm(asked["timeout"])
+    status = 70
+    try:
+        for name, stream in (("out", 1), ("err", 2)):
+            os.dup2(os.open(asked[name], os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        status = main(asked["arguments"], home)
+    except SystemExit as ending:
+        status = 2
+        print(ending, file=sys.stderr)  # noqa: T201
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    if sys.argv[1:] == ["--serve"]:
+        serve()
+    else:
+        with tempfile.TemporaryDirectory(prefix="oracle-") as home:
+            sys.exit(main(sys.argv[1:], home))

@@ -2,12 +2,11 @@
 
 import math
 import shutil
-import subprocess
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from interpreter import run_oracle
 
 from gcodejerk.nc import DIALECTS
 from gcodejerk.nc.interpreter.expressions import evaluate
@@ -61,9 +60,7 @@ def interpret(path):
     """X after every line that moves, and the refusal."""
     table = path.with_name("tools.tbl")
     table.write_text("T1 P1 Z0 D5\n")
-    command = ["/usr/bin/python3", str(Path(__file__).with_name("oracle.py")), str(path)]
-    command += ["--tool-table", str(table)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=20)
+    done = run_oracle(path, "--tool-table", table)
     rows = [row.split() for row in done.stdout.splitlines() if " TRAVERSE " in row]
     return {int(row[0]): float(row[2]) for row in rows}, done.stderr.strip()
 

@@ -10,12 +10,12 @@ import math
 import shutil
 import subprocess
 from bisect import bisect_right
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from interpreter import run_oracle
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
@@ -28,6 +28,7 @@ AT_ZERO = Start(
     positions=dict.fromkeys(AXES, 0.0), offsets={"G54": dict.fromkeys(AXES, 0.0)}, startup=STARTUP
 )
 TOLERANCE = 1e-6
+VMC = Machine.load(find_machine("vmc"))
 
 pytestmark = [
     pytest.mark.linuxcnc,
@@ -41,11 +42,8 @@ def interpret(path):
     """Moves: (line, what, X Y Z), and the refusal."""
     table = path.with_suffix(".tbl")
     table.write_text("T1 P1 Z0 D5\n")
-    command = ["/usr/bin/python3", str(HERE / "oracle.py"), str(path), "--startup", STARTUP]
     try:
-        done = subprocess.run(
-            [*command, "--tool-table", str(table)], capture_output=True, text=True, timeout=5
-        )
+        done = run_oracle(path, "--startup", STARTUP, "--tool-table", table, timeout=2)
     except subprocess.TimeoutExpired:
         return [], "endless"
     moves = []
@@ -278,35 +276,33 @@ def test_what_the_interpreter_keeps_of_a_jump(tmp_path, name):
     assert not wrong
 
 
-# without shrinking: each try costs many runs of the interpreter
+# One program is one example: of several drawn at once, most draws would be too long for hypothesis,
+# and thrown away. Without shrinking: each try costs a run of the interpreter.
+FLOW = settings(
+    deadline=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck)
+)  # fmt: skip
+
+
+@pytest.fixture
+def accepted():
+    """Whether the interpreter ran each program to its end; of others it says little."""
+    ran = []
+    yield ran
+    assert sum(ran) > len(ran) // 3
+
+
 @pytest.mark.parametrize("part", range(2))  # for as many cores
-@settings(
-    max_examples=3,
-    deadline=None,
-    phases=[Phase.generate],
-    suppress_health_check=list(HealthCheck),
-)
-@given(
-    drawn=st.lists(
-        st.tuples(flows(), st.tuples(*[st.integers(-2, 4)] * 3)), min_size=12, max_size=12
-    )
-)
-def test_drawn_flow_is_read_as_the_interpreter_runs_it(tmp_path_factory, part, drawn):
-    folder = tmp_path_factory.mktemp("flow")
-    paths, programs = [], []
-    for k, (lines, hidden) in enumerate(drawn):
-        settings_line = " ".join(f"#{33 + n}={value}" for n, value in enumerate(hidden))
-        paths.append(write(folder, k, [settings_line, *lines]))
-        # We read the same program without that line: for us the variables are unknown.
-        programs.append(("(unknown)\n" + "\n".join(lines) + "\n").encode())
-    with ThreadPoolExecutor(2) as pool:
-        results = list(pool.map(interpret, paths))
-    # A program that the interpreter refuses, or that does not end, says little.
-    assert sum(bool(moves) and not refusal for moves, refusal in results) > len(results) // 3
-    for data, (moves, refusal) in zip(programs, results, strict=True):
-        for start in (Start(startup=STARTUP), AT_ZERO):
-            wrong, _ = disagreements(data, moves, refusal, start)
-            assert not wrong, f"{data.decode()}\n{wrong}\n{refusal}"
+@settings(FLOW, max_examples=36)
+@given(lines=flows(), hidden=st.tuples(*[st.integers(-2, 4)] * 3))
+def test_drawn_flow_is_read_as_the_interpreter_runs_it(tmp_path, accepted, part, lines, hidden):
+    settings_line = " ".join(f"#{33 + n}={value}" for n, value in enumerate(hidden))
+    moves, refusal = interpret(write(tmp_path, len(accepted), [settings_line, *lines]))
+    accepted.append(bool(moves) and not refusal)
+    # We read the same program without that line: for us the variables are unknown.
+    data = ("(unknown)\n" + "\n".join(lines) + "\n").encode()
+    for start in (Start(startup=STARTUP), AT_ZERO):
+        wrong, _ = disagreements(data, moves, refusal, start)
+        assert not wrong, f"{data.decode()}\n{wrong}\n{refusal}"
 
 
 def ends(moves, spans):
@@ -322,36 +318,36 @@ def ends(moves, spans):
     return found
 
 
-@settings(
-    max_examples=2,
-    deadline=None,
-    phases=[Phase.generate],
-    suppress_health_check=list(HealthCheck),
-)
-@given(drawn=st.lists(flows(), min_size=12, max_size=12))
-def test_drawn_flow_moves_alike_before_and_after(tmp_path_factory, drawn):
-    folder = tmp_path_factory.mktemp("processed")
-    machine = Machine.load(find_machine("vmc"))
-    planned = 0
-    for k, lines in enumerate(drawn):
-        path = write(folder, k, ["#33=1 #34=2 #35=3", "G21 G90 G94 G64 F100", *lines])
-        moves, refusal = interpret(path)
-        if refusal or not moves:
-            continue
-        result = process(path.read_bytes(), machine, controller="linuxcnc")
-        planned += result.planned
-        after = folder / f"{k}.after.ngc"
-        after.write_bytes(result.output)
-        starts = [0]
-        for text in result.output.splitlines(keepends=True):
-            starts.append(starts[-1] + len(text))
-        spans = [
-            (bisect_right(starts, begin), bisect_right(starts, end - 1), row)
-            for begin, end, row in result.edits.tolist()
-            if row >= 0
-        ]
-        again, refusal = interpret(after)
-        assert not refusal, (refusal, result.output.decode())
-        reached, wanted = ends(again, spans), ends(moves, [])
-        assert reached == [pytest.approx(to, abs=TOLERANCE) for to in wanted], path.read_text()
-    assert planned > 10
+@pytest.fixture
+def planned():
+    """How many rapids of each program were rewritten."""
+    counts = []
+    yield counts
+    assert sum(counts) > 10
+
+
+@settings(FLOW, max_examples=24)
+@given(lines=flows())
+def test_drawn_flow_moves_alike_before_and_after(tmp_path, planned, lines):
+    k = len(planned)
+    path = write(tmp_path, k, ["#33=1 #34=2 #35=3", "G21 G90 G94 G64 F100", *lines])
+    planned.append(0)
+    moves, refusal = interpret(path)
+    if refusal or not moves:
+        return
+    result = process(path.read_bytes(), VMC, controller="linuxcnc")
+    planned[k] = result.planned
+    after = tmp_path / f"{k}.after.ngc"
+    after.write_bytes(result.output)
+    starts = [0]
+    for text in result.output.splitlines(keepends=True):
+        starts.append(starts[-1] + len(text))
+    spans = [
+        (bisect_right(starts, begin), bisect_right(starts, end - 1), row)
+        for begin, end, row in result.edits.tolist()
+        if row >= 0
+    ]
+    again, refusal = interpret(after)
+    assert not refusal, (refusal, result.output.decode())
+    reached, wanted = ends(again, spans), ends(moves, [])
+    assert reached == [pytest.approx(to, abs=TOLERANCE) for to in wanted], path.read_text()

@@ -10,19 +10,17 @@ import math
 import re
 import shutil
 import subprocess
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from interpreter import run_oracle
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import CERTAIN, Start, read_program, trace
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 
-ORACLE = Path(__file__).resolve().parent / "oracle.py"
 STARTUP = "G17 G21 G40 G49 G54 G64 G90 G94 G97"
 AT_ZERO = Start(
     positions=dict.fromkeys(AXES, 0.0), offsets={"G54": dict.fromkeys(AXES, 0.0)}, startup=STARTUP
@@ -54,9 +52,8 @@ def ends(text, folder, name):
     path = folder / name
     path.write_text(text)
     (folder / "tools.tbl").write_text("T1 P1 Z1 D5\n")
-    command = ["/usr/bin/python3", str(ORACLE), str(path), "--startup", STARTUP]
-    command += ["--tool-table", str(folder / "tools.tbl")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    tools = folder / "tools.tbl"
+    done = run_oracle(path, "--startup", STARTUP, "--tool-table", tools, timeout=60)
     moves = re.findall(r"^\d+ (?:TRAVERSE|FEED) (.*)$", done.stdout, re.MULTILINE)
     return None if done.returncode else tuple(float(v) for v in moves[-1].split()[:3])
 
@@ -74,8 +71,7 @@ def drilling(code, plane, retract, distance):
 def test_every_cycle_in_every_plane_leaves_the_tool_where_it_is_read_to_be(tmp_path):
     kinds = list(itertools.product(CYCLES, PLANES, ("G98", "G99"), ("G90", "G91")))
     texts = [drilling(*kind) for kind in kinds]
-    with ThreadPoolExecutor(2) as pool:
-        real = list(pool.map(lambda k: ends(texts[k], tmp_path, f"{k}.ngc"), range(len(kinds))))
+    real = [ends(text, tmp_path, f"{k}.ngc") for k, text in enumerate(texts)]
     compared = 0
     for kind, text, where in zip(kinds, texts, real, strict=True):
         lines = list(trace(io.BytesIO(text.encode()), start=AT_ZERO))

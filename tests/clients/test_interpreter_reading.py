@@ -5,12 +5,11 @@ import math
 import re
 import shutil
 import subprocess
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
-from hypothesis import strategies as st
+from interpreter import run_oracle
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import CERTAIN, Start, read_program, trace
@@ -18,7 +17,6 @@ from gcodejerk.testing.programs import programs
 
 HERE = Path(__file__).resolve().parent
 SHARED = HERE.parents[1].parent / "shared"
-PYTHON = "/usr/bin/python3"
 STARTUP = "G17 G21 G40 G49 G54 G64 G90 G94 G97"
 AT_ZERO = Start(
     positions=dict.fromkeys(AXES, 0.0), offsets={"G54": dict.fromkeys(AXES, 0.0)}, startup=STARTUP
@@ -44,11 +42,9 @@ def tool_table(folder):
 def interpret(path, folder):
     """Moves of a program: (line, what, positions of the axes that it states), and the refusal."""
     table = folder / "tools.tbl"
-    command = [PYTHON, str(HERE / "oracle.py"), str(path), "--startup", STARTUP]
-    if table.exists():
-        command += ["--tool-table", str(table)]
+    tools = ["--tool-table", table] if table.exists() else []
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=5)
+        done = run_oracle(path, "--startup", STARTUP, *tools, timeout=5)
     except subprocess.TimeoutExpired:
         return [], "endless"
     moves, plane = [], "G17"
@@ -138,8 +134,7 @@ def test_every_real_file_reads_as_the_interpreter_runs_it(tmp_path, part):
     if not files:
         pytest.skip("neither the shared programs nor LinuxCNC's examples are here")
     tool_table(tmp_path)
-    with ThreadPoolExecutor() as pool:
-        results = list(pool.map(lambda path: interpret(path, tmp_path), files))
+    results = [interpret(path, tmp_path) for path in files]
     compared = certain = 0
     wrong = []
     for path, (moves, refusal) in zip(files, results, strict=True):
@@ -156,27 +151,22 @@ def test_every_real_file_reads_as_the_interpreter_runs_it(tmp_path, part):
     assert certain > 1000 / PARTS
 
 
-# without shrinking: each try costs ten runs of the interpreter
+# without shrinking: each try costs a run of the interpreter
 @settings(
-    max_examples=6,
+    max_examples=60,
     deadline=None,
     phases=[Phase.generate],
     suppress_health_check=list(HealthCheck),
 )
-@given(st.lists(programs(), min_size=10, max_size=10))
-def test_drawn_programs_read_as_the_interpreter_runs_them(tmp_path_factory, drawn):
-    folder = tmp_path_factory.mktemp("drawn")
-    tool_table(folder)
-    paths = []
-    for k, data in enumerate(drawn):
-        paths.append(folder / f"{k}.ngc")
-        paths[-1].write_bytes(data)
-    with ThreadPoolExecutor() as pool:
-        results = list(pool.map(lambda path: interpret(path, folder), paths))
-    for path, (moves, refusal) in zip(paths, results, strict=True):
-        for start in (Start(startup=STARTUP), AT_ZERO):
-            wrong, _, _ = disagreements(path.read_bytes(), moves, start, bool(refusal))
-            assert not wrong, f"{path.read_bytes().decode()}\n{wrong}\n{refusal}"
+@given(programs())
+def test_drawn_programs_read_as_the_interpreter_runs_them(tmp_path, data):
+    tool_table(tmp_path)
+    path = tmp_path / "part.ngc"
+    path.write_bytes(data)
+    moves, refusal = interpret(path, tmp_path)
+    for start in (Start(startup=STARTUP), AT_ZERO):
+        wrong, _, _ = disagreements(data, moves, start, bool(refusal))
+        assert not wrong, f"{data.decode()}\n{wrong}\n{refusal}"
 
 
 # Each is there because some reader, or an earlier version of this one, took it differently.
@@ -349,8 +339,7 @@ def test_odd_programs_read_as_the_interpreter_runs_them(tmp_path):
     for k, data in enumerate(CASES):
         paths.append(tmp_path / f"{k}.ngc")
         paths[-1].write_bytes(data)
-    with ThreadPoolExecutor() as pool:
-        results = list(pool.map(lambda path: interpret(path, tmp_path), paths))
+    results = [interpret(path, tmp_path) for path in paths]
     assert sum(bool(moves) for moves, _ in results) > len(CASES) // 2
     for data, (moves, refusal) in zip(CASES, results, strict=True):
         for start in (Start(startup=STARTUP), AT_ZERO):

@@ -124,14 +124,23 @@ def test_played_positions_follow_the_plan(tmp_path):
     assert result.planned == 7
     tolerance = np.maximum(0.10 * result.residual, 0.03 * result.conventional_residual)[:, 0]
     best = {}
+
+    def as_planned():
+        # Blocks of G-code are close, never exact: each rapid arrives in time and on its way. Most
+        # shake as planned; where LinuxCNC's own steps hurt most, a quarter of today's is left.
+        shaking = {row: error * tolerance[row] for row, (error, _, _) in best.items()}
+        return (
+            all(abs(late) <= LATE for _, late, _ in best.values())
+            and all(deviation <= DEVIATION for _, _, deviation in best.values())
+            and sum(error <= 1.0 for error, _, _ in best.values()) >= 4
+            and all(left <= 0.25 * today[row] for row, left in shaking.items())
+        )
+
+    today = result.conventional_residual[:, 0]
     for _ in range(3):
         for row, (late, deviation, residual) in play(result, result.output, tmp_path).items():
             error = float(np.abs(residual - result.residual[row])[0] / tolerance[row])
             best[row] = min(best.get(row, (np.inf,)), (error, int(late), float(deviation)))
-    # Blocks of G-code are close, never exact: each rapid arrives in time and on its way. Most shake
-    # as planned; where LinuxCNC's own steps hurt most, a quarter of today's vibration is left.
-    assert all(abs(late) <= LATE for _, late, _ in best.values()), best
-    assert all(deviation <= DEVIATION for _, _, deviation in best.values()), best
-    assert sum(error <= 1.0 for error, _, _ in best.values()) >= 4, best
-    for row, (error, _, _) in best.items():
-        assert error * tolerance[row] <= 0.25 * result.conventional_residual[row, 0], best
+        if as_planned():
+            break
+    assert as_planned(), best

@@ -4,6 +4,7 @@ LinuxCNC plays programs as they are, with the shipped machine's values of today 
 what the recorded positions leave in the machine's modes is compared with the conventional residual.
 """
 
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -50,6 +51,15 @@ G4 P0.2
 M2
 """
 """Lone rapids, rapids between feeds, and rapids in exact path mode, all from rest to rest."""
+
+
+HURRY = 5
+"""Feeds of the README's program are played so many times as fast: only rapids are looked at."""
+
+
+def hurried(data):
+    """The program with its feeds raised, every line where it was."""
+    return re.sub(rb"F([0-9]+)", lambda feed: b"F%d" % (HURRY * int(feed[1])), data)
 
 
 def played(data, machine, tmp_path):
@@ -106,7 +116,8 @@ def test_todays_rapids_from_rest_to_rest_leave_what_the_report_says(tmp_path):
 
 def test_the_readmes_program_shakes_today_as_its_first_line_says(tmp_path):
     machine = Machine.load(find_machine("vmc"))
-    result, recordings = played((SAMPLES / "plate.ngc").read_bytes(), machine, tmp_path)
+    program = hurried((SAMPLES / "plate.ngc").read_bytes())
+    result, recordings = played(program, machine, tmp_path)
     assert len(recordings) == 19
     stated = result.conventional_residual.max(axis=1)
     at_rest = {10, 18, 27, 32, 37, 42, 55}

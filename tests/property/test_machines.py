@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcodejerk.axes import AXES
@@ -18,6 +18,7 @@ from gcodejerk.machine.spectrum import MOST_LINES, read_spectrum
 from gcodejerk.testing.machines import machines
 
 
+@settings(max_examples=40)
 @given(machine=machines())
 def test_a_machine_written_is_read_back_as_the_same_machine(machine):
     text = machine_yaml(machine)
@@ -27,6 +28,7 @@ def test_a_machine_written_is_read_back_as_the_same_machine(machine):
     assert machine_yaml(again) == text
 
 
+@settings(max_examples=40)
 @given(machine=machines())
 def test_what_is_written_is_plain_yaml_with_plain_numbers(machine):
     values = yaml.safe_load(machine_yaml(machine))
@@ -36,6 +38,7 @@ def test_what_is_written_is_plain_yaml_with_plain_numbers(machine):
         assert written["rapid"].get("jerk", math.inf) == axis.rapid.jerk
 
 
+@settings(max_examples=40)
 @given(machine=machines())
 def test_a_drawn_machine_is_one_that_exists(machine):
     assert 1 <= len(machine.axes) <= 6
@@ -57,6 +60,7 @@ def test_a_drawn_machine_is_as_asked_for(machine):
         assert math.isinf(axis.rapid.jerk)
 
 
+@settings(max_examples=40)
 @given(machine=machines())
 def test_a_file_in_inches_is_the_file_in_mm_with_every_length_converted(machine):
     # 0.01 in are more than a control's step may be, and refused.
@@ -80,6 +84,7 @@ def test_a_file_in_inches_is_the_file_in_mm_with_every_length_converted(machine)
     assert (inch.design.band, inch.interval) == (machine.design.band, machine.interval)
 
 
+@settings(max_examples=40)
 @given(machine=machines())
 def test_every_number_of_a_machine_is_finite_but_for_an_absent_jerk(machine):
     def check(value, name):

@@ -23,7 +23,7 @@ from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.second_reading.agreement import confirm
 
 WRITTEN = sorted(name for name, dialect in DIALECTS.items() if dialect.writing is not None)
-CALM = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+CALM = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 KNOWN = dict.fromkeys("XYZABC", 0.0)
 
 

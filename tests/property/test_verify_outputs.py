@@ -24,7 +24,7 @@ from gcodejerk.verification import verify, verify_files
 # A machine is a large thing to shrink: minutes for a smaller example that says no more.
 CALM = settings(
     deadline=None,
-    max_examples=40,
+    max_examples=16,
     phases=(Phase.explicit, Phase.reuse, Phase.generate),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
@@ -62,7 +62,7 @@ def test_every_output_is_accepted(machine, data, known):
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-@settings(parent=CALM, max_examples=25)
+@settings(parent=CALM, max_examples=10)
 @given(st.data(), st.booleans(), st.sampled_from(["condition3", "cascade", "conventional"]))
 def test_every_output_is_accepted_whatever_profile_todays_rapids_follow(
     planner, data, known, profile
@@ -90,7 +90,7 @@ def test_every_output_is_accepted_whatever_profile_todays_rapids_follow(
 
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
-@settings(parent=CALM, max_examples=20)
+@settings(parent=CALM, max_examples=8)
 @given(machine=machines(axes="XYZ"), data=programs())
 def test_every_table_is_accepted(part, machine, data):
     machine = ready(machine)
@@ -102,7 +102,7 @@ def test_every_table_is_accepted(part, machine, data):
 
 
 @pytest.mark.parametrize("dialect", sorted(VOCABULARIES))
-@settings(parent=CALM, max_examples=25)
+@settings(parent=CALM, max_examples=10)
 @given(st.data(), st.booleans())
 def test_every_output_of_every_dialect_is_accepted(dialect, data, known):
     program = data.draw(programs(dialect))

@@ -29,6 +29,7 @@ import io
 import random
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ KNOWN = dict.fromkeys("XYZABC", 0.0)
 # A machine is a large thing to shrink: minutes for a smaller example that says no more.
 CALM = settings(
     deadline=None,
-    max_examples=8,
+    max_examples=4,
     phases=(Phase.explicit, Phase.reuse, Phase.generate),
     suppress_health_check=list(HealthCheck),
 )
@@ -166,9 +167,6 @@ class Output:
         return {v.kind for v in verify(PROGRAM, text, self.machine).violations}
 
 
-OUTPUTS = {}
-
-
 # The rapids of a machine without rapid.jerk are trapezoids, which are no stream; on the others
 # Conditions I and II are no better than they.
 WITH_STREAMS = [
@@ -184,12 +182,17 @@ WITH_STREAMS = [
 ]
 
 
-@pytest.fixture(params=WITH_STREAMS)
+@cache
+def output_of(name, profile):
+    """Made once, however many tests look at it."""
+    return Output(name, profile)
+
+
+@pytest.fixture(params=WITH_STREAMS, scope="module")
 def output(request):
-    if request.param not in OUTPUTS:
-        OUTPUTS[request.param] = Output(*request.param)
-    assert OUTPUTS[request.param].streams
-    return OUTPUTS[request.param]
+    found = output_of(*request.param)
+    assert found.streams
+    return found
 
 
 def scaled(line, factor):
@@ -255,7 +258,7 @@ def test_most_feeds_changed_by_one_percent_are_noticed(profile):
     rng = random.Random(1)
     noticed = []
     for name in SHIPPED:
-        output = Output(name, profile)
+        output = output_of(name, profile)
         for points in output.streams:
             for point in rng.sample(points, 5):
                 damaged = output.put(point, scaled(output.line(point), rng.choice([0.99, 1.01])))

@@ -1,11 +1,17 @@
 """What several tests share: commands in a folder of their own, a second way to four segments."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from gcodejerk import cli
 from gcodejerk.errors import GcodejerkError
+
+# For `jerk_sums`, which two modules of tests share.
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 
 @pytest.fixture

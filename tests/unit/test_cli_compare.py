@@ -221,7 +221,7 @@ def test_axes_on_their_own_are_compared_too(run, tmp_path):
 
 
 def test_a_measured_spectrum_is_compared_and_drawn(run, tmp_path):
-    lines = [f"{f},{1.0 / ((1 - (f / 40) ** 2) ** 2 + 0.01)}\n" for f in range(10, 121, 2)]
+    lines = [f"{f},{1.0 / ((1 - (f / 40) ** 2) ** 2 + 0.01)}\n" for f in range(10, 121, 10)]
     (tmp_path / "x.csv").write_text("".join(lines))
     (tmp_path / "m.yaml").write_text(
         "interval: 0.001\npositioning: linear\naxes:\n"
@@ -239,7 +239,8 @@ def test_a_measured_spectrum_is_compared_and_drawn(run, tmp_path):
 def test_a_rotary_axis_is_told_in_degrees(run, tmp_path):
     (tmp_path / "m.yaml").write_text(
         "interval: 0.001\npositioning: linear\naxes:\n  A: {type: rotary, rapid: {velocity: 90, "
-        "acceleration: 3000, jerk: 3.0e+5}, modes: [{frequency: 40, damping: 0.03}]}\n"
+        "acceleration: 3000, jerk: 3.0e+5}, modes: [{frequency: 40, damping: 0.03, "
+        "participation: 1}]}\n"
     )
     code, said = run("-m", "m.yaml", "A=2", "--plot", "c.png")
     assert code == 0

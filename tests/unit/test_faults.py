@@ -162,7 +162,7 @@ def test_killed_before_any_call_to_the_system_it_leaves_no_half_file(
     assert names() == ["part.jerk.nc", "part.json", "part.nc"]
 
 
-def test_killed_at_drawn_moments_a_batch_leaves_whole_files_only(folder):
+def test_killed_at_drawn_moments_a_batch_leaves_whole_files_only(folder, request):
     draw = random.Random(4)
     (folder / "in").mkdir()
     data = [program(150, seed) for seed in range(4)]
@@ -174,7 +174,7 @@ def test_killed_at_drawn_moments_a_batch_leaves_whole_files_only(folder):
     took = time.monotonic() - begun
     whole = {name: Path("out", name).read_bytes() for name in names("out")}
     assert len(whole) == 4
-    for _ in range(8):
+    for _ in range(32 if request.config.getoption("--long") else 4):
         for name in names("out"):
             os.unlink(f"out/{name}")
         number = draw.choice([signal.SIGKILL, signal.SIGTERM])
@@ -224,7 +224,7 @@ def _replaced(data):
 
 
 @settings(
-    max_examples=100, deadline=None,
+    max_examples=40, deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 @given(
@@ -451,7 +451,7 @@ def test_an_output_that_is_a_pipe_gets_the_whole_output_or_nothing(folder):
 def test_two_in_place_runs_at_once_leave_one_whole_program(folder):
     data = program(200)
     whole = process(data, VMC).output
-    for _ in range(3):
+    for _ in range(2):
         Path("part.nc").write_bytes(data)
         both = [
             subprocess.Popen([*COMMAND, "--in-place"], stderr=subprocess.PIPE, text=True,

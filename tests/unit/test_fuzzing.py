@@ -22,12 +22,12 @@ PARTS = 2
 
 
 @pytest.mark.parametrize("part", range(PARTS))
-@pytest.mark.parametrize(("name", "runs"), [("fuzz_reader", 400), ("fuzz_process", 200)])
+@pytest.mark.parametrize(("name", "runs"), [("fuzz_reader", 200), ("fuzz_process", 100)])
 def test_a_harness_finds_nothing_in_a_few_hundred_inputs(name, runs, part, request):
     check = load(name).load()
     seeds = load("engine").seeds()
     assert len(seeds) >= 10
-    runs *= 4 if request.config.getoption("--long") else 1
+    runs *= 8 if request.config.getoption("--long") else 1
     drawn = list(load("mutation").drawn(seeds, runs, most=3000))
     for data in [*seeds, *drawn][part::PARTS]:
         check(data, timed=False)

@@ -8,6 +8,7 @@ room, and no circle of modules exists anywhere.
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -109,8 +110,13 @@ def part_of(path, room=""):
     return parts[len(home)]
 
 
+@cache
 def imports(path):
     """Full names that a module imports, wherever in it: a late import is one too."""
+    return tuple(_imports(path))
+
+
+def _imports(path):
     package = path.relative_to(ROOT.parent).parent.parts
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import):

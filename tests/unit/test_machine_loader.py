@@ -313,6 +313,11 @@ def test_units_in_messages_are_those_of_the_file_and_the_axis():
             "    type: rotary\n",
             "6:11: axes.X.type is 'rotary', expected linear: X is measured in mm",
         ),
+        (
+            "  A: {rapid: {velocity: 9, acceleration: 90}, modes: [{frequency: 30}]}\n",
+            "6:55: axes.A.modes[0] has no participation, but A is a rotary axis: 1 would be 1 mm "
+            "at the tool for each degree",
+        ),
         ("    type: rotory\n", "6:11: axes.X.type is 'rotory', expected one of linear, rotary"),
         ("    diameter: perhaps\n", "6:15: axes.X.diameter is 'perhaps', expected true or false"),
         (
@@ -481,3 +486,13 @@ def test_error_crosses_a_process_border():
     with pytest.raises(MachineFileError) as caught:
         Machine.loads("interval: 1", "mill.yaml")
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_a_rotary_axis_says_what_its_spectrum_moves(tmp_path):
+    (tmp_path / "a.csv").write_text("".join(f"{f},1\n" for f in range(10, 30)))
+    text = MILL.replace("  X:", "  A:") + "    spectrum: %s\n"
+    with pytest.raises(MachineFileError) as refused:
+        Machine.loads(text % "a.csv", str(tmp_path / "m.yaml"))
+    assert "axes.A.spectrum has no participation, but A is a rotary" in str(refused.value)
+    stated = text % "{file: a.csv, participation: 1.75}"
+    assert Machine.loads(stated, str(tmp_path / "m.yaml")).axis("A").spectrum.participation == 1.75

@@ -94,6 +94,7 @@ def test_modes_of_the_structure_are_looked_at_too():
 )
 def test_rotary_axes_have_thresholds_of_their_own(velocity, acceleration, what):
     text = TEXT.replace("  Z:", "  A:").replace(", jerk: %(jerk)s", "")
+    text = text.replace("%(damping)s}", "%(damping)s, participation: 1}")
     found = warnings(text, velocity=velocity, acceleration=acceleration)
     assert len(found) == (what is not None)
     if what:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from jerk_sums import columns, displacement
 
 from gcodejerk.motion import (
     Objective,
@@ -22,11 +23,6 @@ def column(*values):
     return np.array(values, dtype=float)
 
 
-def columns(*values):
-    """One row of each."""
-    return tuple(np.array([float(v)]) for v in values)
-
-
 def designed(total, low, high, objective):
     """The design of four segments, and what its objective says that it leaves."""
     profiles = design_four_segments(total, low, high, objective)
@@ -39,20 +35,6 @@ def four_segment_peaks(T1, T):
     R = T2 / T1
     J1 = 6.0 / (T1**2 * T * (2 * R + 1))  # noqa: N806
     return J1 * T1 * (T1 + T2) / 2, J1 * T1, J1 * max(1.0, 1.0 / R)
-
-
-def displacement(T1, Ta, T2, Tv, poles, weights):
-    """Largest residual of unit profiles, and their peak acceleration, by sums over jerk steps."""
-    ends = np.cumsum(np.broadcast_arrays(np.zeros_like(T1), T1, Ta, T2, Tv, T2, Ta, T1), axis=0)
-    left = ends[-1] - ends
-    rise, fall = 1.0 / T1, 1.0 / T2
-    steps = np.stack([rise, -rise, -fall, fall, -fall, fall, rise, -rise])
-    A = 6.0 / (steps * left**3).sum(axis=0)
-    worst = np.zeros_like(A)
-    for pole, weight in zip(poles, weights, strict=True):
-        ringing = A * (steps * np.exp(pole * left)).sum(axis=0)
-        worst = np.maximum(worst, weight * np.abs(ringing) / pole.imag / np.abs(pole) ** 2)
-    return worst, A
 
 
 def test_the_second_way_to_a_residual_is_right_itself():

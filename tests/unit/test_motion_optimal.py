@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import linprog
 
 from gcodejerk.motion import conventional_profiles, mode_poles, profiles_response
-from gcodejerk.motion.search.optimal import Move, least_residual, optimum_profiles, smoothest_within
+from gcodejerk.motion.search.optimal import least_residual, smoothest_within
+from gcodejerk.motion.search.unit_move import Move, optimum_profiles
 
 MS = 0.001
 FACETS = 64
@@ -234,8 +235,8 @@ def test_the_fewest_intervals_have_what_the_programme_has(count, damping):
 def test_within_a_tolerance_the_smoothest_profile_is_taken():
     move = move_of(40, 50, 5000, 5e6, [30.0], band=0.05)
     least = least_residual(move, 0.37)
-    assert smoothest_within(move, 0.9 * least.worst, 0.37) is None
-    smooth = smoothest_within(move, 3.0 * least.worst, 0.37)
+    assert smoothest_within(move, 0.9 * least.worst) is None
+    smooth = smoothest_within(move, 3.0 * least.worst)
     assert smooth.worst <= 3.0 * least.worst
     assert np.abs(smooth.jerk).max() < 0.6 * np.abs(least.jerk).max()
 

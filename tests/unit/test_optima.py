@@ -7,7 +7,7 @@ import pytest
 
 from gcodejerk.errors import PlanError
 from gcodejerk.motion import mode_poles
-from gcodejerk.motion.search.optimal import Move
+from gcodejerk.motion.search.unit_move import Move
 from gcodejerk.planning import optima
 from gcodejerk.planning.optima import Question, answers
 from gcodejerk.planning.solution_cache import VARIABLE, cache_file, read_solutions, write_solutions

@@ -50,6 +50,7 @@ def load_text(text: str, name: str) -> Description:
     values = checker.read()
     _check_axis_types(values, checker)
     _check_resolutions(values, checker)
+    _check_rotary_participations(values, checker)
     spectra = _spectra(values, Path(name).parent, checker)
     _check_frequencies(values, checker)
     _check_participations(values, checker)
@@ -138,6 +139,30 @@ def _check_participations(values: dict[str, Any], checker: Checker) -> None:
                 )
 
 
+def _check_rotary_participations(values: dict[str, Any], checker: Checker) -> None:
+    """Refuse a rotary axis that does not say how far its modes move the tool for a degree."""
+    for name in sorted(checker.rotary.intersection(values.get("axes", {}))):
+        axis = values["axes"][name]
+        path: KeyPath = ("axes", name)
+        silent = [
+            (*path, "modes", i)
+            for i, mode in axis.get("modes", {}).items()
+            if i != "spectrum" and "participation" not in mode
+        ]
+        spectra = (axis.get("spectrum"), axis.get("modes", {}).get("spectrum"))
+        for key, spectrum in zip((("spectrum",), ("modes", "spectrum")), spectra, strict=True):
+            if spectrum and (isinstance(spectrum, str) or "participation" not in spectrum):
+                silent.append((*path, *key))
+        for where in silent:
+            checker.problems.add(
+                checker.place(where),
+                f"{dotted(where)} has no participation, but {name} is a rotary axis: 1 would be "
+                "1 mm at the tool for each degree",
+                "state mm per degree: the tool's distance from the axis [mm] * pi/180 for a mode "
+                "that swings with it, e.g. participation: 1.75 at 100 mm",
+            )
+
+
 def _spectra(values: dict[str, Any], folder: Path, checker: Checker) -> dict[str, Spectrum]:
     """Read the spectra; from here on `modes` of an axis is a list, however they were given."""
     highest = 0.5 / values["interval"] if "interval" in values else math.inf
@@ -222,7 +247,8 @@ def _axis(
         limit=_limit(values.get("limit", {}), rapid),
         travel=values.get("travel"),
         modes=tuple(
-            _mode(mode, {name: mode["participation"]}) for mode in values.get("modes", {}).values()
+            _mode(mode, {name: mode.get("participation", 1.0)})
+            for mode in values.get("modes", {}).values()
         ),
         spectrum=spectrum,
         planner=planner,

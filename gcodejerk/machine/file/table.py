@@ -215,7 +215,7 @@ def _mode(participation: Kind, doc: str, required: bool) -> Section:
                 "Damping ratio: 0 rings for ever, machine tools have 0.01 to 0.1.",
                 default=0.0, example="0.02"),
             Key("participation", participation, doc, required,
-                None if required else 1.0, example="{Y: 0.4, Z: 1.0}" if required else "1.0"),
+                example="{Y: 0.4, Z: 1.0}" if required else "1.0"),
         )
     )  # fmt: skip
 
@@ -254,7 +254,12 @@ _AXIS = Section(
             example="[-400, 50]"),
         Key("modes", OrMapping(
             ListOf(
-                _mode(Number("-", at_least=0.0), "How strongly the axis excites the mode.", False),
+                _mode(
+                    Number("-", at_least=0.0),
+                    "How strongly the axis excites the mode: mm at the tool for each mm, or each "
+                    "degree, of the axis. Left out: 1, but a rotary axis has to say it.",
+                    False,
+                ),
                 at_most=100),
             Section((replace(_SPECTRUM, required=True),))),
             "Modes that this axis alone excites, as a list; or {spectrum: FILE}, which is the key "
@@ -269,6 +274,9 @@ _DESIGN = Section(
         Key("band", Number("-", at_least=0.0, below=1.0),
             "Relative frequency error to be robust to, for every profile; 0 where the modes are "
             "exact.", default=0.10, example="0.10"),
+        Key("guard", Number("-", at_least=0.0),
+            "What frequencies that the file does not name may keep after an optimal rapid, times "
+            "what today's leaves there; 0: anything.", default=1.0, example="1"),
         Key("tolerance", Number("mm", above=0.0), "Residual that counts as settled.",
             default=0.001, example="0.001"),
         Key("minimum_length", Number("mm", at_least=0.0), "Shorter rapids are left alone.",

@@ -50,6 +50,7 @@ def machine_yaml(machine: Description) -> str:
             "design:",
             f"  profile: {design.profile}",
             f"  band: {_number(design.band)}",
+            f"  guard: {_number(design.guard)}",
             f"  tolerance: {_number(design.tolerance)}",
             f"  minimum_length: {_number(design.minimum_length)}",
             f"  max_extension: {_number(design.max_extension)}",

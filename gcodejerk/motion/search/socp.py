@@ -9,11 +9,13 @@ This module owns the programme and its solver. Which blocks and which frequencie
 * a largest residual displacement t over all modes and frequencies asked for: one second-order cone
   for each, exact where a linear programme needs a polygon in place of the modulus.
 
-Minimised is t with a small part of the peak jerk, so that among equal optima the smoothest is
-taken; or the peak jerk alone under a given t, which may be zero: the modes are perfectly still.
+Frequencies that only must not be worse than today's have cones of a fixed size instead of t.
+Minimised is what t has above a residual that costs nothing, with a small part of the peak jerk: of
+the profiles that are as good, the smoothest is taken. Or the peak jerk alone where the modes shall
+be perfectly still.
 
-Rule 1: times are in units of the move's duration and weights in units of the largest, so that the
-solver sees numbers near 1 and equal problems are equal.
+Rule 1: times are in units of the move's duration and residuals in units of one that matters, such
+as today's, so that the solver sees numbers near 1 and equal problems are equal.
 Rule 2: scipy and clarabel (an interior-point solver for cones) are imported inside functions; where
 they are missing, the error names the remedy.
 """
@@ -28,7 +30,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.motion.residual import Complex, grouped
+from gcodejerk.motion.residual import grouped
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -55,21 +57,28 @@ class Problem:
         Ends of the blocks of constant jerk, from 0 to T_SUM. [intervals]
     velocity, acceleration, jerk : float
         Limits, times T_SUM, T_SUM^2 and T_SUM^3 over the length. [-]
-    poles : ndarray of complex, shape (m,)
-        Times T_SUM. [rad]
-    weights : ndarray, shape (m,)
-        Participation times displacement over the largest of them. [-]
-    group : ndarray of int, shape (m,)
-        Poles of the same group, in a row, are judged by the root of their squares' sum.
+    rows : ndarray, shape (r, k)
+        What a unit jerk in each block leaves: displacements, real and imaginary part or what else
+        squares add up of, each over a measure that is common to all. [-]
+    group : ndarray of int, shape (r,)
+        Rows of the same group, side by side, count together: the root of their squares' sum.
+    cap : ndarray, shape (g,)
+        What a group may leave; NaN: it is of those whose largest is made least. [-]
+    mirrored : bool
+        The acceleration is odd about the middle; so must the knots be.
+    cruise : bool
+        The block in the middle has no acceleration.
     """
 
     knots: Index
     velocity: float
     acceleration: float
     jerk: float
-    poles: Complex
-    weights: Array
+    rows: Array
     group: Index
+    cap: Array
+    mirrored: bool = False
+    cruise: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +90,7 @@ class Solution:
     jerk : ndarray, shape (k,)
         Of each block, for the unit length in the unit of time. [-]
     worst : float
-        Largest residual displacement over the groups, for the largest weight 1. [-]
+        Largest residual over the groups without a cap. [-]
     peak : float
         Largest jerk as a share of its limit. [-]
     """
@@ -106,47 +115,41 @@ def require_solver() -> None:
 
 
 def solve(
-    problem: Problem, reference: float, jerk_cost: float, accuracy: float = ACCURACY
+    problem: Problem, allowed: float, jerk_cost: float, accuracy: float = ACCURACY
 ) -> Solution | None:
-    """The profile that has the least sum of residual and cost of its peak jerk.
+    """The profile that has the least sum of residual above what is allowed and cost of its jerk.
 
     Parameters
     ----------
     problem : Problem
-        The move.
-    reference : float
-        A residual, such as that of the controller's own profile: the solver's accuracy is a share
-        of it. [-]
+        The move; residuals near 1 are those that matter.
+    allowed : float
+        Residual that costs nothing. [-]
     jerk_cost : float
-        What the full jerk costs, as a share of the reference: it decides among profiles that are
-        equal. [-]
+        What the full jerk costs: it decides among profiles that leave the same. [-]
     accuracy : float, optional
         Asked of the solver. [-]
 
     Returns
     -------
     Solution or None
-        None where no profile keeps the limits.
+        None where no profile keeps the limits, and the caps of groups.
 
     Raises
     ------
     PlanError
         scipy or clarabel is not installed.
     """
-    found = _solve(problem, None, (1.0 / reference, jerk_cost), accuracy)
-    # Where next to nothing is left, the solver may not get on at that scale.
-    return found or _solve(problem, None, (1.0, jerk_cost * reference), accuracy)
+    return _solve(problem, allowed, jerk_cost, accuracy)
 
 
-def smoothest(problem: Problem, worst: float) -> Solution | None:
-    """The profile of least peak jerk with a residual within `worst`, exactly null where it is 0.
+def smoothest_null(problem: Problem) -> Solution | None:
+    """The profile of least peak jerk that leaves exactly nothing in any group.
 
     Parameters
     ----------
     problem : Problem
-        The move.
-    worst : float
-        Residual allowed, for the largest weight 1. [-]
+        The move; none of its groups has a cap.
 
     Returns
     -------
@@ -158,33 +161,24 @@ def smoothest(problem: Problem, worst: float) -> Solution | None:
     PlanError
         scipy or clarabel is not installed.
     """
-    return _solve(problem, worst, (0.0, 1.0), ACCURACY)
-
-
-def amplitudes(problem: Problem, jerk: Array) -> Array:
-    """Residual displacement of each group for a jerk in each block, shape (groups,)."""
-    return grouped(np.abs(_Unknowns(problem).by_block() @ jerk), problem.group)
+    return _solve(problem, None, 1.0, ACCURACY)
 
 
 def _solve(
-    problem: Problem, cap: float | None, costs: tuple[float, float], accuracy: float
+    problem: Problem, allowed: float | None, jerk_cost: float, accuracy: float
 ) -> Solution | None:
-    """Residual and jerk are minimised, or the jerk under a cap."""
-    found = _solve_once(problem, cap, costs, accuracy, curved=False)
+    """Residual and jerk are minimised, or where nothing is allowed the jerk of a null."""
+    found = _solve_once(problem, allowed, jerk_cost, accuracy, curved=False)
     if found is not None and not _Unknowns(problem).keeps_velocity(found.jerk):
         # Seldom: between two knots the velocity goes beyond its bounds.
-        return _solve_once(problem, cap, costs, accuracy, curved=True)
+        return _solve_once(problem, allowed, jerk_cost, accuracy, curved=True)
     return found
 
 
 def _solve_once(
-    problem: Problem,
-    cap: float | None,
-    costs: tuple[float, float],
-    accuracy: float,
-    curved: bool,
+    problem: Problem, allowed: float | None, jerk_cost: float, accuracy: float, curved: bool
 ) -> Solution | None:
-    """One call of the solver; `costs` are those of the residual and of the full jerk."""
+    """One call of the solver."""
     require_solver()
     import clarabel
     from scipy import sparse
@@ -193,29 +187,31 @@ def _solve_once(
     response = unknowns.responses()
     rows = _Rows()
     unknowns.motion(rows)
-    if cap == 0.0:
-        rows.dense(_condensed(np.concatenate(response)), unknowns.a)
+    if allowed is None:
+        rows.dense(_condensed(response), unknowns.a)
     equalities = rows.count
     unknowns.limits(rows, curved)
+    if allowed is not None:
+        rows.add([(unknowns.above, -1.0)], 0.0)
     cones: list[Any] = [
         clarabel.ZeroConeT(equalities),
         clarabel.NonnegativeConeT(rows.count - equalities),
     ]
-    if cap != 0.0:
-        for part in _groups(problem.group):
-            if cap is None:
-                rows.add([(unknowns.worst, -1.0)], 0.0)
+    if allowed is not None:
+        for part, cap in zip(_groups(problem.group), problem.cap, strict=True):
+            if np.isnan(cap):
+                rows.add([(unknowns.above, -1.0)], allowed)
             else:
                 rows.add([], cap)
-            own = _condensed(np.concatenate(response[part]))
+            own = _condensed(response[part])
             rows.dense(own, unknowns.a)
             cones.append(clarabel.SecondOrderConeT(1 + len(own)))
-    width = unknowns.worst + (cap is None)
+    width = unknowns.above + (allowed is not None)
     matrix, bound = rows.assembled(width)
     cost = np.zeros(width)
-    cost[unknowns.peak] = costs[1]
-    if cap is None:
-        cost[unknowns.worst] = costs[0]
+    cost[unknowns.peak] = jerk_cost
+    if allowed is not None:
+        cost[unknowns.above] = 1.0
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"
@@ -224,7 +220,12 @@ def _solve_once(
     found = clarabel.DefaultSolver(none, cost, matrix, bound, cones, settings).solve()
     if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None
-    return unknowns.solution(np.array(found.x), null=cap == 0.0)
+    return unknowns.solution(np.array(found.x), null=allowed is None)
+
+
+def residuals(problem: Problem, jerk: Array) -> Array:
+    """What each group is left with by a jerk in each block, shape (g,) [-]."""
+    return grouped(np.abs(problem.rows @ jerk), problem.group)
 
 
 class _Rows:
@@ -267,29 +268,27 @@ class _Rows:
 class _Unknowns:
     """Acceleration and velocity at every knot, the peak jerk as a share of its limit, the residual.
 
-    Columns of the matrix; -1 stands for what is zero: rest at both ends. Without damping a profile
-    and its mirror image in time (braking first, reversed) leave the same, and half of both no more:
-    the optimum can be odd about its middle, and the second half of the knots are images of the
-    first.
+    Columns of the matrix; -1 stands for what is zero: rest at both ends. Of a mirrored profile
+    (braking is the acceleration in reverse) the second half of the knots are images of the first.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         knots, blocks = problem.knots, len(problem.knots) - 1
         self.h = np.diff(knots) / knots[-1]
-        undamped = not problem.poles.real.any()
-        self.odd = undamped and bool(np.all(knots + knots[::-1] == knots[-1]))
+        self.odd = problem.mirrored
         k = np.arange(blocks + 1)
         image = np.minimum(k, blocks - k) if self.odd else k
         self.sign = np.sign(blocks - 2 * k) if self.odd else np.ones(blocks + 1, dtype=np.int64)
         self.speeds = blocks // 2 if self.odd else blocks - 1
-        slopes = (blocks - 1) // 2 if self.odd else blocks - 1
-        ends = (k == 0) | (k == blocks)
-        self.at_v = np.where(ends, -1, image - 1)
-        self.at_a = np.where(ends | (self.sign == 0), -1, self.speeds + image - 1)
+        slopes = (blocks - 1) // 2 - problem.cruise if self.odd else blocks - 1
+        zero = (k == 0) | (k == blocks)
+        self.at_v = np.where(zero, -1, image - 1)
+        zero |= (self.sign == 0) | (image > slopes)
+        self.at_a = np.where(zero, -1, self.speeds + image - 1)
         self.a = self.speeds + np.arange(slopes)
         self.peak = self.speeds + slopes
-        self.worst = self.peak + 1
+        self.above = self.peak + 1
 
     def motion(self, rows: _Rows) -> None:
         """The velocity is the acceleration's integral, and its own is the length."""
@@ -342,48 +341,41 @@ class _Unknowns:
         small = MARGIN * np.abs(v).max(initial=0.0)
         return bool(control.min() >= -small and control.max() <= self.problem.velocity + small)
 
-    def responses(self) -> list[Array]:
-        """Displacement of each pole for each unknown acceleration: real rows, shape (., len(a)).
-
-        Two rows a pole, real and imaginary part; one where the profile is odd: seen from the
-        middle, its response is imaginary throughout.
-        """
+    def responses(self) -> Array:
+        """The rows of the problem for each unknown acceleration, shape (r, len(a))."""
         # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
-        per_time = self.by_block() / self.h
-        response: Complex = per_time[:, :-1] - per_time[:, 1:]
+        per_time = self.problem.rows / self.h
+        response: Array = per_time[:, :-1] - per_time[:, 1:]
         if self.odd:
-            folded = (response - response[:, ::-1])[:, : len(self.a)]
-            seen = folded * np.exp(-0.5 * self.problem.poles)[:, np.newaxis]
-            return list(seen.imag[:, np.newaxis, :])
-        return list(_parts(response).reshape(len(response), 2, -1))
-
-    def by_block(self) -> Complex:
-        """Displacement of each pole for a unit jerk in each block, shape (m, k)."""
-        problem = self.problem
-        pole = problem.poles[:, np.newaxis]
-        left = 1.0 - problem.knots / problem.knots[-1]
-        decay = np.exp(pole * left)
-        gain = problem.weights / (problem.poles**2 * problem.poles.imag)
-        by_block: Complex = (decay[:, :-1] - decay[:, 1:]) * gain[:, np.newaxis]
-        return by_block
+            folded: Array = (response - response[:, ::-1])[:, : len(self.a)]
+            return folded
+        return response
 
     def solution(self, x: Array, null: bool) -> Solution:
         """The solver's answer, mended to the last digit where it must be exact."""
+        problem = self.problem
         a = self.sign * np.append(x, 0.0)[np.where(self.at_a < 0, len(x), self.at_a)]
         jerk = np.diff(a) / self.h
-        by_block = self.by_block()
         # Rest and length: what a jerk does to acceleration, velocity and position at the end.
         ends = np.stack(_moments(self.h))
-        exact = np.concatenate([ends, _parts(by_block)]) if null else ends
-        wanted = np.zeros(len(exact))
-        wanted[2] = 1.0
-        correction = np.linalg.lstsq(exact, wanted - exact @ jerk, rcond=None)[0]
-        if np.abs(correction).max() > MARGIN * self.problem.jerk:
+        correction = self._correction(jerk, np.concatenate([ends, problem.rows]) if null else ends)
+        if np.abs(correction).max() > MARGIN * problem.jerk:
             # Nulls at frequencies side by side are nearly the same equation: not to the last digit.
-            correction = np.linalg.lstsq(ends, wanted[:3] - ends @ jerk, rcond=None)[0]
-        jerk += correction
-        worst = grouped(np.abs(by_block @ jerk), self.problem.group).max(initial=0.0)
-        return Solution(jerk, float(worst), float(x[self.peak]))
+            correction = self._correction(jerk, ends)
+        mended: Array = jerk + correction
+        counts = np.isnan(problem.cap)
+        worst = float(residuals(problem, mended)[counts].max(initial=0.0))
+        return Solution(mended, worst, float(x[self.peak]))
+
+    def _correction(self, jerk: Array, exact: Array) -> Array:
+        """The least change of the jerk that makes rows exact: 0, but for the third, the length."""
+        missing: Array = -(exact @ jerk)
+        missing[2] += 1.0
+        if self.odd:
+            # Seen in reverse they say the same, and keep the correction even.
+            exact, missing = np.concatenate([exact, exact[:, ::-1]]), np.tile(missing, 2)
+        correction = np.linalg.lstsq(exact, missing, rcond=None)[0]
+        return np.asarray(correction, dtype=np.float64)
 
 
 def _condensed(rows: Array) -> Array:
@@ -402,14 +394,8 @@ def _moments(h: Array) -> tuple[Array, Array, Array]:
     return h, h * (left + 0.5 * h), h * (0.5 * left**2 + 0.5 * left * h + h**2 / 6.0)
 
 
-def _parts(rows: Complex) -> Array:
-    """Complex rows as twice as many real ones: real part, imaginary part."""
-    parts: Array = np.stack([rows.real, rows.imag], axis=1).reshape(-1, rows.shape[-1])
-    return parts
-
-
 def _groups(group: Index) -> list[slice]:
-    """Poles of each group, which stand side by side."""
+    """Rows of each group, which stand side by side."""
     starts = np.flatnonzero(np.diff(group, prepend=-1))
     ends = np.append(starts[1:], len(group))
     return [slice(int(begin), int(end)) for begin, end in zip(starts, ends, strict=True)]

@@ -27,6 +27,8 @@ WHOLE = 0.0001
 """How far a computed index of a variable may be from a whole number."""
 LARGEST_TANGENT = 1e9
 """Beyond it the last digit of pi decides, at 90 degrees even the sign."""
+LARGEST_ANGLE = 1e6
+"""Degrees beyond which the last digits of an angle, which rounding decides, are too many turns."""
 NEARLY_ZERO = 1e-9
 """What a zero may be after errors of rounding, on one side or the other."""
 LARGEST_DIVIDED = 1e8
@@ -251,9 +253,14 @@ def _round(x: float) -> float:
     return math.copysign(math.floor(abs(x) + 0.5), x) if abs(x) < LARGEST_ROUNDED else NAN
 
 
+def _turned(function: Callable[[float], float], x: float) -> float:
+    """Apply a function of an angle in degrees, but not to thousands of turns."""
+    return function(math.radians(x)) if abs(x) < LARGEST_ANGLE else NAN
+
+
 def _tangent(x: float) -> float:
     """Compute the tangent, but not at its poles."""
-    value = math.tan(math.radians(x))
+    value = _turned(math.tan, x)
     return value if abs(value) < LARGEST_TANGENT else NAN
 
 
@@ -280,14 +287,14 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "ABS": abs,
     "ACOS": lambda x: math.degrees(math.acos(x)),
     "ASIN": lambda x: math.degrees(math.asin(x)),
-    "COS": lambda x: math.cos(math.radians(x)),
+    "COS": lambda x: _turned(math.cos, x),
     "EXP": math.exp,
     "FIX": math.trunc,
     "FUP": lambda x: math.copysign(math.ceil(abs(x)), x),
     "LN": math.log,
     "POT": lambda x: x * x,
     "ROUND": _round,
-    "SIN": lambda x: math.sin(math.radians(x)),
+    "SIN": lambda x: _turned(math.sin, x),
     "SQRT": math.sqrt,
     "TAN": _tangent,
     "TRUNC": math.trunc,
