@@ -50,12 +50,25 @@ def plan(
 ) -> None:
     """Plan one move: its profile, peaks and residuals, the conventional ones beside it."""
     from gcodejerk.batch.files import new_file
+    from gcodejerk.emit import load_controller
+    from gcodejerk.planning.lines import Play
     from gcodejerk.planning.move import not_planned, plan_move
     from gcodejerk.report.records import conventional_motion, dump, move_record, stream_csv
     from gcodejerk.report.tables import move_limit, move_tables
 
     described = load_machine(machine, None)
-    planned = plan_move(_displacement(moves), described, profile, time=time, T1=t1)
+    emitter = load_controller(described.controller)
+    # LinuxCNC follows the profile between the points: judged at every interval, like a table.
+    held = emitter.play is Play.HELD
+    planned = plan_move(
+        _displacement(moves),
+        described,
+        profile,
+        time=time,
+        T1=t1,
+        stride=emitter.stride(described.interval) if held else 1,
+        play=Play.HELD if held else Play.TABLE,
+    )
     if not planned.planned:
         raise not_planned(planned.reason or "")
     record = move_record(planned)

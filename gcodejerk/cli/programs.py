@@ -200,6 +200,9 @@ def verify(
     machine: MachineOption,
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    controller: Annotated[
+        str | None, typer.Option(metavar="NAME", help="what the streams are written for")
+    ] = None,
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="the original's cycles are written out")
     ] = False,
@@ -231,6 +234,9 @@ def verify(
         elif stamp is not None:
             profile, dialect = profile or stamp.profile, dialect or stamp.dialect
             expand_cycles = expand_cycles or stamp.expand_cycles
+            controller = controller or stamp.controller
+        if controller is not None:
+            described = replace(described, controller=controller)
         if profile is not None:
             described = replace(described, design=replace(described.design, profile=profile))
         if expand_cycles:

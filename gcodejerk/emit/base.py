@@ -23,6 +23,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import DIALECTS, Dialect, Rapids
+from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Batch, NumberFormat
 from gcodejerk.units import MM_PER_INCH
@@ -71,6 +72,9 @@ class Controller(ABC):
     """Of the output's name; empty for that of the input."""
     unblended: str = ""
     """Axes between whose blocks the control stops: their rapids are left alone."""
+    play: Play = Play.TABLE
+    """What the control makes of the points: what is left in the modes is judged by that. `verify`
+    takes every controller but `linuxcnc` for one that moves in straight lines between them."""
     forms: tuple[Form, ...] = ()
     """What it can write; at least one."""
 

@@ -1,9 +1,9 @@
 """Controllers whose programs take streams, and of which nobody has measured how they follow them.
 
 The points are right whatever the control does: they lie on the rapid's own path and end at its end.
-What was not verified is the time profile: a control that reads blocks slower than one in 2 ms,
-smooths them, or ramps between them moves later than planned, and shakes otherwise. Each form says
-so.
+F is the mean speed of each block, so a control that holds it is in time. What was not verified is
+whether it does: a control that reads blocks slower than one in 2 ms, smooths them, or ramps between
+them moves later than planned, and shakes otherwise. Each form says so.
 """
 
 from __future__ import annotations

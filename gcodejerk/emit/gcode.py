@@ -1,11 +1,9 @@
 """Streams as G1 blocks in the place of the rapid's block, spelled in the program's own dialect.
 
-The form is the one that was measured to follow a profile best (LinuxCNC 2.9, servo period 1 ms):
-blocks of 2 ms per-minute feed and continuous path, each with F = the larger of the profile's speeds
-at the block's two ends, since LinuxCNC reaches F at the end of a servo period, and ends a block
-with the smaller of its own F and the next one's. Blocks of 1 ms would be stretched by 2 %
-(TP_MIN_SEGMENT_CYCLES). How other controls follow such blocks was not measured: their emitters say
-so (`controls`).
+Blocks of 2 ms in per-minute feed and continuous path. What F means is the control's (`feeds`): for
+one that holds F over a block its mean speed, so that it takes the time that it was planned for; for
+LinuxCNC the larger of the speeds at its two ends (`linuxcnc`). How controls other than LinuxCNC
+follow such blocks was not measured: their emitters say so (`controls`).
 
 A replaced block becomes, each line only where it is needed, here in LinuxCNC's words::
 
@@ -33,30 +31,30 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Options, axis_steps, step_sizes
+from gcodejerk.emit.feeds import Feeds, mean_feeds
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
 from gcodejerk.nc.dialects.dialect import Writing, code_name
 from gcodejerk.nc.dialects.gcodes import G90
+from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import FINE_DECIMALS, Batch, NumberFormat
-from gcodejerk.units import MM_PER_INCH, per_minute
+from gcodejerk.units import MM_PER_INCH
 
 BLOCK_TIME = 0.002
 """Duration of a block, measured as the best; whole intervals, at least one [s]."""
-FEED_DECIMALS = 4
-"""Of F in units per minute."""
 COMMENT_LENGTH = 69
 """Controllers and senders with short lines choke on longer comments."""
-FEED_GROUPS = ("XYZ", "UVW", "ABC")
-"""F is the speed along the first of these groups that moves (LinuxCNC, G94)."""
 LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
 """By `Rapids.terminator`."""
 
 
 class GcodeController(Controller):
-    """Writes G1 blocks of 2 ms with end-point speeds; a control adds its name and its facts."""
+    """Writes G1 blocks of 2 ms, F their mean speed; a control adds its name and its facts."""
+
+    play = Play.HELD
 
     def stride(self, interval: float) -> int:
         """About 2 ms."""
@@ -69,6 +67,10 @@ class GcodeController(Controller):
         step = np.where(rapids.inch[:, np.newaxis], inch, mm)
         origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
         return NumberFormat(rapids.start, step, origin, finer=doubles)
+
+    def feeds(self, batch: Batch, rapids: Rapids) -> Feeds:
+        """F of every block of a batch."""
+        return mean_feeds(batch, rapids)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What a user of these streams has to know."""
@@ -93,12 +95,12 @@ class GcodeController(Controller):
         line_ends = [newline if end in (b"", b"\r") else end for end in last_ends]
         dialect = options.dialect
         parsed = [parse_block(block, dialect) for block in blocks]
-        feed = _feed(_path_speed(batch, rapids), batch, rapids)
-        points = self._points(batch, rapids, line_ends, feed, writing_of(dialect).doubles)
+        feeds = self.feeds(batch, rapids)
+        points = self._points(batch, rapids, line_ends, feeds, writing_of(dialect).doubles)
         out = []
         for row, move in enumerate(moves):
             frame = _Frame(rapids, int(move), parsed[row], blocks[row], dialect)
-            last = frame.last_point(points[row].before_end, int(feed[row, -1]))
+            last = frame.last_point(points[row].before_end, feeds.of_end(row))
             follows = _follows_stream(batch.plans, rapids, int(move))
             lines = [
                 *frame.head(options.comments),
@@ -115,7 +117,7 @@ class GcodeController(Controller):
         batch: Batch,
         rapids: Rapids,
         line_ends: Sequence[bytes],
-        feed: NDArray[np.int64],
+        feeds: Feeds,
         doubles: bool,
     ) -> list[_Points]:
         """The points of every move but its last, formatted for all moves of one kind together."""
@@ -125,6 +127,7 @@ class GcodeController(Controller):
             kind = _Kind(
                 axes=tuple(np.nonzero(moving[row])[0].tolist()),
                 fine=tuple(np.nonzero(batch.fine[row])[0].tolist()),
+                feed_decimals=int(feeds.decimals[row]),
                 inch=bool(rapids.inch[move]),
                 incremental=bool(rapids.incremental[move]),
                 diameter=bool(rapids.diameter[move]),
@@ -133,7 +136,7 @@ class GcodeController(Controller):
             kinds.setdefault(kind, []).append(row)
         out: list[_Points] = [_Points(b"", {})] * len(batch)
         for kind, rows in kinds.items():
-            made = _format_kind(batch, np.array(rows), kind, feed, doubles)
+            made = _format_kind(batch, np.array(rows), kind, feeds.whole, doubles)
             for row, points in zip(rows, made, strict=True):
                 out[row] = points
         return out
@@ -145,6 +148,7 @@ class _Kind:
 
     axes: tuple[int, ...]
     fine: tuple[int, ...]
+    feed_decimals: int
     inch: bool
     incremental: bool
     diameter: bool
@@ -172,7 +176,7 @@ def _format_kind(
             values = np.diff(np.where(knots > 0, values, 0), axis=1, prepend=0)
         prefix = b" " if columns else b"G1 "
         columns.append(Column(prefix + AXES[axis].encode(), values[inner], places))
-    columns.append(Column(b" F", feed[rows][inner], FEED_DECIMALS))
+    columns.append(Column(b" F", feed[rows][inner], kind.feed_decimals))
     text, ends = format_lines(columns, kind.line_end)
     at = np.concatenate([[0], ends])[np.concatenate([[0], np.cumsum(counts)])]
     return [
@@ -254,10 +258,10 @@ class _Frame:
         words = b" ".join(code_name(code) for code in codes if code is not None)
         return ([] if stands else [self.writing.standstill]) + ([words] if words else [])
 
-    def last_point(self, before_end: dict[int, Decimal], feed: int) -> bytes:
+    def last_point(self, before_end: dict[int, Decimal], feed: Decimal) -> bytes:
         """The last point: the block's own words, or what is left of its increments."""
         words = [self._last_word(word, before_end) for word in self.axis_words]
-        words.append(b"F" + _plain(Decimal(feed).scaleb(-FEED_DECIMALS)))
+        words.append(b"F" + _plain(feed))
         return b" ".join([b"G1", *self._ending(), *words])
 
     def _ending(self) -> list[bytes]:
@@ -361,40 +365,3 @@ def _follows_stream(plans: Plans, rapids: Rapids, move: int) -> bool:
     return bool(
         before >= 0 and plans.planned[before] and rapids.line[before] + 1 == rapids.line[move]
     )
-
-
-def _path_speed(batch: Batch, rapids: Rapids) -> NDArray[np.float64]:
-    """Speed at every knot as F means it, in the program's own unit per second."""
-    out = np.zeros(batch.grid.knots.shape)
-    moving = batch.plans.displacement[batch.moves] != 0.0
-    inch = rapids.inch[batch.moves]
-    left = np.ones(len(batch), dtype=bool)
-    for group in FEED_GROUPS:
-        axes = [AXES.index(a) for a in group]
-        chosen = left & moving[:, axes].any(axis=1)
-        square = np.zeros(out.shape)
-        for axis in axes:
-            if axis in batch.velocity:
-                square += batch.velocity[axis] ** 2
-        unit = np.where(inch & (group != "ABC"), MM_PER_INCH, 1.0)[:, np.newaxis]
-        out = np.where(chosen[:, np.newaxis], np.sqrt(square) / unit, out)
-        left &= ~chosen
-    return out
-
-
-def _feed(speed: NDArray[np.float64], batch: Batch, rapids: Rapids) -> NDArray[np.int64]:
-    """F of the block that ends at each knot, in whole units of its last decimal."""
-    ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
-    # A stream of one block is at rest at both ends: only its mean speed is left.
-    single = batch.grid.blocks == 1
-    if single.any():
-        moves = batch.moves[single]
-        linear = (batch.plans.displacement[moves][:, :3] != 0.0).any(axis=1)
-        unit = np.where(rapids.inch[moves] & linear, MM_PER_INCH, 1.0)
-        time = batch.grid.counts[single] * batch.grid.interval
-        ends[single, -1] = batch.plans.length[moves] / time / unit
-    # F0 is an error in LinuxCNC; a block that hardly moves still has its smallest F.
-    feed: NDArray[np.int64] = np.maximum(
-        np.rint(per_minute(1.0) * 10.0**FEED_DECIMALS * ends), 1.0
-    ).astype(np.int64)
-    return feed

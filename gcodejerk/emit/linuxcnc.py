@@ -1,5 +1,10 @@
 """Controller `linuxcnc`: the form that was played by the controller and compared.
 
+It was measured to follow a profile best (LinuxCNC 2.9, servo period 1 ms): blocks of 2 ms, each
+with F = the larger of the profile's speeds at the block's two ends, since LinuxCNC reaches F at the
+end of a servo period, and ends a block with the smaller of its own F and the next one's. Blocks of
+1 ms would be stretched by 2 % (TP_MIN_SEGMENT_CYCLES).
+
 LinuxCNC 2.9 blends blocks of X, Y and Z alone: where A, B, C, U, V or W moves, it stops after every
 block, and a stream of 112 ms was played in 515 ms (A and U alike).
 """
@@ -10,10 +15,13 @@ import numpy as np
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Form
+from gcodejerk.emit.feeds import Feeds, end_feeds
 from gcodejerk.emit.gcode import GcodeController
 from gcodejerk.machine import LINUXCNC
 from gcodejerk.nc import Rapids
+from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.stream import Batch
 
 STREAMS_NEED = 1.05
 """MAX_ACCELERATION over the largest acceleration of a stream, played: 1.05 to 4 times."""
@@ -23,6 +31,7 @@ class LinuxcncController(GcodeController):
     """Writes G1 blocks of 2 ms with end-point speeds."""
 
     name = "linuxcnc"
+    play = Play.PROFILE
     unblended = "ABCUVW"
     forms = (
         Form(
@@ -32,6 +41,10 @@ class LinuxcncController(GcodeController):
             "MAX_ACCELERATION a little (5 %) above the axis's limit.acceleration",
         ),
     )
+
+    def feeds(self, batch: Batch, rapids: Rapids) -> Feeds:
+        """The larger of the speeds at the ends of each block."""
+        return end_feeds(batch, rapids)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """Where the machine file contradicts how LinuxCNC moves; what the program leaves open."""

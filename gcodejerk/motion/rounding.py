@@ -8,6 +8,7 @@ modes themselves, so it has its zeros at their poles, damping included, for any 
 Rule 1: a rounded position is one of the two neighbours of the exact one: the error stays below one
 step, whatever the modes.
 Rule 2: a rounded move never goes backwards and never passes its end.
+Rule 3: where the points set the speed, no block is faster than the highest speed by a step or more.
 """
 
 from __future__ import annotations
@@ -24,7 +25,13 @@ from gcodejerk.motion.sampling import Counts, Grid
 
 
 def round_positions(
-    positions: Array, grid: Grid, step: Array, origin: Array, poles: Complex, weights: Array
+    positions: Array,
+    grid: Grid,
+    step: Array,
+    origin: Array,
+    poles: Complex,
+    weights: Array,
+    highest: Array | None = None,
 ) -> Counts:
     r"""Positions as whole steps from an origin, their noise kept away from the modes.
 
@@ -42,6 +49,10 @@ def round_positions(
         Of the modes that the axis excites. [rad/s]
     weights : ndarray, shape (m,)
         Their participation. [-]
+    highest : ndarray, shape (n,), optional
+        Speed that the exact positions never exceed. A block then has at most as many steps as that
+        speed rounded up to whole steps per block; two errors of rounding are up to two steps too
+        many otherwise. [mm/s]
 
     Returns
     -------
@@ -55,6 +66,9 @@ def round_positions(
     a mode keeps :math:`R = \sum_i e_i z^{k-i}`, times a constant. Choosing between the two
     neighbours the one with the smaller weighted sum of :math:`|R|^2` is rounding of :math:`x -
     \mathrm{Re}\,\overline{z R}`.
+
+    The lower neighbour is always within `highest`: with :math:`x_i \le x_{i-1} + V\tau`,
+    :math:`\lfloor x_i \rfloor \le \lfloor x_{i-1} \rfloor + \lceil V\tau \rceil`.
     """
     n, k = positions.shape
     # Rows in order of length, so that those under way in a column are the first ones.
@@ -72,7 +86,9 @@ def round_positions(
     half = exact + 0.5
     out = np.rint(exact)
     blocks = grid.blocks[order]
-    if not len(poles):  # nothing to feed back: all knots at once
+    duration = np.diff(grid.knots, axis=1)[order]
+    most = None if highest is None else _most_steps(highest[order] / step[order], duration, grid)
+    if not len(poles):  # nothing to feed back: all knots at once, and never a step too many
         begun = np.arange(1, k - 1)[:, np.newaxis] >= k - blocks
         nearest = np.minimum(np.maximum(np.floor(half), below), above)[1:-1]
         nearest = np.maximum.accumulate(np.where(begun, nearest, previous), axis=0)
@@ -81,7 +97,6 @@ def round_positions(
     under_way = np.searchsorted(-blocks, -np.arange(k - 1, 0, -1), side="right")
     share = _shares(poles, weights)
     running = np.zeros((n, len(poles)), dtype=np.complex128)
-    duration = np.diff(grid.knots, axis=1)[order]
     usual = int(np.median(duration[:, -1])) if n else 1
     step_phase = np.exp(poles * usual * grid.interval)
     differs = (duration != usual) & (np.arange(n)[:, np.newaxis] < under_way)
@@ -90,7 +105,8 @@ def round_positions(
     if begin < together:
         knots = slice(1 + begin, 1 + together)
         longer = np.where(differs[0], duration[0] - usual, 0)[begin:together]
-        columns = (exact[knots, 0], half[knots, 0], below[knots, 0], above[knots, 0], longer)
+        reach = np.full(together - begin, np.inf) if most is None else most[begin:together, 0]
+        columns = (exact[knots, 0], half[knots, 0], below[knots, 0], above[knots, 0], longer, reach)
         out[knots, 0] = _alone(columns, previous, running, share, step_phase, poles, grid.interval)
     for knot, m in enumerate(under_way[together:-1].tolist(), 1 + together):
         ringing, before = running[:m], previous[:m]
@@ -102,10 +118,19 @@ def round_positions(
         rounded = np.floor(half[knot, :m] - ringing.real @ share)
         np.maximum(rounded, below[knot, :m], out=rounded)
         np.minimum(rounded, above[knot, :m], out=rounded)
+        if most is not None:
+            np.minimum(rounded, before + most[knot - 1, :m], out=rounded)
         np.maximum(rounded, before, out=before)
         out[knot, :m] = before
         ringing += (before - exact[knot, :m])[:, np.newaxis]
     return _in_order(out, direction, order)
+
+
+def _most_steps(speed: Array, duration: Counts, grid: Grid) -> Array:
+    """Steps of each block at most, a row for each block, from steps per second, shape (n,)."""
+    exact = speed[:, np.newaxis] * (duration * grid.interval)
+    most: Array = np.ascontiguousarray(np.ceil(exact - 1e-9).T)
+    return most
 
 
 def _alone(
@@ -116,16 +141,18 @@ def _alone(
 
     What has been rounded last, and what rings of it, stays in the first rows of `previous` and
     `running`. The columns are the exact positions, those plus 0.5, the neighbours below and above,
-    and how much longer than usual the block before each is. [intervals]
+    how much longer than usual the block before each is [intervals], and its steps at most.
     """
     ringing, before = running[:1], float(previous[0])
     written = []
-    for exact, half, below, above, longer in zip(*(c.tolist() for c in columns), strict=True):
+    for exact, half, below, above, longer, reach in zip(
+        *(c.tolist() for c in columns), strict=True
+    ):
         ringing *= step_phase
         if longer:
             ringing *= np.exp(poles * longer * interval)
         nearest = float(math.floor(half - (ringing.real @ share).item()))
-        before = max(min(max(nearest, below), above), before)
+        before = max(min(max(nearest, below), above, before + reach), before)
         written.append(before)
         ringing += before - exact
     previous[0] = before

@@ -160,17 +160,35 @@ def knots_response(values: Array, grid: Grid, poles: Complex) -> Complex:
     -------
     ndarray of complex, shape (n, m)
     """
+    every = knots_steps(values, grid)
+    decay = np.exp(poles * (np.arange(every.shape[1]) * grid.interval)[:, np.newaxis])
+    response: Complex = every @ decay.real + 1j * (every @ decay.imag)
+    return response
+
+
+def knots_steps(values: Array, grid: Grid) -> Array:
+    """Changes of velocity of moves in straight lines between the knots, laid out at every interval.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, k)
+        Positions at the knots. [mm]
+    grid : Grid
+        The knots.
+
+    Returns
+    -------
+    ndarray, shape (n, longest + 1)
+        By the time that is left until arrival, so that all moves share the exponentials; 0 where
+        nothing changes. [mm/s]
+    """
     duration = np.diff(grid.knots, axis=1) * grid.interval
     with np.errstate(invalid="ignore", divide="ignore"):
         velocity = np.where(duration > 0.0, np.diff(values, axis=1) / duration, 0.0)
     steps = np.diff(velocity, axis=1, prepend=0.0, append=0.0)
-    # Laid out at every interval, so that all moves share the exponentials.
-    longest = int(grid.counts.max(initial=0))
-    every = np.zeros((len(values), longest + 1))
+    every = np.zeros((len(values), int(grid.counts.max(initial=0)) + 1))
     left = grid.counts[:, np.newaxis] - grid.knots
     # Columns before a move has begun have no step.
     begun = steps != 0.0
     every[np.nonzero(begun)[0], left[begun]] = steps[begun]
-    decay = np.exp(poles * (np.arange(longest + 1) * grid.interval)[:, np.newaxis])
-    response: Complex = every @ decay.real + 1j * (every @ decay.imag)
-    return response
+    return every

@@ -15,6 +15,7 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import profiles_response
 from gcodejerk.motion.profiles.profile import Array, Profiles
+from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Batch, NumberFormat, make_streams
@@ -92,7 +93,7 @@ class Plan:
 
     @property
     def residual(self) -> Array:
-        """Displacement envelope of each mode, of the stream as written, shape (1, m) [mm]."""
+        """Displacement envelope of each mode, of the stream as it is played, shape (1, m) [mm]."""
         return self.batch.residual
 
     @property
@@ -130,6 +131,8 @@ def plan_move(
     *,
     time: float | None = None,
     T1: float | None = None,
+    stride: int = 1,
+    play: Play = Play.TABLE,
 ) -> Plan:
     """Plan one move from rest to rest.
 
@@ -145,6 +148,11 @@ def plan_move(
         T_SUM, rounded up to whole intervals; the conventional time by default. [s]
     T1 : float, optional
         T1 of a four-segment profile; the best by default. [s]
+    stride : int, optional
+        Intervals from one point to the next as the move is judged, `Controller.stride`; the plan's
+        own points are those of every interval.
+    play : Play, optional
+        What the control makes of the points that it is judged by, `Controller.play`.
 
     Returns
     -------
@@ -170,7 +178,14 @@ def plan_move(
     row = displacement_row(displacement, machine)
     check_time(time)
     plans = plan_moves(row, machine, profile, time=time, T1=T1)
-    batches = _streams(plans)
+    batches = _streams(plans, stride, play)
+    if batches and (stride, play) != (1, Play.TABLE):
+        judged = batches[0]
+        points = _streams(replace(plans, has_to_gain=False))
+        batches = [
+            replace(batch, residual=judged.residual, worst_in_band=judged.worst_in_band)
+            for batch in points
+        ]
     why = None if plans.reason[0] == CERTAIN else REASONS[plans.reason[0]]
     if why in (Reason.LIMITS, Reason.NOT_BETTER):
         plans = plan_moves(row, machine, "conventional", as_today=True)
@@ -182,7 +197,7 @@ def plan_move(
     return Plan(machine, named, plans, batches[0], why is None, None if why is None else str(why))
 
 
-def _streams(plans: Plans) -> list[Batch]:
+def _streams(plans: Plans, stride: int = 1, play: Play = Play.TABLE) -> list[Batch]:
     """The stream of one move, to the axes' resolutions; none where the move is not planned."""
     step = np.ones((1, len(AXES)))
     for described in plans.machine.axes:
@@ -190,7 +205,7 @@ def _streams(plans: Plans) -> list[Batch]:
     zero = np.zeros((1, len(AXES)))
     return [
         batch
-        for window in make_streams(plans, NumberFormat(zero, step, zero), 1)
+        for window in make_streams(plans, NumberFormat(zero, step, zero), stride, play)
         for batch in window
     ]
 

@@ -305,6 +305,7 @@ def _write(
         plans,
         emitter.number_format(writer.program.rapids, machine, dialect),
         emitter.stride(machine.interval),
+        emitter.play,
     ):
         for batch in window:
             collected.add(batch)
@@ -333,7 +334,7 @@ def _verified(
         found = verify_files(
             source,
             target,
-            replace(machine, design=design),
+            replace(machine, design=design, controller=emitter.name),
             names=(program.name, f"the output for {program.name}"),
             dialect=program.dialect,
             table=not emitter.in_place,

@@ -31,6 +31,8 @@ MOST = 100
 BATCH_BYTES = 1 << 20
 """Text of streams that is judged at a time."""
 NAMES = ("<original>", "<processed>")
+END_SPEEDS = ("linuxcnc",)
+"""Controllers for which F is the speed at an end of a block; all others hold it over the block."""
 
 
 def verify(
@@ -39,6 +41,7 @@ def verify(
     machine: Machine,
     *,
     dialect: str | Dialect | None = None,
+    controller: str | None = None,
     most: int = MOST,
 ) -> Verification:
     r"""Compare a processed program with its original.
@@ -48,9 +51,12 @@ def verify(
     original, processed : bytes, str or Path
         The programs themselves, or the names of their files. A file is read in bounded memory.
     machine : Machine
-        What the program was processed for. The profile is that of the stamp, where there is one.
+        What the program was processed for. Profile and controller are those of the stamp, where
+        there is one.
     dialect : str or Dialect, optional
         How the original is written; the stamp's by default, or the machine's.
+    controller : str, optional
+        What the streams are for; the stamp's by default, or the machine's.
     most : int, optional
         Violations after which it stops.
 
@@ -82,7 +88,9 @@ def verify(
         stamp = read_stamp(other, machine)
         if stamp is not None and stamp.known and stamp.profile is not None:
             design = replace(machine.design, profile=stamp.profile)
-            machine, dialect = replace(machine, design=design), dialect or stamp.dialect
+            machine = replace(machine, design=design)
+            dialect, controller = dialect or stamp.dialect, controller or stamp.controller
+        machine = replace(machine, controller=controller or machine.controller)
         return verify_files(one, other, machine, names=names, dialect=dialect, most=most)
 
 
@@ -121,7 +129,7 @@ def verify_files(
     original, processed : BinaryIO
         Opened for reading bytes, at their beginning; the original is read twice, so it is seekable.
     machine : Machine
-        What the program was processed for.
+        What the program was processed for; its controller is that of the streams.
     names : tuple of str, optional
         For messages.
     dialect : str or Dialect, optional
@@ -164,9 +172,9 @@ def _judge_program(
     """Compare programs; which rapids were replaced, and how many lines were kept."""
     alignment = Alignment(Window(original), Window(processed), program, machine, found)
     reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
-    stride = stride_of(machine)
+    stride, end_speeds = stride_of(machine), machine.controller in END_SPEEDS
     for streams in _batches(_checked(alignment, reader)):
-        _check_points(reader.paths(streams), program, machine, stride, found)
+        _check_points(reader.paths(streams), program, machine, stride, found, end_speeds)
     alignment.check_sum()
     return alignment.replaced, alignment.kept
 
@@ -175,7 +183,7 @@ def _judge_table(table: BinaryIO, program: Program, machine: Machine, found: Fin
     """Compare a table with its program; which rapids it replaces."""
     reader = TableReader(table, program.rapids, machine, found)
     for paths in reader.paths():
-        _check_points(paths, program, machine, 1, found)
+        _check_points(paths, program, machine, 1, found, end_speeds=False)
     return reader.replaced
 
 
@@ -221,11 +229,16 @@ def _batches(streams: Iterator[Stream]) -> Iterator[list[Stream]]:
 
 
 def _check_points(
-    paths: Paths, program: Program, machine: Machine, stride: int, found: Findings
+    paths: Paths,
+    program: Program,
+    machine: Machine,
+    stride: int,
+    found: Findings,
+    end_speeds: bool,
 ) -> None:
     """All checks on points."""
     check_rapids(paths, program.rapids, machine, found)
     check_line(paths, machine, found)
     # A rapid without length has no time profile.
     if (paths.displacement != 0.0).any(axis=1).all():
-        check_dynamics(paths, machine, stride, found)
+        check_dynamics(paths, machine, stride, found, end_speeds=end_speeds)

@@ -1,6 +1,5 @@
 """Controller `linuxcnc`: what stands around the points, and what the points add up to."""
 
-import itertools
 import re
 from decimal import Decimal
 
@@ -249,36 +248,6 @@ def test_absolute_points_are_the_planned_positions():
     for axis in "XZA":
         found = [float(x) for x in words(points, axis)]
         assert found == pytest.approx(plan.positions[axis][1:].tolist(), abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("row", "axes"),
-    [
-        ({"X": 12.5}, "X"),
-        ({"X": 12.5, "Z": -5.0}, "XZ"),
-        ({"A": 40.0}, "A"),
-        ({"X": 9.0, "A": 40.0}, "X"),
-    ],
-)
-def test_feed_is_the_larger_speed_of_the_profile_at_a_block_s_ends(row, axes):
-    """F is the speed along the linear axes, or the rotary ones where only they move."""
-    block = " ".join(f"{axis}{value}" for axis, value in row.items()).encode()
-    _, points, _ = parts(stream_of(HEAD + b"G0 " + block + b"\nM2\n", controller="mach"))
-    plan = plan_move(row, MACHINE)
-    length = sum(row[a] ** 2 for a in axes) ** 0.5
-    # The speed of a piecewise polynomial of the segments, not that of the samples.
-    speed, v, a, t0 = [0.0], 0.0, 0.0, 0.0
-    segments = plan.profiles.segments(0)
-    for t in plan.t[1:]:
-        while segments and t0 + segments[0][0] <= t + 1e-12:
-            d, j = segments.pop(0)
-            v, a, t0 = v + a * d + j * d * d / 2, a + j * d, t0 + d
-        u = t - t0
-        j = segments[0][1] if segments else 0.0
-        speed.append(length * 60.0 * (v + a * u + j * u * u / 2 if segments else 0.0))
-    feeds = [float(x) for x in words(points, "F")]
-    expected = [max(pair) for pair in itertools.pairwise(speed)]
-    assert feeds == pytest.approx(expected, abs=1e-3, rel=1e-6)
 
 
 def test_points_are_two_milliseconds_apart_whatever_the_interval():

@@ -76,6 +76,32 @@ def test_noise_is_below_that_of_plain_rounding_at_every_mode_that_counts(frequen
     assert total[0] < 0.6 * total[1]
 
 
+@pytest.mark.parametrize("stride", [1, 2, 3])
+@pytest.mark.parametrize("frequencies", [(), (30.0,), (23.7, 90.0, 180.0)])
+def test_no_block_is_a_step_faster_than_the_highest_speed(frequencies, stride):
+    # Cruise at 37.3 steps per interval, and the same backwards.
+    ramp = SymmetricProfiles(*(np.array([d]) for d in (0.004, 0.003, 0.004, 0.2))).general()
+    V = float(ramp.peak_velocity[0])
+    exact = np.concatenate(
+        [positions_of(ramp, sign * 37.3e-3 / INTERVAL / V, [0.1237], 222) for sign in (1.0, -1.0)]
+    )
+    counts = np.full(2, 222)
+    grid = Grid.every(counts, stride, INTERVAL)
+    taken = np.take_along_axis(exact, grid.knots, axis=1)
+    poles = mode_poles(frequencies, np.zeros(len(frequencies)))
+    arguments = (taken, grid, np.full(2, 1e-3), np.zeros(2), poles, np.ones(len(poles)))
+    bound = round_positions(*arguments, np.full(2, 37.3e-3 / INTERVAL))
+    free = round_positions(*arguments)
+    steps, exact_steps = np.abs(np.diff(bound, axis=1)), 37.3 * np.diff(grid.knots, axis=1)
+    assert (steps <= np.ceil(exact_steps)).all()
+    # Still one of the two neighbours, and nowhere backwards.
+    assert (np.abs(bound - taken / 1e-3)[:, 1:-1] < 1.0 + 1e-6).all()
+    if len(poles) > 1 and stride == 1:
+        assert (np.abs(np.diff(free, axis=1)) > np.ceil(exact_steps)).any()
+    if not len(poles):
+        np.testing.assert_array_equal(bound, free)
+
+
 @pytest.mark.parametrize("length", [0.0213, -0.0213, 1.0, -7.7, 113.0])
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 0.0025, 0.01])
 @pytest.mark.parametrize("stride", [1, 2, 5])

@@ -1,12 +1,14 @@
 """How fast the points of a stream follow each other: time, limits, feeds.
 
 The time between two points is not written; it follows from the machine's interval: every block
-lasts `stride` intervals, and the remainder of the division lengthens one block in the middle.
+lasts `stride` intervals, and the remainder of the division lengthens one block in the middle. Where
+the control holds F over a block, its F says so too (`held`).
 
 Velocity, acceleration and jerk are divided differences of the points. Times a factorial, such a
 difference is a weighted mean of the derivative, so exact points of a motion within its limits
 never exceed them, however short or long the blocks are; only the rounding of the points needs a
-tolerance.
+tolerance. Where the points set the speed, that of a velocity is one step for each block: the points
+are rounded so that none has more. Where F bounds it (LinuxCNC), it is one step at both ends.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from gcodejerk.machine import BELL, Machine
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.physics.conventional import rapid_time
 from gcodejerk.verification.physics.feeds import NOT_OWN, check_feeds, rapid_limits
+from gcodejerk.verification.physics.held import MIRRORED, Blocks, check_held, check_mirror
 from gcodejerk.verification.physics.independent import check_axes
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import Array, Index, Paths
@@ -135,8 +138,14 @@ class Clock:
         return cls(moment.astype(np.int64))
 
 
-def check_dynamics(paths: Paths, machine: Machine, stride: int, found: Findings) -> None:
-    """Duration, limits and feeds of streams; feeds only where the streams have them."""
+def check_dynamics(
+    paths: Paths, machine: Machine, stride: int, found: Findings, *, end_speeds: bool
+) -> None:
+    """Duration, limits and feeds of streams; feeds only where the streams have them.
+
+    With `end_speeds` F of a block is the larger of the speeds at its ends (LinuxCNC), and the
+    motion between the points is the profile's; without, the control moves in straight lines.
+    """
     usual, most = conventional_counts(paths, machine)
     blocks = paths.count
     fewest = np.where(blocks > 1, blocks * stride, 1)
@@ -147,7 +156,7 @@ def check_dynamics(paths: Paths, machine: Machine, stride: int, found: Findings)
     highest = np.maximum(np.minimum(blocks * stride + stride - 1, most), fewest)
     count = np.clip(usual, fewest, highest)
     clock = Clock.of(paths, count, stride, blocks // 2)
-    best: list[Complaint | None] = _check_points(paths, machine, clock)
+    best: list[Complaint | None] = _check_points(paths, machine, clock, end_speeds)
     # Another duration may fit where the usual one does not: nothing says which was meant.
     for other in range(stride if stride > 1 else 0):
         for late in (blocks // 2, (blocks - 1) // 2):
@@ -160,7 +169,8 @@ def check_dynamics(paths: Paths, machine: Machine, stride: int, found: Findings)
                 continue
             part = _take(paths, bad)
             clock = Clock.of(part, guess[bad], stride, late[bad])
-            for k, complaint in zip(bad.tolist(), _check_points(part, machine, clock), strict=True):
+            judged = _check_points(part, machine, clock, end_speeds)
+            for k, complaint in zip(bad.tolist(), judged, strict=True):
                 if complaint is None:
                     best[k] = None
     for k, complaint in enumerate(best):
@@ -178,15 +188,24 @@ class Complaint:
     problem: str
 
 
-def _check_points(paths: Paths, machine: Machine, clock: Clock) -> list[Complaint | None]:
+def _check_points(
+    paths: Paths, machine: Machine, clock: Clock, end_speeds: bool
+) -> list[Complaint | None]:
     """Look at each stream under one guess of its times."""
     out: list[Complaint | None] = [None] * len(paths.begin)
     t: Array = np.asarray(clock.moment * machine.interval, dtype=np.float64)
     independent = machine.positioning != "linear"
+    has_feeds = bool(np.isfinite(paths.feed).any())
+    if end_speeds:
+        feeds = check_feeds(paths, machine, t, limits_of(machine))
+    else:
+        feeds = check_held(paths, machine.interval, clock.moment) if has_feeds else []
+        if has_feeds and not independent and machine.design.profile in MIRRORED:
+            feeds.append(check_mirror(paths, clock.moment))
     for kind, rows, problem in (
         *(check_axes(paths, machine, t, *_own_times(paths, machine)) if independent else ()),
-        *_limits(paths, machine, t),
-        *check_feeds(paths, machine, t, limits_of(machine)),
+        *_limits(paths, machine, t, end_speeds),
+        *feeds,
     ):
         bad = np.flatnonzero(rows)
         owner = paths.owner[bad]
@@ -195,7 +214,11 @@ def _check_points(paths: Paths, machine: Machine, clock: Clock) -> list[Complain
             if out[k] is None:
                 out[k] = Complaint(kind, int(bad[at] - paths.begin[k]) - 1, problem)
     own = rapid_limits(paths, machine)
-    excess = leaves_more(paths, machine, clock.moment, own)
+    played, moment = paths, clock.moment
+    if has_feeds and not end_speeds:
+        blocks = Blocks(paths, moment)
+        played, moment = blocks.played(), blocks.arrivals()
+    excess = leaves_more(played, machine, moment, own, straight=not end_speeds)
     for k, left, allowed in zip(*excess.columns(), strict=True):
         if out[k] is None:
             problem = (
@@ -280,7 +303,9 @@ class Padded:
 _ORDERS = ((1, Kind.VELOCITY, "s"), (2, Kind.ACCELERATION, "s^2"), (3, Kind.JERK, "s^3"))
 
 
-def _limits(paths: Paths, machine: Machine, t: Array) -> list[tuple[Kind, NDArray[np.bool_], str]]:
+def _limits(
+    paths: Paths, machine: Machine, t: Array, end_speeds: bool
+) -> list[tuple[Kind, NDArray[np.bool_], str]]:
     """Compare every moving axis with what designs may use."""
     padded = Padded.of(paths, t)
     limits = limits_of(machine)
@@ -291,6 +316,8 @@ def _limits(paths: Paths, machine: Machine, t: Array) -> list[tuple[Kind, NDArra
             limit = limits[order - 1, a]
             value, error, inside = padded.differences(x, order)
             step = paths.step[padded.owner[: len(value)], a]
+            if order == 1 and not end_speeds:
+                step = 0.5 * step
             bad = inside & (np.abs(value) > limit * (1.0 + RELATIVE) + error * step)
             if bad.any():
                 problem = f"{AXES[a]} passes its limit of {limit:g} mm/{unit}"

@@ -1,7 +1,8 @@
-"""Whether the F words of a stream belong to its points.
+"""Whether the F words of a stream belong to its points, where F is the speed at a block's end.
 
-F of a block is the larger of the speeds at its two ends, known to the last decimal written, far
-better than from rounded points. That gives these tests:
+So it is for LinuxCNC (others hold F: `held`): F of a block is the larger of the speeds at its two
+ends, known to the last decimal written, far better than from rounded points. That gives these
+tests:
 
 - F is not below the mean speed of its block, nor above the velocity limits;
 - on a straight line, the tests of `speeds`: the F words are those of one motion within the limits;

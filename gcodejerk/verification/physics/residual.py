@@ -17,6 +17,9 @@ that is fair: more than that rapid in closed form at the worst frequencies withi
 what designs are judged by, and more than it through straight lines at the same moments, by more
 than what rounding and the distance of the points may make of it. Of a mode of which points tell
 less than two in a period, they tell nothing.
+
+A control that moves in straight lines between the points leaves what these leave, of every mode:
+then neither the distance of the points excuses anything, nor how few there are in a period.
 """
 
 from __future__ import annotations
@@ -39,6 +42,8 @@ SIGMAS = 3.0
 BAND_POINTS, BAND_STEP = 9, 0.25
 """Frequencies at which a band is judged at least, and how far apart they are at most, times half of
 the longest duration. [rad]"""
+UNJUDGED = ("conventional", "shortest")
+"""Profiles that are written whether or not their straight lines are better than today's rapid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +59,9 @@ class Excess:
         return self.stream.tolist(), self.left.tolist(), self.allowed.tolist()
 
 
-def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) -> Excess:
+def leaves_more(
+    paths: Paths, machine: Machine, moment: Index, limits: Array, *, straight: bool
+) -> Excess:
     """Find the streams that leave more vibration than the controller's own rapid.
 
     Parameters
@@ -67,8 +74,11 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
         When each point is reached, since the start of its stream. [intervals]
     limits : ndarray, shape (3, streams, 9)
         Of the controller's own rapid, over the displacement of each axis. [1/s], [1/s^2], [1/s^3]
+    straight : bool
+        The control moves in straight lines between the points.
     """
-    streams = _Streams(paths, machine, moment, limits)
+    straight = straight and machine.design.profile not in UNJUDGED
+    streams = _Streams(paths, machine, moment, limits, straight)
     modes = Oscillators.of(machine)
     none = Excess(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
     if not len(modes.poles):
@@ -85,7 +95,8 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
     own = streams.lines(modes, streams.own_positions())
     sampled = streams.largest(modes, np.abs(own))
     allowed = np.maximum(allowed, (1.0 + RELATIVE) * sampled + streams.noise(modes))
-    allowed = allowed + streams.largest(modes, streams.coarseness(modes))
+    if not straight:
+        allowed = allowed + streams.largest(modes, streams.coarseness(modes))
     for factor in streams.band(modes):
         if (left <= allowed).all():
             return none
@@ -98,8 +109,10 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
 class _Streams:
     """The motions of many streams, and of the rapids that they replace."""
 
-    def __init__(self, paths: Paths, machine: Machine, moment: Index, limits: Array) -> None:
-        self.paths, self.machine = paths, machine
+    def __init__(
+        self, paths: Paths, machine: Machine, moment: Index, limits: Array, straight: bool
+    ) -> None:
+        self.paths, self.machine, self.straight = paths, machine, straight
         self.owner = paths.owner
         self.left = (moment[paths.end - 1][self.owner] - moment).astype(np.int64)
         """Until arrival, row by row. [intervals]"""
@@ -119,6 +132,8 @@ class _Streams:
 
     def largest(self, modes: Oscillators, amplitude: Array) -> Array:
         """Largest over the modes that each stream's own points can show, shape (streams,)."""
+        if self.straight:
+            return modes.largest(amplitude)
         shown = np.abs(modes.poles) * self.spacing[:, np.newaxis] < np.pi
         return modes.largest(np.where(shown, amplitude, 0.0))
 
@@ -136,7 +151,8 @@ class _Streams:
 
     def lines(self, modes: Oscillators, position: Array) -> NDArray[np.complex128]:
         """Vibration left by straight lines through positions, shape (streams, m) [mm]."""
-        h = np.where(self.begins, 1.0, np.diff(self.t, prepend=0.0))
+        h = np.diff(self.t, prepend=0.0)
+        h = np.where(self.begins | (h <= 0.0), 1.0, h)
         out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
         clock = np.arange(int(self.left.max(initial=0)) + 1) * self.machine.interval
         steps = {}

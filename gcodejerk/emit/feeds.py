@@ -1,0 +1,153 @@
+r"""F of the blocks of streams, as the control takes it.
+
+This module owns both meanings of F. A control that *holds* F over a block moves along it at one
+speed: F is then the length of the block, between its points as they are written, over its time. For
+one that reaches F at the *end* of a block (LinuxCNC 2.9) it is the larger of the profile's speeds
+at the two ends.
+
+Rule 1: F counts along the axes that it refers to: the first of XYZ, UVW, ABC that moves.
+Rule 2: equal blocks have equal F: none corrects what the digits of the one before left open. Half
+of F's last digit is 1.7 nm in 2 ms (42 nm in inches), so that a block of one step of 0.0001 mm
+lasts its 2 ms within 33 ns, and a faster one is nearer still. For finer steps F has more decimals:
+a block of one step lasts its time to 0.01 % in any case. What all blocks of a rapid add up to is
+right to the same share, were all of them that slow, and mostly to nanoseconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc import Rapids
+from gcodejerk.planning.stream import Batch
+from gcodejerk.units import MM_PER_INCH, per_minute
+
+FEED_DECIMALS = 4
+"""Of F in units per minute, at least."""
+STEP_KNOWN = 2e-4
+"""Last digit of F at most, of the F of a block of one step."""
+FEED_GROUPS = ("XYZ", "UVW", "ABC")
+"""F is the speed along the first of these groups that moves (LinuxCNC, G94)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Feeds:
+    """F of b streams of k moments each.
+
+    Attributes
+    ----------
+    whole : ndarray of int, shape (b, k)
+        F of the block that ends at each moment, in whole units of its last decimal.
+    decimals : ndarray of int, shape (b,)
+        Of each stream's F, in program units per minute.
+    """
+
+    whole: NDArray[np.int64]
+    decimals: NDArray[np.int64]
+
+    def of_end(self, row: int) -> Decimal:
+        """F of the last block of a stream."""
+        return Decimal(int(self.whole[row, -1])).scaleb(-int(self.decimals[row]))
+
+
+def mean_feeds(batch: Batch, rapids: Rapids) -> Feeds:
+    """F for controls that hold it over a block: its length over its time.
+
+    A block without length, which takes no time, has the F of the next one, or of the last that has
+    a length: nothing changes, and a control that refuses a tiny F has none to refuse.
+
+    Parameters
+    ----------
+    batch : Batch
+        b streams.
+    rapids : Rapids
+        The program's, for the unit of its F.
+
+    Returns
+    -------
+    Feeds
+    """
+    inch = rapids.inch[batch.moves]
+    length, unit = np.zeros(batch.times.shape), np.ones(batch.times.shape)
+    for group in FEED_GROUPS:
+        way = np.zeros(batch.times.shape)
+        for axis in map(AXES.index, group):
+            if axis in batch.written:
+                q = batch.written[axis]
+                way += np.diff(q, axis=1, prepend=q[:, :1]) ** 2
+        first = (length == 0.0) & (way > 0.0)
+        length = np.where(first, np.sqrt(way), length)
+        own = np.where(inch & (group != "ABC"), MM_PER_INCH, 1.0)
+        unit = np.where(first, own[:, np.newaxis], unit)
+    time = np.maximum(batch.times, 1) * batch.grid.interval
+    decimals = _decimals(batch, inch)
+    speed = np.where(batch.times > 0, length / time / unit, np.nan)
+    # Backwards first: what is left without a length stands behind all motion.
+    speed = _filled(_filled(speed[:, ::-1])[:, ::-1])
+    return Feeds(_in_digits(speed, decimals), decimals)
+
+
+def end_feeds(batch: Batch, rapids: Rapids) -> Feeds:
+    """F for LinuxCNC: the larger of the profile's speeds at the two ends of each block."""
+    speed = _path_speed(batch, rapids)
+    ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
+    # A stream of one block is at rest at both ends: only its mean speed is left.
+    single = batch.grid.blocks == 1
+    if single.any():
+        moves = batch.moves[single]
+        linear = (batch.plans.displacement[moves][:, :3] != 0.0).any(axis=1)
+        unit = np.where(rapids.inch[moves] & linear, MM_PER_INCH, 1.0)
+        time = batch.grid.counts[single] * batch.grid.interval
+        ends[single, -1] = batch.plans.length[moves] / time / unit
+    decimals = np.full(len(batch), FEED_DECIMALS, dtype=np.int64)
+    return Feeds(_in_digits(ends, decimals), decimals)
+
+
+def _in_digits(speed: NDArray[np.float64], decimals: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Speeds per second as F, at least its last digit: F0 is an error, and so no block has it."""
+    scale = per_minute(1.0) * 10.0**decimals
+    feed = np.maximum(np.rint(scale[:, np.newaxis] * np.nan_to_num(speed)), 1.0)
+    out: NDArray[np.int64] = feed.astype(np.int64)
+    return out
+
+
+def _decimals(batch: Batch, inch: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Decimals of each stream's F, by the coarsest step of the axes that move."""
+    moving = batch.plans.displacement[batch.moves] != 0.0
+    step = np.where(moving, batch.number_format.step, 0.0).max(axis=1)
+    block = np.maximum(batch.grid.knots[:, -1] - batch.grid.knots[:, -2], 1) * batch.grid.interval
+    least = per_minute(1.0) * step / np.where(inch, MM_PER_INCH, 1.0) / block
+    needed = np.ceil(-np.log10(STEP_KNOWN * least) - 1e-9).astype(np.int64)
+    decimals: NDArray[np.int64] = np.maximum(needed, FEED_DECIMALS)
+    return decimals
+
+
+def _filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows with the last number before each gap in it."""
+    columns = np.arange(values.shape[1])
+    known = np.maximum.accumulate(np.where(np.isnan(values), 0, columns), axis=1)
+    out: NDArray[np.float64] = np.take_along_axis(values, known, axis=1)
+    return out
+
+
+def _path_speed(batch: Batch, rapids: Rapids) -> NDArray[np.float64]:
+    """Speed of the profile at every knot as F means it, in the program's own unit per second."""
+    out = np.zeros(batch.grid.knots.shape)
+    moving = batch.plans.displacement[batch.moves] != 0.0
+    inch = rapids.inch[batch.moves]
+    left = np.ones(len(batch), dtype=bool)
+    for group in FEED_GROUPS:
+        axes = [AXES.index(a) for a in group]
+        chosen = left & moving[:, axes].any(axis=1)
+        square = np.zeros(out.shape)
+        for axis in axes:
+            if axis in batch.velocity:
+                square += batch.velocity[axis] ** 2
+        unit = np.where(inch & (group != "ABC"), MM_PER_INCH, 1.0)[:, np.newaxis]
+        out = np.where(chosen[:, np.newaxis], np.sqrt(square) / unit, out)
+        left &= ~chosen
+    return out

@@ -1,0 +1,179 @@
+r"""Straight lines between written points: how long each block lasts, and what the modes keep.
+
+This module owns what a control makes of the points of a stream. One that plays a table, or that
+holds F over a block, moves in straight lines, at one velocity v_i from point to point: a staircase
+of velocity. Each of its steps is an impulse of acceleration, so after the arrival at T a mode keeps
+
+.. math:: D = \frac{p}{\omega_d} \left| \sum_i (v_{i+1} - v_i)\, e^{\lambda (T - t_i)} \right| ,
+
+exactly, for modes of any frequency: those near half of the sampling rate too, which a profile is
+blind for and its samples are not.
+
+Rule: a block without length takes no time, whatever its F. In front of the motion and behind it
+that changes nothing but the moment of its beginning or end: what is left is that of the arrival,
+which then is earlier. Within the motion, the next block that has a length takes the time of those
+that have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion import Grid, Objective, grouped, knots_steps
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.sampling import Counts
+from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
+
+CELLS = 1 << 20
+"""Exponentials that are computed at a time, of moments at frequencies: 16 MB."""
+
+
+class Play(Enum):
+    """What a control makes of the points of a stream."""
+
+    PROFILE = "the profile itself, between the points too, within their speeds"
+    TABLE = "straight lines between points, each at its own time"
+    HELD = "straight lines between points, each at the F of its block"
+
+
+def block_times(moved: NDArray[np.bool_], grid: Grid) -> Counts:
+    """How long a control that holds F takes for each block.
+
+    Parameters
+    ----------
+    moved : ndarray of bool, shape (n, k)
+        The block that ends at each knot has a length.
+    grid : Grid
+        The knots.
+
+    Returns
+    -------
+    ndarray of int, shape (n, k)
+        For the block that ends at each knot. [intervals]
+
+    Examples
+    --------
+    Seven intervals in blocks of two, the second of which goes nowhere:
+
+    >>> grid = Grid.every(np.array([7]), 2, 0.001)
+    >>> grid.knots.tolist()
+    [[0, 2, 5, 7]]
+    >>> block_times(np.array([[False, True, False, True]]), grid).tolist()
+    [[0, 2, 0, 5]]
+    """
+    before = np.roll(grid.knots, 1, axis=1)
+    before[:, 0] = 0
+    # Where the last block with a length ended; nowhere in front of the motion.
+    ended = np.maximum.accumulate(np.where(moved, grid.knots, -1), axis=1)
+    ended = np.roll(ended, 1, axis=1)
+    ended[:, 0] = -1
+    begin = np.where(ended >= 0, ended, before)
+    times: Counts = np.where(moved, grid.knots - begin, 0)
+    return times
+
+
+def played_positions(written: Array, times: Counts, grid: Grid) -> Array:
+    """Positions at the knots as they are reached: within blocks that last longer, on their line.
+
+    Parameters
+    ----------
+    written : ndarray, shape (n, k)
+        Positions of one axis. [mm]
+    times : ndarray of int, shape (n, k)
+        Of `block_times`.
+    grid : Grid
+        The knots.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        [mm]
+    """
+    before = np.roll(grid.knots, 1, axis=1)
+    before[:, 0] = 0
+    if not (times > grid.knots - before).any():
+        return written
+    columns = np.arange(written.shape[1])
+    last = len(columns) - 1
+    moved = times > 0
+    # The next knot that a block with a length ends at, and what is left of it from here.
+    behind = np.where(moved, columns, last)[:, ::-1]
+    ends = np.minimum.accumulate(behind, axis=1)[:, ::-1]
+    row = np.arange(len(written))[:, np.newaxis]
+    whole = times[row, ends]
+    left = grid.knots[row, ends] - grid.knots
+    within = (left > 0) & (left < whole)
+    share = np.where(within, left / np.maximum(whole, 1), 0.0)
+    here = np.where(within, written[row, ends], written)
+    out: Array = here + share * (written - here)
+    return out
+
+
+def missing_times(times: Counts, grid: Grid) -> Counts:
+    """How much earlier than planned such a control arrives, shape (n,) [intervals]."""
+    missing: Counts = grid.counts - np.where(times > 0, grid.knots, 0).max(axis=1, initial=0)
+    return missing
+
+
+def worst_of_lines(
+    positions: Mapping[int, Array],
+    grid: Grid,
+    objective: Objective,
+    band: float,
+    early: Counts | None = None,
+) -> Array:
+    """Largest residual displacement with every frequency anywhere within the band.
+
+    Parameters
+    ----------
+    positions : mapping of int to ndarray, shape (n, k)
+        Of each axis (index in `AXES`) at the knots. [mm]
+    grid : Grid
+        The knots, of moves that differ in their duration by less than a factor of two.
+    objective : Objective
+        The modes; its nine rows of weights are the axes' participation. [-]
+    band : float
+        Relative error of the frequencies. [-]
+    early : ndarray of int, shape (n,), optional
+        How much earlier than the grid's end the moves arrive. [intervals]
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        [mm]
+    """
+    axes = [axis for axis in positions if objective.weights[axis].any()]
+    felt = objective.take(np.array(axes, dtype=np.int64)).excited()
+    if not len(felt.poles):
+        return np.zeros(len(grid.counts))
+    # The frequencies are those of the class of durations, whatever stands beside a move.
+    longest = grid.interval * 2.0 ** float(np.frexp(float(grid.counts.max(initial=1)))[1])
+    around = felt.in_band(band, longest, JUDGED, JUDGED_FEWEST)
+    response = np.zeros((len(grid.counts), len(around.poles)), dtype=np.complex128)
+    for row, axis in enumerate(axes):
+        steps = knots_steps(positions[axis], grid)
+        used = np.flatnonzero(steps.any(axis=0))
+        steps, left = steps[:, used], used * grid.interval
+        excited = np.flatnonzero(around.weights[row])
+        width = max(1, CELLS // max(len(used), 1))
+        for begin in range(0, len(excited), width):
+            index = excited[begin : begin + width]
+            decay = np.exp(around.poles[index] * left[:, np.newaxis]) * around.weights[row, index]
+            response.real[:, index] += steps @ decay.real
+            response.imag[:, index] += steps @ decay.imag
+    displacement = np.abs(response) / around.poles.imag
+    if early is not None:
+        displacement *= undecayed(early, around.poles * grid.interval)
+    worst: Array = grouped(displacement, around.group).max(axis=1, initial=0.0)
+    return worst
+
+
+def undecayed(early: Counts, poles: Complex) -> Array:
+    """By how much more modes still move some intervals earlier, poles per interval, (n, m) [-]."""
+    out: Array = np.exp(-poles.real * early[:, np.newaxis])
+    return out

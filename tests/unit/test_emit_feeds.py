@@ -1,0 +1,232 @@
+"""F of the blocks: the mean speed for controls that hold it, speeds at the ends for LinuxCNC."""
+
+import io
+import itertools
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gcodejerk import Machine, plan_move, process
+from gcodejerk.axes import AXES
+from gcodejerk.emit.feeds import end_feeds, mean_feeds
+from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.stream import NumberFormat, make_streams
+from gcodejerk.verification import Kind, verify, verify_files
+
+TEXT = """
+interval: 0.002
+positioning: linear
+axes:
+  X:
+    resolution: 0.001
+    rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}
+    modes: [{frequency: 22, damping: 0.02}]
+  Z:
+    resolution: 0.001
+    rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4}
+    modes: [{frequency: 30, damping: 0.02}]
+  A:
+    wrap: none
+    resolution: 0.01
+    rapid: {velocity: 90, acceleration: 2000, jerk: 5.0e+4}
+    modes: [{frequency: 30, damping: 0.02, participation: 1.0}]
+program: {start: {X: 0, Z: 0, A: 0}}
+"""
+MACHINE = Machine.loads(TEXT)
+HEAD = b"G21 G90 G94 G64 F250\n"
+ROWS = [
+    ({"X": 12.5}, "X"),
+    ({"X": 12.5, "Z": -5.0}, "XZ"),
+    ({"A": 40.0}, "A"),
+    ({"X": 9.0, "A": 40.0}, "X"),
+]
+CONTROLS = ("fanuc", "haas", "siemens", "grbl", "mach", "marlin", "klipper")
+
+
+def streams_of(text):
+    """Points of the streams of an output: rows of F and words by letter."""
+    found = []
+    for line in text.decode().splitlines():
+        if "gcodejerk: " in line:
+            found.append([])
+        elif found and re.match(r"G1 .*F[0-9.]+$", line) and found[-1] is not None:
+            words = dict(re.findall(r"([A-Z])(-?[0-9.]+)", line))
+            words.pop("G")
+            found[-1].append({letter: float(number) for letter, number in words.items()})
+    return found
+
+
+def batch_of(displacement, machine=MACHINE, stride=1, step=0.001, start=0.0):
+    """The stream of one move."""
+    row = np.zeros((1, len(AXES)))
+    for axis, size in displacement.items():
+        row[0, AXES.index(axis)] = size
+    shape = row.shape
+    spelled = NumberFormat(*(np.full(shape, float(x)) for x in (start, step, 0.0)))
+    ((batch,),) = make_streams(plan_moves(row, machine), spelled, stride)
+    return batch
+
+
+@pytest.mark.parametrize(("row", "axes"), ROWS)
+def test_for_linuxcnc_f_is_the_larger_speed_of_the_profile_at_a_block_s_ends(row, axes):
+    """F is the speed along the linear axes, or the rotary ones where only they move."""
+    made = end_feeds(batch_of(row), SimpleNamespace(inch=np.array([False])))
+    plan = plan_move(row, MACHINE)
+    length = sum(row[a] ** 2 for a in axes) ** 0.5
+    # The speed of a piecewise polynomial of the segments, not that of the samples.
+    speed, v, a, t0 = [0.0], 0.0, 0.0, 0.0
+    segments = plan.profiles.segments(0)
+    for t in plan.t[1:]:
+        while segments and t0 + segments[0][0] <= t + 1e-12:
+            d, j = segments.pop(0)
+            v, a, t0 = v + a * d + j * d * d / 2, a + j * d, t0 + d
+        u = t - t0
+        j = segments[0][1] if segments else 0.0
+        speed.append(length * 60.0 * (v + a * u + j * u * u / 2 if segments else 0.0))
+    expected = [max(pair) for pair in itertools.pairwise(speed)]
+    assert made.whole[0, 1:] / 1e4 == pytest.approx(expected, abs=1e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize(("row", "axes"), ROWS)
+def test_for_others_f_is_the_length_of_the_block_over_its_time(row, axes):
+    block = " ".join(f"{axis}{value}" for axis, value in row.items()).encode()
+    made = process(HEAD + b"G0 " + block + b"\nM2\n", MACHINE, controller="mach")
+    (points,) = streams_of(made.output)
+    at, feeds, way = dict.fromkeys(row, 0.0), [], []
+    for point in points:
+        feeds.append(point["F"])
+        linear = sum((point[a] - at[a]) ** 2 for a in axes) ** 0.5
+        # Before the linear axes have moved a step, F is that of the rotary one alone.
+        way.append(linear or abs(point.get("A", 0.0) - at.get("A", 0.0)))
+        at = point
+    feeds, way = np.array(feeds), np.array(way)
+    moves = np.flatnonzero(way > 1e-9)
+    # Blocks without length take no time; within the motion the next one takes it.
+    times = 0.002 * np.diff(np.concatenate([[moves[0] - 1], moves]))
+    assert 60.0 * way[moves] / feeds[moves] == pytest.approx(times, rel=1e-4)
+    fast = way > 0.1
+    assert feeds[fast] == pytest.approx(60.0 * way[fast] / 0.002, abs=0.6e-4)
+
+
+def test_a_block_without_length_says_the_f_of_the_next():
+    batch = batch_of({"X": 12.5}, step=0.01)
+    made = mean_feeds(batch, SimpleNamespace(inch=np.array([False])))
+    q, feeds = batch.written[AXES.index("X")][0], made.whole[0] / 10.0 ** made.decimals[0]
+    moving = np.flatnonzero(np.diff(q) > 0.0) + 1
+    first, last = moving[[0, -1]]
+    assert first > 1
+    assert last < len(q) - 1
+    assert np.flatnonzero(batch.times[0]).tolist() == moving.tolist()
+    assert (feeds[1:first] == feeds[first]).all()
+    assert (feeds[last:] == feeds[last]).all()
+    lasts = 60.0 * np.diff(q)[moving - 1] / feeds[moving]
+    assert lasts == pytest.approx(0.002 * batch.times[0, moving], rel=1e-6)
+    # Together: from the beginning of the first that moves to the end of the last.
+    assert lasts.sum() == pytest.approx(0.002 * (last - first + 1), rel=1e-6)
+
+
+@pytest.mark.parametrize("unit", ["G21", "G20"])
+@pytest.mark.parametrize("resolution", [1e-2, 1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("interval", [0.0005, 0.001, 0.004])
+def test_the_digits_of_f_never_let_the_time_drift(interval, resolution, unit):
+    machine = Machine.loads(TEXT.replace("interval: 0.002", f"interval: {interval}"))
+    axes = tuple(replace(axis, resolution=resolution) for axis in machine.axes)
+    machine = replace(machine, axes=axes)
+    scale = 25.4 if unit == "G20" else 1.0
+    ends = (37.123456, -80.0, 211.7, 300.0)
+    lines = [f"G0 X{x / scale:.4f}" for x in ends]
+    program = "\n".join([f"{unit} G90 G94 F9", *lines, "M2"]).encode() + b"\n"
+    made = process(program, machine, controller="grbl")
+    streams = streams_of(made.output)
+    assert len(streams) == 4
+    block = max(1, round(0.002 / interval)) * interval
+    start = 0.0
+    for k, points in enumerate(streams):
+        x = np.array([start, *(point["X"] for point in points)])
+        way, feeds = np.abs(np.diff(x)), np.array([point["F"] for point in points])
+        start, lasts = x[-1], 60.0 * way / feeds
+        assert lasts[way == 0.0] == pytest.approx(0.0)
+        # Blocks without length at both ends are all that may be missing.
+        moves = np.flatnonzero(way)
+        inner = slice(moves[0], moves[-1] + 1)
+        planned = made.plans.counts[k] * interval
+        planned -= block * (moves[0] + len(way) - 1 - moves[-1])
+        whole = lasts[inner].sum()
+        step = max(resolution / scale, way[moves].min())
+        assert whole == pytest.approx(planned, abs=2e-4 * planned)
+        # Half a digit of F is 0.5e-4/60 per second: less than so much in each block.
+        most = np.minimum(0.5e-4 / 60.0 * block / np.maximum(way[moves], step) * 2.0, 1e-3) * block
+        assert whole == pytest.approx(planned, abs=most.sum() + 1e-12)
+        assert whole == pytest.approx(planned, abs=0.01 * interval)
+
+
+@pytest.mark.parametrize("controller", CONTROLS)
+def test_every_control_but_linuxcnc_holds_f(controller):
+    machine = replace(
+        MACHINE,
+        dialect=controller,
+        spindle="mill",
+        program=replace(
+            MACHINE.program,
+            decimal_point="calculator",
+            startup="G71" if controller == "siemens" else "",
+        ),
+    )
+    head = {"siemens": b"G71 G90 G94 G64 F60\n", "marlin": b"G21\nG90\nG0 F90000\n"}
+    head["klipper"] = head["marlin"]
+    program = head.get(controller, b"G21 G90 G94 F60\n") + b"G0 X12.5 Z-5.\nM30\n"
+    made = process(program, machine, controller=controller)
+    (points,) = streams_of(made.output)
+    at, way, feeds = {"X": 0.0, "Z": 0.0}, [], []
+    for point in points:
+        way.append(np.hypot(point["X"] - at["X"], point["Z"] - at["Z"]))
+        feeds.append(point["F"])
+        at = point
+    way, feeds = np.array(way), np.array(feeds)
+    fast = way > 0.01
+    assert np.count_nonzero(fast) > 50
+    assert 60.0 * way[fast] / feeds[fast] == pytest.approx(0.002, rel=1e-6)
+    assert verify(program, made.output, machine).ok
+
+
+def test_a_machine_that_runs_another_control_s_streams_would_run_them_otherwise():
+    program = HEAD + b"G0 X12.5\nM2\n"
+    held = process(program, MACHINE, controller="mach").output
+    ended = process(program, MACHINE, controller="linuxcnc").output
+    # The stamp says what they are for; for another machine file, that or the user does.
+    assert verify(program, held, MACHINE).ok
+    assert verify(program, ended, MACHINE).ok
+    for text, own, other in ((held, "grbl", "linuxcnc"), (ended, "linuxcnc", "mach")):
+        changed = replace(MACHINE, name="another", interval=0.002, controller=other)
+        changed = replace(changed, design=replace(changed.design, tolerance=0.002))
+        found = verify(program, text, changed)
+        assert {v.kind for v in found.violations} == {Kind.FEED}
+        assert verify(program, text, changed, controller=own).ok
+        assert verify(program, text, replace(changed, controller=own)).ok
+
+
+@pytest.mark.parametrize("controller", ["mach", "csv"])
+def test_a_block_with_a_whole_step_more_than_the_limit_allows_is_refused(controller):
+    # 600.6 steps in a block: 601 are rounding, 602 are not.
+    machine = Machine.loads(TEXT.replace("velocity: 300", "velocity: 300.3"))
+    program = HEAD + b"G0 X300\nM2\n"
+    text = process(program, machine, controller=controller).output
+    number = rb"(?m)^G1 X([0-9.]+) F.*$" if controller == "mach" else rb"(?m)^2,[0-9.]+,([0-9.]+),"
+    found = [(float(m[1]), m.span(1)) for m in re.finditer(number, text)]
+    steps = np.rint(np.diff([round(x * 1e3) for x, _ in found])).astype(int)
+    assert set(steps[len(steps) // 2 - 20 : len(steps) // 2 + 20].tolist()) == {600, 601}
+    assert steps.max() == 601
+    k = len(steps) // 2 + int(np.argmax(steps[len(steps) // 2 :] == 601)) + 1
+    x, (begin, end) = found[k]
+    damaged = text[:begin] + b"%.3f" % (x + 1e-3) + text[end:]
+    table = {"table": True} if controller == "csv" else {}
+    own = replace(machine, controller=controller)
+    good, bad = (
+        verify_files(io.BytesIO(program), io.BytesIO(data), own, **table)
+        for data in (text, damaged)
+    )
+    assert good.ok
+    assert Kind.VELOCITY in {v.kind for v in bad.violations}
