@@ -44,7 +44,7 @@ MOST_REMEMBERED = 50_000
 """Profiles that a search remembers, a few hundred bytes each."""
 NEXT_TO_NOTHING, SETTLED = 0.01, 0.1
 """A residual does not matter below this share of what today's rapid leaves, or below this one of
-the tolerance, whichever is more."""
+the tolerance, whichever is more; but what can be settled on arrival, is."""
 COARSE = 24
 """Moves of so few intervals may gain from segments that end between them."""
 
@@ -170,10 +170,7 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     slack = np.maximum(
         NEXT_TO_NOTHING * worst_in_band(task, task.conventional), SETTLED * task.tolerance
     )
-    questions = [
-        _question(task, k, float(reference[k]), slack=float(slack[k]), guard=task.guard)
-        for k in rows
-    ]
+    questions = [_question(task, k, float(reference[k]), slack=float(slack[k])) for k in rows]
     profiles, worst = _answered(task, rows, answers(questions, task.progress), profiles, worst)
     found = np.isfinite(worst)
     worst[found] = worst_in_band(task.take(found), profiles.take(found))
@@ -324,22 +321,17 @@ def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0
 
 
 def _question(
-    task: Task,
-    row: np.intp,
-    reference: float,
-    allowed: float = 0.0,
-    slack: float = 0.0,
-    guard: float = 0.0,
+    task: Task, row: np.intp, reference: float, allowed: float = 0.0, slack: float = 0.0
 ) -> Question:
-    """What is asked about one of the moves."""
+    """What is asked about one of the moves; only where there is slack does it have a guard."""
     V, A, J = (float(limit[row]) for limit in task.limits)
     objective = task.objective
     today = task.conventional.take(slice(row, row + 1))
     move = Move(
         int(task.counts[row]), V, A, J, objective.poles, objective.weights[row], objective.group,
-        task.band, task.interval, today, guard,
+        task.band, task.interval, today, task.guard if slack else 0.0,
     )  # fmt: skip
-    return Question(move, reference, allowed, slack)
+    return Question(move, reference, allowed, slack, task.tolerance if slack else 0.0)
 
 
 def _answered(

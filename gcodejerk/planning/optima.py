@@ -63,12 +63,15 @@ class Question:
     slack : float
         Else, above 0: the smoothest of those that leave no more than this above the least; 0: the
         one that leaves least. [mm]
+    settled : float
+        But of those that leave no more than this, if there are any. [mm]
     """
 
     move: Move
     reference: float
     allowed: float = 0.0
     slack: float = 0.0
+    settled: float = 0.0
 
     def key(self) -> tuple[bytes, float]:
         """A digest that equal problems share, and the weight [mm] that solutions are scaled by."""
@@ -76,10 +79,11 @@ class Question:
         scale = float(move.weights.max(initial=0.0)) or 1.0
         T = move.count * move.interval
         limits = (move.velocity * T, move.acceleration * T**2, move.jerk * T**3)
-        measures = (self.reference / scale, self.allowed / scale, self.slack / scale)
+        measures = (self.reference, self.allowed, self.slack, self.settled)
         numbers = np.concatenate(
             [
-                [move.count, *limits, *measures, move.band, move.interval, move.guard],
+                [move.count, *limits, *(measure / scale for measure in measures)],
+                [move.band, move.interval, move.guard],
                 move.poles.real * T, move.poles.imag * T, move.weights / scale, move.group,
                 *_columns(move.today, T),
             ]
@@ -207,7 +211,7 @@ def _solved(question: Question) -> Optimum | None:
     if question.allowed:
         found = smoothest_within(unit, question.allowed / scale)
     elif question.slack:
-        found = near_least(unit, question.slack / scale, reference)
+        found = near_least(unit, question.slack / scale, question.settled / scale, reference)
     else:
         found = least_residual(unit, reference)
     return found if found is not None and _holding([found], [move])[0] else None

@@ -112,10 +112,11 @@ def test_no_guarded_frequency_keeps_more_than_todays_envelope():
     gained = 0
     for move in drawn(12):
         reference = today_of(move)
-        optimum = near_least(move, 0.01 * reference, reference)
+        optimum = near_least(move, 0.01 * reference, reference, reference)
         free = near_least(
             Move(*(getattr(move, name) for name in Move.__slots__[:-1]), 0.0),
             0.01 * reference,
+            reference,
             reference,
         )
         if optimum is None:
@@ -145,7 +146,7 @@ def test_hardly_more_than_the_least_is_left_and_no_profile_does_that_with_less_j
         free = Move(*(getattr(move, name) for name in Move.__slots__[:-1]), 0.0)
         reference = today_of(move)
         slack = 0.02 * reference
-        least, near = least_residual(free, reference), near_least(free, slack, reference)
+        least, near = least_residual(free, reference), near_least(free, slack, reference, reference)
         assert near.worst <= max(slack, least.worst + slack) * 1.001
         peak = np.abs(near.jerk).max()
         assert peak <= np.abs(least.jerk).max() * 1.001
@@ -207,7 +208,7 @@ def test_a_move_with_a_long_cruise_is_one_ramp_and_its_image():
         today.general(), 1.0,
     )  # fmt: skip
     reference = today_of(move)
-    optimum = near_least(move, 0.01 * reference, reference)
+    optimum = near_least(move, 0.01 * reference, reference, reference)
     assert len(optimum.jerk) < 500
     profile = optimum_profiles([optimum], MS)
     relative = np.linspace(0.9, 1.1, 801)

@@ -105,7 +105,7 @@ def least_residual(move: Move, reference: float) -> Optimum | None:
     return search.optimum(search.null() or search.least(0.0))
 
 
-def near_least(move: Move, slack: float, reference: float) -> Optimum | None:
+def near_least(move: Move, slack: float, settled: float, reference: float) -> Optimum | None:
     """Of the profiles that leave hardly more than the least, the one of least peak jerk.
 
     Parameters
@@ -114,6 +114,8 @@ def near_least(move: Move, slack: float, reference: float) -> Optimum | None:
         At least one pole has a weight above zero.
     slack : float
         What may be left above the least: a residual that does not matter, above zero. [mm]
+    settled : float
+        Where the least is no more than this, what is found leaves no more either. [mm]
     reference : float
         As in `least_residual`. [mm]
 
@@ -128,10 +130,13 @@ def near_least(move: Move, slack: float, reference: float) -> Optimum | None:
         scipy or clarabel is not installed.
     """
     search = _Search(move, reference)
-    allowed = slack / search.unit
+    most = settled / search.unit
+    allowed = min(slack / search.unit, 0.5 * most)
     found = search.least(allowed)
     if found is not None and found.guards and found.worst > allowed:
-        found = search.smoother(found, found.worst + allowed)
+        allowed = found.worst + slack / search.unit
+        allowed = min(allowed, most) if found.worst <= USED * most else allowed
+        found = search.smoother(found, allowed)
     return search.optimum(found)
 
 
