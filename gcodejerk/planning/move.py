@@ -181,7 +181,7 @@ def plan_move(
     batches = _streams(plans, stride, play)
     if batches and (stride, play) != (1, Play.TABLE):
         judged = batches[0]
-        points = _streams(replace(plans, has_to_gain=False))
+        points = _streams(replace(plans, most_in_band=np.full(len(plans), np.nan)))
         batches = [
             replace(batch, residual=judged.residual, worst_in_band=judged.worst_in_band)
             for batch in points

@@ -39,6 +39,8 @@ PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
 LEAST_GAIN = 0.02
 """Share of today's residual that a profile has to win: less is not worth the blocks."""
+ROUNDED = 1.1
+"""What rounding may make of the tolerance that `shortest` promises."""
 MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
 
@@ -275,11 +277,13 @@ class _Planner:
         )
         task = self.task.after(whole_intervals(fastest, self.interval))
         profiles, worst, counts = shortest(task, longest)
+        left = worst
         if self.machine.positioning != "linear":
             # Each axis is quiet enough by itself: together they may not be.
-            joint, today = self._at_arrival(profiles, worst)
-            loud = np.isfinite(joint) & (joint > np.maximum(today, self.machine.design.tolerance))
+            left, today = self._at_arrival(profiles, worst)
+            loud = np.isfinite(left) & (left > np.maximum(today, self.machine.design.tolerance))
             self._rule_out_profiles(loud, Reason.NOT_BETTER)
+        self.judged = left, np.full(len(left), ROUNDED * self.machine.design.tolerance)
         return profiles, counts, np.isfinite(worst)
 
     def _designed(
@@ -392,6 +396,6 @@ class _Planner:
             profile_counts=counts[keep],
             designed=self.profile,
             worst_in_band=in_band[0],
-            conventional_in_band=in_band[1],
+            most_in_band=in_band[1],
             has_to_gain=self.profile in DESIGNS and self.time is None and self.T1 is None,
         )

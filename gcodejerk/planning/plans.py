@@ -124,11 +124,14 @@ class Plans:
     designed : str
         Name of the profiles. Of axes that run on their own, one that gains nothing by it keeps the
         conventional profile.
-    worst_in_band, conventional_in_band : ndarray, shape (n,)
-        Largest residual displacement with every frequency anywhere within `design.band`, of the
-        designed profiles and of the control's own rapid; NaN where they were not compared. [mm]
+    worst_in_band : ndarray, shape (n,)
+        Largest residual displacement of the designed profiles with every frequency anywhere within
+        `design.band`; NaN where it was not computed. [mm]
+    most_in_band : ndarray, shape (n,)
+        What a stream may leave there at most to be written: what the control's own rapid does, or
+        of `shortest` hardly more than the tolerance; NaN: anything. [mm]
     has_to_gain : bool
-        A stream that leaves more than the control's own rapid does is not written.
+        It is the control's own rapid.
     """
 
     machine: Machine
@@ -145,7 +148,7 @@ class Plans:
     profile_counts: NDArray[np.int64]
     designed: str
     worst_in_band: Array
-    conventional_in_band: Array
+    most_in_band: Array
     has_to_gain: bool
 
     def __len__(self) -> int:

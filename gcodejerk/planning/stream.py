@@ -202,9 +202,7 @@ def _make_batch(
 ) -> Batch:
     """One batch, without the moves that it would make worse; these are ruled out."""
     batch = _Maker(plans, moves, number_format.take(moves), stride, play).batch()
-    if not plans.has_to_gain:
-        return batch
-    worse = batch.worst_in_band > plans.conventional_in_band[moves]
+    worse = batch.worst_in_band > plans.most_in_band[moves]
     if not worse.any():
         return batch
     plans.reason[moves[worse]] = REASONS.index(Reason.NOT_BETTER)
@@ -340,7 +338,7 @@ class _Maker:
         residual = residual_displacement(response, self.modes.poles)
         residual *= undecayed(early, self.modes.poles * self.interval)
         worst = self.plans.worst_in_band[self.moves]
-        if self.plans.has_to_gain:
+        if np.isfinite(worst).any():
             band = self.plans.machine.design.band
             worst = worst_of_lines(written, self.grid, self.every, band, early)
         return residual, worst

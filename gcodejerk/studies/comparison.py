@@ -358,7 +358,7 @@ class _Field:
             profile_counts=counts,
             designed=self.machine.design.profile,
             worst_in_band=np.full(n, np.nan),
-            conventional_in_band=np.full(n, np.nan),
+            most_in_band=np.full(n, np.nan),
             has_to_gain=False,
         )
 

@@ -85,7 +85,7 @@ def test_what_is_left_is_what_an_oscillator_keeps_of_the_staircase(step):
                 )
             # The band is judged to 0.5 %, and at more frequencies than these.
             assert worst <= 1.005 * batch.worst_in_band[row] + 1e-9
-            assert batch.worst_in_band[row] <= batch.plans.conventional_in_band[batch.moves[row]]
+            assert batch.worst_in_band[row] <= batch.plans.most_in_band[batch.moves[row]]
     assert seen >= 5
 
 

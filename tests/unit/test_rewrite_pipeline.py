@@ -174,5 +174,5 @@ def test_where_todays_rapid_is_lucky_at_the_file_s_frequencies_it_is_said():
     said = [note for note in made.notes if note.startswith("1 rapid leaves more than today's")]
     assert len(said) == 1
     assert "within 5 % of them" in said[0]
-    assert made.plans.worst_in_band[0] < 0.98 * made.plans.conventional_in_band[0]
+    assert made.plans.worst_in_band[0] < 0.98 * made.plans.most_in_band[0]
     assert not any("leaves more" in note for note in process(PROGRAM, VMC).notes)
