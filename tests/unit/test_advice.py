@@ -134,7 +134,7 @@ axes:
   AXIS:
     rapid: {velocity: 600, acceleration: 5000}
     limit: {acceleration: 6000, jerk: 5.0e+6}
-    modes: [{frequency: 40, damping: 0.02}]
+    modes: [{frequency: 40, damping: 0.02, participation: 1}]
 """
 
 

@@ -24,7 +24,7 @@ axes:
     wrap: none
     resolution: 0.01
     rapid: {velocity: 90, acceleration: 2000, jerk: 5.0e+4}
-    modes: [{frequency: 30, damping: 0.02}]
+    modes: [{frequency: 30, damping: 0.02, participation: 1}]
 """
 )
 

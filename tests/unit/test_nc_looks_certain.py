@@ -245,7 +245,7 @@ positioning: linear
 controller: fanuc
 axes:
   X: {rapid: &r {velocity: 500, acceleration: 3000, jerk: 5.0e+4}, modes: [{frequency: 22}]}
-  A: {wrap: shortest, rapid: *r, modes: [{frequency: 30}]}
+  A: {wrap: shortest, rapid: *r, modes: [{frequency: 30, participation: 1}]}
 """
     program = b"G21 G17 G40 G90 G94 G64 F100.\nG0 X0. A300.\nG0 A90.\nG0 X50. A90.\nG0 A10.\nM30\n"
     for controller, planned in (("fanuc", []), ("csv", [3, 4, 5])):
