@@ -323,7 +323,7 @@ def test_shortest_is_written_only_where_rounding_leaves_it_within_the_tolerance(
         MACHINE, design=replace(MACHINE.design, tolerance=0.002),
         axes=tuple(replace(axis, resolution=0.01) for axis in MACHINE.axes),
     )  # fmt: skip
-    displacement = drawn_moves(8, seed=4)
+    displacement = drawn_moves(4, seed=4)
     plans = plan_moves(displacement, machine, "shortest")
     planned = plans.planned.copy()
     written = [batch for window in make_streams(plans, spelling_of(displacement, step=0.01), 1)
