@@ -66,8 +66,9 @@ def test_an_envelope_is_that_of_a_simulated_oscillator():
 
 
 def test_lines_of_a_spectrum_settle_together(tmp_path):
+    # Lines that stand for unlike widths are damped unlike.
     (tmp_path / "x.csv").write_text(
-        "frequency,PSD\n" + "".join(f"{f},{40 - abs(f - 30)}\n" for f in range(20, 41, 2))
+        "frequency,PSD\n" + "".join(f"{20.0 * 1.08**k},{40 - 3 * abs(k - 5)}\n" for k in range(11))
     )
     text = "interval: 0.001\npositioning: linear\naxes:\n  X:\n    spectrum: x.csv\n"
     text += "    rapid: {velocity: 300, acceleration: 3000, jerk: 1.0e+5}\n"
