@@ -103,7 +103,13 @@ def map_amplitudes(
             "(default: all; in a .csv the mode that the controller's own G0 moves most)",
         ),
     ] = None,
-    condition: Annotated[str, typer.Option(metavar="I/II/III", help="which profiles")] = "III",
+    condition: Annotated[
+        str | None,
+        typer.Option(metavar="I/II/III", help="which profiles", show_default="III"),
+    ] = None,
+    conditions: Annotated[
+        bool, typer.Option("--conditions", help="draw the maps of all three side by side")
+    ] = False,
     output: Annotated[
         str | None,
         typer.Option(
@@ -126,15 +132,23 @@ def map_amplitudes(
     """Map what is left of vibration over T1 and T_SUM, for one move of one axis."""
     from gcodejerk.batch.files import new_file
 
-    if condition.upper() not in CONDITIONS:
+    if condition is not None and condition.upper() not in CONDITIONS:
         raise typer.BadParameter(f"--condition {condition}: choose I, II or III")
+    if conditions and condition is not None:
+        raise typer.BadParameter("--conditions draws all three: leave --condition out")
+    if conditions and output is None:
+        raise typer.BadParameter("--conditions is of maps that are drawn (-o FILE)")
     if output is None and (points is not None or longest is not None):
         raise typer.BadParameter("--points and --longest are of a map that is written (-o FILE)")
     suffix = Path(output).suffix.lower() if output is not None else ""
     if output is not None and suffix not in MAPS:
         raise typer.BadParameter(f"-o {output}: a map is one of {', '.join(MAPS)}")
+    if conditions and suffix == TABLE:
+        raise typer.BadParameter(
+            f"-o {output}: --conditions draws {', '.join(FIGURES)}; a .csv is of one condition"
+        )
     described = load_machine(machine, None)
-    survey = _survey(described, axis, length, condition.upper(), mode, suffix == TABLE)
+    survey = _survey(described, axis, length, (condition or "III").upper(), mode, suffix == TABLE)
     if output is None:
         from gcodejerk.report.tables import map_tables
 
@@ -149,9 +163,10 @@ def map_amplitudes(
             grid = survey.axes(points, longest) if points else survey.interval_axes(longest)
             file.write(map_csv(survey, *grid))
         else:
-            from gcodejerk.report.map_figure import POINTS, plot_map
+            from gcodejerk.report.map_figure import POINTS, plot_conditions, plot_map
 
-            plot_map(survey, file, Path(output).suffix, points or POINTS, longest)
+            plot = plot_conditions if conditions else plot_map
+            plot(survey, file, Path(output).suffix, points or POINTS, longest)
 
 
 def compare(

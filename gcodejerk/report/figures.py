@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 FORMATS = (".png", ".svg", ".pdf")
 TODAY, PLANNED = "#c44e52", "#1f5fa8"
 """Colours that differ in print and for colour-blind eyes."""
+HATCH = 0.6
+"""Width of the lines of hatches. [pt]"""
 FINE = 8
 """Points of a curve for each interval."""
 PERIODS = 4.0
@@ -63,6 +65,27 @@ def new_figure(suffix: str, size: tuple[float, float]) -> Figure:
     return Figure(figsize=size, layout="constrained")
 
 
+def save(figure: Figure, file: BinaryIO, suffix: str, dpi: int) -> None:
+    """Write a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        Of `new_figure`.
+    file : binary file
+        Where it goes.
+    suffix : str
+        Its format: .png, .svg or .pdf.
+    dpi : int
+        Pixels for each inch; in .svg and .pdf only of maps.
+    """
+    import matplotlib as mpl
+
+    # Hatches with lines as thin as their neighbours'.
+    with mpl.rc_context({"hatch.linewidth": HATCH}):
+        figure.savefig(file, format=suffix.lower().removeprefix("."), dpi=dpi)
+
+
 def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
     """Draw acceleration, velocity, and the vibration of the worst mode, now and as planned.
 
@@ -101,7 +124,7 @@ def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
         textcoords="offset points", va="top", fontsize=8, color="0.4",
     )  # fmt: skip
     upper.legend(frameon=False, fontsize=9, loc="upper right")
-    figure.savefig(file, format=suffix.lower().removeprefix("."), dpi=150)
+    save(figure, file, suffix, 150)
 
 
 class _Curve:

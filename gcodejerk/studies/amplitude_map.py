@@ -251,12 +251,28 @@ class Survey:
                 count = middle
             else:
                 least = middle + 1
-        T = count * self.machine.interval
+        return self._best(count * self.machine.interval, within=True)
+
+    def choose_freely(self) -> Chosen | None:
+        """The best profile in the conventional time whatever the limits, as the paper has it.
+
+        Returns
+        -------
+        Chosen or None
+            T1 and T_SUM/2 - T1 are at least one interval; None where there are not four of them.
+        """
+        if self.time < 3.999 * self.machine.interval:
+            return None
+        return self._best(self.time, within=False)
+
+    def _best(self, T: float, *, within: bool) -> Chosen:
+        """The best T1 in a time, of those within the limits or of all."""
         low, high = self.machine.interval, 0.5 * T - self.machine.interval
         for _ in range(3):
             T1 = np.linspace(low, high, SEARCH)
             value = self.values(T1, np.array([T]))[0]
-            value[~self._within(T1, T)] = np.inf
+            if within:
+                value[~self._within(T1, T)] = np.inf
             # Conditions I and II leave as much with T1 and T_SUM/2 - T1 exchanged: the shorter one.
             best = int(np.flatnonzero(value <= value.min() * WITHIN)[0])
             low, high = T1[max(best - 1, 0)], T1[min(best + 1, len(T1) - 1)]
@@ -268,11 +284,34 @@ class Survey:
         share[0, AXES.index(self.axis.name)] = self.length
         return Task.of(self.machine, Modes.of(self.machine), share).conventional
 
-    def nulls(self, T_SUM: Array) -> Array:
-        """T1 at which the dominant mode without damping would keep nothing; see `null_curve`."""
+    def nulls(self, T_SUM: Array, mode: Mode | None = None) -> Array:
+        """T1 at which a mode without damping keeps nothing; see `null_curve`.
+
+        Parameters
+        ----------
+        T_SUM : ndarray, shape (n,)
+            [s]
+        mode : Mode, optional
+            The dominant one by default.
+
+        Returns
+        -------
+        ndarray, shape (m, n)
+            One row for each curve [s]; none but for Condition III.
+        """
         if self.condition is not Condition.III:
             return np.empty((0, len(T_SUM)))
-        return null_curve(T_SUM, self.dominant.frequency)
+        return null_curve(T_SUM, (mode or self.dominant).frequency)
+
+    def null_times(self, longest: float, mode: Mode) -> Array:
+        """T_SUM up to a longest at which a mode without damping keeps nothing, whatever T1 [s].
+
+        Only Condition II has such times, 2 n/f: its halves are alike, and cancel.
+        """
+        if self.condition is not Condition.II:
+            return np.empty(0)
+        count = int(0.5 * longest * mode.frequency * WITHIN)
+        return np.asarray(2.0 * np.arange(1, count + 1) / mode.frequency, dtype=np.float64)
 
     def nearest_null(self, mode: Mode, T_SUM: float) -> tuple[float, float] | None:
         """T1 and T_SUM of the first exact null of a mode (without damping) from a time on [s].
