@@ -31,7 +31,7 @@ PERIODS = 4.0
 """Periods of the slowest mode that are shown after arrival."""
 
 
-def new_figure(suffix: str, size: tuple[float, float]) -> Figure:
+def new_figure(suffix: str, size: tuple[float, float], dpi: int) -> Figure:
     """An empty figure, refused before anything is computed for it.
 
     Parameters
@@ -40,6 +40,8 @@ def new_figure(suffix: str, size: tuple[float, float]) -> Figure:
         Of the file that it is for.
     size : tuple of float
         Width and height [inch].
+    dpi : int
+        Pixels for each inch; in .svg and .pdf only of maps.
 
     Returns
     -------
@@ -62,10 +64,10 @@ def new_figure(suffix: str, size: tuple[float, float]) -> Figure:
             "figures need matplotlib, which is not installed",
             "install it with: pip install 'gcodejerk[figures]'",
         ) from None
-    return Figure(figsize=size, layout="constrained")
+    return Figure(figsize=size, dpi=dpi, layout="constrained")
 
 
-def save(figure: Figure, file: BinaryIO, suffix: str, dpi: int) -> None:
+def save(figure: Figure, file: BinaryIO, suffix: str) -> None:
     """Write a figure.
 
     Parameters
@@ -76,14 +78,12 @@ def save(figure: Figure, file: BinaryIO, suffix: str, dpi: int) -> None:
         Where it goes.
     suffix : str
         Its format: .png, .svg or .pdf.
-    dpi : int
-        Pixels for each inch; in .svg and .pdf only of maps.
     """
     import matplotlib as mpl
 
     # Hatches with lines as thin as their neighbours'.
     with mpl.rc_context({"hatch.linewidth": HATCH}):
-        figure.savefig(file, format=suffix.lower().removeprefix("."), dpi=dpi)
+        figure.savefig(file, format=suffix.lower().removeprefix("."), dpi="figure")
 
 
 def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
@@ -103,7 +103,7 @@ def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
     EmitError
         The format is unknown, or matplotlib is not installed.
     """
-    figure = new_figure(suffix, (7.2, 7.2))
+    figure = new_figure(suffix, (7.2, 7.2), 150)
     shown = [_Curve("controller's own G0", TODAY, plan.plans.conventional, plan)]
     shown.append(_Curve(f"{plan.profile}, as written", PLANNED, plan.profiles, plan))
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
@@ -124,7 +124,7 @@ def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
         textcoords="offset points", va="top", fontsize=8, color="0.4",
     )  # fmt: skip
     upper.legend(frameon=False, fontsize=9, loc="upper right")
-    save(figure, file, suffix, 150)
+    save(figure, file, suffix)
 
 
 class _Curve:

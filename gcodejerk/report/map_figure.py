@@ -26,6 +26,7 @@ from gcodejerk.studies.amplitude_map import Survey
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+DPI = 200
 POINTS = 700
 """Of each axis of a picture."""
 ONE, THREE = (7.4, 6.0), (10.8, 5.2)
@@ -57,9 +58,9 @@ def plot_map(
     PlanError
         The longest time leaves no room.
     """
-    figure = new_figure(suffix, ONE)
+    figure = new_figure(suffix, ONE, DPI)
     draw_map(figure, survey, points, longest)
-    save(figure, file, suffix, 200)
+    save(figure, file, suffix)
 
 
 def plot_conditions(
@@ -81,9 +82,9 @@ def plot_conditions(
     PlanError
         The longest time leaves no room.
     """
-    figure = new_figure(suffix, THREE)
+    figure = new_figure(suffix, THREE, DPI)
     draw_conditions(figure, survey, points, longest)
-    save(figure, file, suffix, 200)
+    save(figure, file, suffix)
 
 
 def draw_map(

@@ -9,8 +9,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from gcodejerk.machine import Machine, find_machine
+from gcodejerk.motion import Profiles
+from gcodejerk.report.compare_figure import DPI, draw_comparison, page_size
+from gcodejerk.report.compare_lanes import position_curve
+from gcodejerk.report.compare_shown import Shown
+from gcodejerk.report.compare_spectra import acceleration_spectrum, spread, vibration_spectrum
 from gcodejerk.report.map_figure import ONE, THREE, draw_conditions, draw_map
 from gcodejerk.studies.amplitude_map import Survey
+from gcodejerk.studies.comparison import CONTENDERS, compare_move
 
 T_SUM = r"$T_\mathrm{SUM}$"
 
@@ -40,10 +46,11 @@ def corners(text):
     """The corners of a text's own box, which may be turned, shape (4, 2) [px]."""
     angle = text.get_rotation()
     text.set_rotation(0.0)
-    box = text.get_window_extent()
+    # An annotation's own box has its arrow in it.
+    box = Text.get_window_extent(text)
     text.set_rotation(angle)
     upright = np.array([[box.x0, box.y0], [box.x1, box.y0], [box.x1, box.y1], [box.x0, box.y1]])
-    turned = text.get_window_extent()
+    turned = Text.get_window_extent(text)
     middle = 0.5 * (turned.p0 + turned.p1)
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     return middle + (upright - upright.mean(axis=0)) @ np.array([[c, s], [-s, c]])
@@ -207,3 +214,183 @@ def test_condition_two_is_at_rest_in_two_periods_whatever_t1(four_segments):
         worst = four_segments("II", np.array([0.2, 0.31]) * T, 0.9 * T).left(30.0, 0.0)
         assert (left < 1e-5 * worst).all()
     assert not surveyed("paper", "Z", 1.0).null_times(0.21, mode).size
+
+
+MANY_MODES = """\
+interval: 0.001
+positioning: linear
+axes:
+  X:
+    rapid: {velocity: 300, acceleration: 5000, jerk: 5.0e+5}
+    modes:
+""" + "".join(
+    f"      - {{name: a mode with a long name {k}, frequency: {f}, damping: 0.02}}\n"
+    for k, f in enumerate((30, 33, 36, 39, 42, 60, 66, 90, 100))
+)
+SPECTRUM = """\
+interval: 0.001
+positioning: linear
+axes:
+  X: {rapid: {velocity: 300, acceleration: 3000, jerk: 5.0e+5}, spectrum: x.csv}
+"""
+ROTARY = """\
+interval: 0.001
+positioning: linear
+axes:
+  A: {type: rotary, rapid: {velocity: 90, acceleration: 3000, jerk: 3.0e+5},
+      modes: [{frequency: 40, damping: 0.03, participation: 1}]}
+"""
+
+
+@functools.cache
+def compared(name, *moves):
+    """What is drawn of a comparison, and its figure."""
+    if name == "own":
+        text = find_machine("centre").read_text(encoding="utf-8")
+        machine = Machine.loads(text.replace("positioning: linear", "positioning: independent"))
+    elif name in ("many", "rotary"):
+        machine = Machine.loads(MANY_MODES if name == "many" else ROTARY)
+    else:
+        machine = Machine.load(find_machine(name))
+    shown = Shown(compare_move(dict(moves), machine))
+    figure = Figure(page_size(shown), dpi=DPI, layout="constrained")
+    draw_comparison(figure, shown)
+    return shown, figure
+
+
+COMPARED = [
+    ("paper", ("Z", 1.0)), ("vmc", ("X", 43.773)), ("drill", ("X", 20.0), ("Y", 7.0)),
+    ("centre", ("X", 30.0), ("Y", -12.0), ("Z", 5.0)), ("own", ("X", 6.0), ("Z", 1.0)),
+    ("router", ("X", 24.0)), ("drill", ("Z", 0.05)), ("many", ("X", 5.0)), ("rotary", ("A", 2.0)),
+]  # fmt: skip
+
+
+def part(figure, title):
+    """The axes of the part whose title begins so, after its letter."""
+    return next(a for a in figure.axes if a.get_title(loc="left")[4:].startswith(title))
+
+
+@pytest.mark.parametrize("case", COMPARED, ids=lambda case: f"{case[0]}-{len(case) - 1}")
+def test_a_comparison_shows_every_axis_with_no_word_over_another_or_over_a_line(case):
+    shown, figure = compared(*case)
+    assert_readable(figure)
+    for axes in figure.axes:
+        boxes = [corners(text) for text in axes.texts if text.get_text()]
+        lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
+        for box in boxes:
+            for line in lines:
+                x, y = line.get_transform().transform(line.get_xydata()).T
+                low, high = box.min(axis=0), box.max(axis=0)
+                over = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])
+                assert not over.any(), (axes.get_title(loc="left"), line)
+    assert_every_axis_is_shown(case, shown, figure)
+
+
+def assert_every_axis_is_shown(case, shown, figure):
+    """Acceleration, position and spectrum of each; the others named; a unit on every axis."""
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert [title[1] for title in titles] == list("abcdefghijklmnop"[: len(titles)])
+    assert len(titles) == 3 * (len(case) - 1) + 3
+    for axis, length in case[1:]:
+        letter = next(t[1] for t in titles if t.endswith(f"acceleration of {axis}"))
+        assert any(t.endswith(f"spectrum of ({letter})") for t in titles)
+        position = part(figure, f"position of {axis}")
+        for line in position.lines:
+            assert line.get_ydata()[0] == 0.0
+            assert line.get_ydata()[-1] == pytest.approx(length)
+        assert len(position.lines) == len(shown.shown)
+    for axes in figure.axes:
+        assert "[" in axes.get_xlabel()
+        lanes = any(word in axes.get_title(loc="left") for word in ("acceleration", "vibration"))
+        assert lanes or "[" in axes.get_ylabel()
+    words = words_of(figure).replace("\n", " ")
+    others = words[words.index("all others:") :]
+    for candidate in shown.comparison.candidates:
+        named = candidate.name in [c.name for c in shown.shown]
+        assert named or candidate.name in others
+    assert {c.name for c in (*shown.shown, *shown.others)} <= set(CONTENDERS)
+
+
+def test_modes_are_named_where_there_is_room_and_counted_where_there_is_little():
+    _, figure = compared("centre", ("X", 30.0), ("Y", -12.0), ("Z", 5.0))
+    words = words_of(figure)
+    for name in ("rocking 30 Hz", "column 42 Hz", "bed 50 Hz", "table 55 Hz", "head 110 Hz"):
+        assert name in words
+    few = words_of(compared("many", ("X", 5.0))[1])
+    assert "a mode with" not in few
+    assert all(f"{f} Hz" in few for f in (30, 33, 36, 39, 42, 60, 66, 90, 100))
+
+
+def test_things_that_are_spread_keep_their_order_and_room():
+    centres = np.array([1.0, 1.5, 2.0, 50.0, 98.0, 99.0])
+    sizes = np.full(6, 12.0)
+    places = spread(centres, sizes, 100.0)
+    assert (np.diff(places) >= 12.0 + 5.0 - 1e-9).all()
+    assert places[0] >= 6.0
+    assert places[-1] <= 94.0
+
+
+def simpson(values, step):
+    """Simpson's rule over an odd number of points."""
+    weight = np.full(values.shape[-1], 2.0)
+    weight[1::2] = 4.0
+    weight[[0, -1]] = 1.0
+    return (values * weight).sum(axis=-1) * step / 3.0
+
+
+@pytest.mark.parametrize("name", ["conventional", "condition3", "optimal", "zv"])
+def test_the_spectrum_of_the_acceleration_is_its_fourier_integral(name):
+    shown, _ = compared("paper", ("Z", 1.0))
+    profile = shown.profile(shown.comparison[name], "Z")
+    corners_t = np.append(profile.begin, profile.begin[-1] + profile.duration[-1])
+    corners_a = np.append(profile.acceleration, 0.0)
+    t = np.linspace(0.0, corners_t[-1], 40001)
+    a = -3.0 * np.interp(t, corners_t, corners_a)
+    f = np.array([2.0, 17.0, 30.0, 55.5, 121.0])
+    expected = np.abs(simpson(a * np.exp(-2j * np.pi * f[:, np.newaxis] * t), t[1]))
+    found = acceleration_spectrum(profile, -3.0, f)
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5 * found.max())
+
+
+def test_the_spectrum_of_the_vibration_is_what_an_fft_of_samples_shows():
+    f, zeta, r = np.array([30.0, 47.3, 90.0]), np.array([0.0, 0.02, 0.1]), [0.2 + 0.1j, 0.05j, -0.3]
+    omega = 2 * np.pi * f
+    poles = -zeta * omega + 1j * omega * np.sqrt(1 - zeta**2)
+    window, count = 0.5, 1 << 14
+    t = np.arange(count) * window / count
+    swing = sum(
+        -np.exp(-z * w * t) * np.imag(a * np.exp(1j * w * np.sqrt(1 - z**2) * t))
+        for z, w, a in zip(zeta, omega, r, strict=True)
+    )
+    shaped = swing * (1 - np.cos(2 * np.pi * t / window))
+    expected = 2.0 / count * np.abs(np.fft.rfft(shaped))
+    bins = np.arange(1, 120)
+    found = vibration_spectrum(np.array(r), poles, window, bins / window)
+    np.testing.assert_allclose(found, expected[bins], atol=2e-6)
+    # What does not decay stands there with its amplitude.
+    alone = vibration_spectrum(np.array(r[:1]), poles[:1], window, [30.0])
+    assert alone == pytest.approx([abs(r[0])])
+
+
+def test_a_position_is_the_acceleration_integrated_twice():
+    first = np.array([0, 4])
+    durations = np.array([0.01, 0.03, 0.03, 0.01])
+    jerk = np.array([3.0, -1.0, -1.0, 3.0]) * 1e5
+    profile = Profiles.of(first, durations, np.array([0.0, 3e3, 0.0, -3e3]), jerk)
+    t, q = position_curve(profile, 0.1)
+    fine = np.linspace(0.0, 0.1, 20001)
+    a = np.interp(fine, [0.0, 0.01, 0.04, 0.07, 0.08], [0.0, 3e3, 0.0, -3e3, 0.0])
+    for _ in range(2):
+        a = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * fine[1])])
+    np.testing.assert_allclose(q, np.interp(t, fine, a), atol=1e-4 * a[-1])
+
+
+def test_a_measured_spectrum_is_drawn(tmp_path):
+    rows = [f"{f},{1.0 / ((1 - (f / 40) ** 2) ** 2 + 0.01)}\n" for f in range(10, 121, 10)]
+    (tmp_path / "x.csv").write_text("".join(rows))
+    (tmp_path / "m.yaml").write_text(SPECTRUM)
+    shown = Shown(compare_move({"X": 2.0}, Machine.load(tmp_path / "m.yaml")))
+    figure = Figure(page_size(shown), dpi=DPI, layout="constrained")
+    draw_comparison(figure, shown)
+    assert_readable(figure)
+    assert "grey: measured spectrum" in words_of(figure)
