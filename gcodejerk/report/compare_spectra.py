@@ -133,7 +133,7 @@ def draw_vibration_spectrum(axes: Axes, shown: Shown, part: str) -> str:
     for candidate, curve in curves:
         axes.plot(frequency, curve, **shown.style(candidate))
     tolerance = UM * shown.comparison.machine.design.tolerance
-    low = max(SPECTRUM_FLOOR * top, min(0.1 * tolerance, 0.1 * top))
+    low = max(SPECTRUM_FLOOR * top, min(0.1 * tolerance, 0.01 * top))
     _log_axes(axes, frequency, low, 2.0 * top, 0.11)
     _mark(axes, [m for m, _ in modes])
     axes.set_ylabel(f"amplitude [{shown.small}]")
