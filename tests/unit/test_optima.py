@@ -1,13 +1,14 @@
 """Optima of many moves: each problem once, remembered, and checked before it is used."""
 
 import builtins
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gcodejerk.errors import PlanError
 from gcodejerk.motion import mode_poles
-from gcodejerk.motion.search.unit_move import Move
+from gcodejerk.motion.search.unit_move import Move, optimum_profiles
 from gcodejerk.planning import optima
 from gcodejerk.planning.optima import Question, answers
 from gcodejerk.planning.solution_cache import VARIABLE, cache_file, read_solutions, write_solutions
@@ -95,6 +96,20 @@ def test_a_solution_from_the_disk_that_is_none_is_solved_again(solved):
         again = answers([question()])[0]
         assert len(solved) == count
         np.testing.assert_allclose(again.jerk, good.jerk)
+
+
+@pytest.mark.parametrize("limit", ["velocity", "acceleration", "jerk"])
+def test_a_solution_is_one_within_each_limit_only(limit):
+    found, move = answers([question()])[0], question().move
+    assert optima._holding([found], [move])[0]
+    profile = optimum_profiles([found], MS)
+    peak = {
+        "velocity": profile.peak_velocity,
+        "acceleration": profile.peak_acceleration,
+        "jerk": profile.greatest_jerk,
+    }[limit][0]
+    assert optima._holding([found], [replace(move, **{limit: peak})])[0]
+    assert not optima._holding([found], [replace(move, **{limit: 0.99 * peak})])[0]
 
 
 def test_many_problems_are_solved_by_several_processes_alike(monkeypatch):
