@@ -189,7 +189,7 @@ def name_modes(axes: Axes, shown: Shown) -> None:
     modes = sorted(
         (m for m, _ in _excited(shown, [shown.row(shown.longest)])[0]), key=lambda m: m.frequency
     )
-    figure = axes.get_figure(root=True)
+    figure = axes.get_figure()
     assert figure is not None
     pixel = figure.dpi / 72.0
     width = axes.bbox.width / pixel

@@ -304,7 +304,7 @@ class MapPanel:
     @property
     def _pixel(self) -> float:
         """Pixels of a point."""
-        figure = self.axes.get_figure(root=True)
+        figure = self.axes.get_figure()
         assert figure is not None
         return figure.dpi / 72.0
 
