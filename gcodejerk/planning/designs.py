@@ -45,6 +45,8 @@ MOST_REMEMBERED = 50_000
 NEXT_TO_NOTHING, SETTLED = 0.01, 0.1
 """A residual does not matter below this share of what today's rapid leaves, or below this one of
 the tolerance, whichever is more; but what can be settled on arrival, is."""
+NOTHING = 1e-3
+"""A bound is 0 where no more than this share of today's residual can be left over the band."""
 COARSE = 24
 """Moves of so few intervals may gain from segments that end between them."""
 
@@ -233,7 +235,8 @@ def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Profiles, Array, N
         high[rows[quiet]] = middle[quiet]
         low[rows[~quiet]] = middle[~quiet]
     final = task.after(high)
-    profiles, worst = _quiet(final, reference)
+    profiles, worst = symmetric(final)
+    worst = np.where(worst <= final.tolerance, worst, np.inf)
     # Within the tolerance all are equal: the smoothest is taken.
     rows = np.nonzero(possible & task.objective.weights.any(axis=1))[0]
     questions = [_question(final, k, float(reference[k]), task.tolerance) for k in rows]
@@ -270,6 +273,13 @@ def bounds(task: Task) -> Array:
     least = np.where(task.objective.weights.any(axis=1), np.nan, 0.0)
     rows = np.nonzero(np.isnan(least))[0]
     reference = task.objective.of(task.conventional)
+    if task.band:
+        # Over a band there is no null, but where next to nothing can be left it is soon found.
+        rows = rows[reference[rows] > 0.0]
+        nothing = [_question(task, k, float(reference[k]), NOTHING * reference[k]) for k in rows]
+        possible = np.array([x is not None for x in answers(nothing, task.progress)], dtype=bool)
+        least[rows[possible]] = 0.0
+        rows = np.nonzero(np.isnan(least))[0]
     found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
     for k, optimum in zip(rows, found, strict=True):
         least[k] = np.nan if optimum is None else optimum.worst

@@ -268,3 +268,21 @@ def test_measured_spectra_go_through_every_design(name, tmp_path):
         assert (left <= today * (1 + 1e-6)).all()
         assert (best <= left * (1 + 1e-3)).all()
     assert (best < 0.7 * today).all()
+
+
+def test_the_bound_over_a_band_is_that_of_the_programme_or_next_to_nothing():
+    task = task_of(VMC, moves({"Z": 1.0}, {"X": 43.773}, {"X": 5.0, "Z": 2.0}))
+    found, reference = bounds(task), task.objective.of(task.conventional)
+    for k, (least, today) in enumerate(zip(found, reference, strict=True)):
+        V, A, J = (float(limit[k]) for limit in task.limits)
+        move = Move(
+            int(task.counts[k]), V, A, J, task.objective.poles, task.objective.weights[k],
+            task.objective.group, task.band, task.interval,
+        )  # fmt: skip
+        directly = least_residual(move, float(today)).worst
+        if least:
+            assert least == pytest.approx(directly, rel=0.02)
+        else:
+            assert directly <= 1e-3 * today
+    assert found[0] > 0.0
+    assert found[1] == 0.0

@@ -252,7 +252,7 @@ class _Search:
         best: _Found | None = None
         if move.count < FEWEST_INTERVALS:
             return best
-        if self.ramp:
+        if self.ramp and allowed:
             # The phases of a short cruise can be made use of: what is found counts if it is enough.
             looked_at = self._looked_at(self.ramp)
             best = self._exchanged(looked_at, self._ramps(looked_at), allowed, enough=True)
