@@ -46,6 +46,7 @@ class Reason(enum.StrEnum):
     BEYOND_TRAVEL = "beyond travel"
     LINE_LIMIT = "line or number too long for the control"
     LIMITS = "limits cannot be met"
+    NOT_PLAYED = "the control would not play it as planned"
     NOT_BETTER = "no profile within the limits is better"
 
 

@@ -23,9 +23,9 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import DIALECTS, Dialect, Rapids
+from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import Batch, NumberFormat
 from gcodejerk.units import MM_PER_INCH
 
 GROUP = "gcodejerk.controllers"

@@ -18,8 +18,9 @@ from gcodejerk.emit.base import Controller, Form, Options, decimal_step, step_si
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
+from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import FINE_DECIMALS, Batch, NumberFormat
+from gcodejerk.planning.stream import FINE_DECIMALS
 
 
 class CsvController(Controller):

@@ -1,9 +1,7 @@
-r"""F of the blocks of streams, as the control takes it.
+r"""F of the blocks of streams for controls that hold it over a block.
 
-This module owns both meanings of F. A control that *holds* F over a block moves along it at one
-speed: F is then the length of the block, between its points as they are written, over its time. For
-one that reaches F at the *end* of a block (LinuxCNC 2.9) it is the larger of the profile's speeds
-at the two ends.
+Such a control moves along a block at one speed: F is its length, between its points as they are
+written, over its time.
 
 Rule 1: F counts along the axes that it refers to: the first of XYZ, UVW, ABC that moves.
 Rule 2: equal blocks have equal F: none corrects what the digits of the one before left open. Half
@@ -23,7 +21,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.stream import Batch
+from gcodejerk.planning.batch import Batch
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 FEED_DECIMALS = 4
@@ -91,22 +89,6 @@ def mean_feeds(batch: Batch, rapids: Rapids) -> Feeds:
     return Feeds(_in_digits(speed, decimals), decimals)
 
 
-def end_feeds(batch: Batch, rapids: Rapids) -> Feeds:
-    """F for LinuxCNC: the larger of the profile's speeds at the two ends of each block."""
-    speed = _path_speed(batch, rapids)
-    ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
-    # A stream of one block is at rest at both ends: only its mean speed is left.
-    single = batch.grid.blocks == 1
-    if single.any():
-        moves = batch.moves[single]
-        linear = (batch.plans.displacement[moves][:, :3] != 0.0).any(axis=1)
-        unit = np.where(rapids.inch[moves] & linear, MM_PER_INCH, 1.0)
-        time = batch.grid.counts[single] * batch.grid.interval
-        ends[single, -1] = batch.plans.length[moves] / time / unit
-    decimals = np.full(len(batch), FEED_DECIMALS, dtype=np.int64)
-    return Feeds(_in_digits(ends, decimals), decimals)
-
-
 def _in_digits(speed: NDArray[np.float64], decimals: NDArray[np.int64]) -> NDArray[np.int64]:
     """Speeds per second as F, at least its last digit: F0 is an error, and so no block has it."""
     scale = per_minute(1.0) * 10.0**decimals
@@ -131,23 +113,4 @@ def _filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
     columns = np.arange(values.shape[1])
     known = np.maximum.accumulate(np.where(np.isnan(values), 0, columns), axis=1)
     out: NDArray[np.float64] = np.take_along_axis(values, known, axis=1)
-    return out
-
-
-def _path_speed(batch: Batch, rapids: Rapids) -> NDArray[np.float64]:
-    """Speed of the profile at every knot as F means it, in the program's own unit per second."""
-    out = np.zeros(batch.grid.knots.shape)
-    moving = batch.plans.displacement[batch.moves] != 0.0
-    inch = rapids.inch[batch.moves]
-    left = np.ones(len(batch), dtype=bool)
-    for group in FEED_GROUPS:
-        axes = [AXES.index(a) for a in group]
-        chosen = left & moving[:, axes].any(axis=1)
-        square = np.zeros(out.shape)
-        for axis in axes:
-            if axis in batch.velocity:
-                square += batch.velocity[axis] ** 2
-        unit = np.where(inch & (group != "ABC"), MM_PER_INCH, 1.0)[:, np.newaxis]
-        out = np.where(chosen[:, np.newaxis], np.sqrt(square) / unit, out)
-        left &= ~chosen
     return out

@@ -1,11 +1,10 @@
 """Streams as G1 blocks in the place of the rapid's block, spelled in the program's own dialect.
 
-Blocks of 2 ms in per-minute feed and continuous path. What F means is the control's (`feeds`): for
-one that holds F over a block its mean speed, so that it takes the time that it was planned for; for
-LinuxCNC the larger of the speeds at its two ends (`linuxcnc`). How controls other than LinuxCNC
-follow such blocks was not measured: their emitters say so (`controls`).
+Blocks of 2 ms in per-minute feed and continuous path, F their mean speed (`feeds`), so that a control
+that holds F over a block takes the time that it was planned for. How controls follow such blocks was
+not measured: their emitters say so (`controls`). LinuxCNC has a form of its own (`linuxcnc`).
 
-A replaced block becomes, each line only where it is needed, here in LinuxCNC's words::
+A replaced block becomes, each line only where it is needed::
 
     (gcodejerk: G0 X10. Y5.)     names the original
     N120 G0 M8 (go)              what else the block says, byte for byte
@@ -22,7 +21,7 @@ whatever was rounded before.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -32,21 +31,17 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Options, axis_steps, step_sizes
 from gcodejerk.emit.feeds import Feeds, mean_feeds
+from gcodejerk.emit.frame import Frame, plain, writing_of
 from gcodejerk.emit.number_format import Column, format_lines
-from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
-from gcodejerk.nc.dialects.dialect import Writing, code_name
-from gcodejerk.nc.dialects.gcodes import G90
+from gcodejerk.nc import Dialect, Rapids, parse_block
+from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import FINE_DECIMALS, Batch, NumberFormat
-from gcodejerk.units import MM_PER_INCH
+from gcodejerk.planning.stream import FINE_DECIMALS
 
 BLOCK_TIME = 0.002
 """Duration of a block, measured as the best; whole intervals, at least one [s]."""
-COMMENT_LENGTH = 69
-"""Controllers and senders with short lines choke on longer comments."""
 LINE_ENDS = (b"", b"\n", b"\r\n", b"\r")
 """By `Rapids.terminator`."""
 
@@ -90,24 +85,25 @@ class GcodeController(Controller):
     ) -> list[bytes]:
         """Text of each move."""
         moves = batch.moves
-        last_ends = [LINE_ENDS[t] for t in rapids.terminator[moves]]
-        # A lone CR ends no line for LinuxCNC; it can stand at the end of the file.
-        line_ends = [newline if end in (b"", b"\r") else end for end in last_ends]
+        line_ends, last_ends = line_ends_of(rapids, moves, newline)
         dialect = options.dialect
-        parsed = [parse_block(block, dialect) for block in blocks]
         feeds = self.feeds(batch, rapids)
         points = self._points(batch, rapids, line_ends, feeds, writing_of(dialect).doubles)
         out = []
         for row, move in enumerate(moves):
-            frame = _Frame(rapids, int(move), parsed[row], blocks[row], dialect)
-            last = frame.last_point(points[row].before_end, feeds.of_end(row))
-            follows = _follows_stream(batch.plans, rapids, int(move))
+            frame = Frame(
+                rapids, int(move), parse_block(blocks[row], dialect), blocks[row], dialect
+            )
+            last = frame.last_point(points[row].before_end) + b" F" + plain(feeds.of_end(row))
+            follows = follows_stream(batch.plans, rapids, int(move))
             lines = [
                 *frame.head(options.comments),
-                *frame.setup(follows),
+                *frame.standstill(follows),
+                *frame.modes(),
                 points[row].text,
                 last,
-                *frame.tail(),
+                b" ".join([b"G0", *frame.restored()]),
+                *frame.after(),
             ]
             out.append(line_ends[row].join(line for line in lines if line) + last_ends[row])
         return out
@@ -140,6 +136,15 @@ class GcodeController(Controller):
             for row, points in zip(rows, made, strict=True):
                 out[row] = points
         return out
+
+
+def line_ends_of(
+    rapids: Rapids, moves: NDArray[np.int64], newline: bytes
+) -> tuple[list[bytes], list[bytes]]:
+    """What the lines of each stream end with, and its last line."""
+    last = [LINE_ENDS[t] for t in rapids.terminator[moves]]
+    # A lone CR ends no line for LinuxCNC; it can stand at the end of the file.
+    return [newline if end in (b"", b"\r") else end for end in last], last
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,167 +204,7 @@ class _Points:
     before_end: dict[int, Decimal]
 
 
-class _Frame:
-    """The lines around a move's points: what its block says besides, and what it relies on."""
-
-    def __init__(
-        self, rapids: Rapids, move: int, block: Block, text: bytes, dialect: Dialect
-    ) -> None:
-        self.rapids, self.move, self.block, self.text = rapids, move, block, text
-        self.dialect, self.writing = dialect, writing_of(dialect)
-        self.axis_words = [w for w in block.words if w.letter in AXES or w.letter in self.turned]
-        after = dialect.after_m
-        self.behind = [w for w in block.words if w.letter == "M" and w.value in after]
-        """What the control runs when the motion has ended."""
-        exact = None if dialect.exact_stop is None else dialect.exact_stop / 10
-        self.exact = [w for w in block.words if w.letter == "G" and w.value == exact]
-        """G9, which is about the end of the motion of its own block."""
-
-    @property
-    def turned(self) -> Mapping[str, str]:
-        """Addresses of increments, with their axes."""
-        return self.dialect.increments
-
-    def head(self, comments: bool) -> list[bytes]:
-        """A comment that names the block, and the block without its axis words."""
-        out = [self._comment()] if comments else []
-        rest, at = [], 0
-        moved = [*self.axis_words, *self.behind, *self.exact]
-        for word in sorted(moved, key=lambda w: w.begin):
-            rest.append(self.text[at : word.begin])
-            at = word.end
-        rest.append(self.text[at:])
-        others = [w for w in self.block.words if w not in moved]
-        if self.block.comments or any(not (w.letter == "G" and w.value == 0.0) for w in others):
-            out.append(b"".join(rest).rstrip(b" \t\r"))
-        return out
-
-    def _comment(self) -> bytes:
-        """`(gcodejerk: ...)` with the words of the block, in at most COMMENT_LENGTH characters."""
-        opens, closes = self.writing.comment
-        words = b" ".join(b"".join(w.text.split()) for w in self.block.words)
-        plain = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
-        room = COMMENT_LENGTH - len(opens + b"gcodejerk: " + closes)
-        if len(plain) > room:
-            plain = plain[: room - 3] + b"..."
-        return opens + b"gcodejerk: " + plain + closes
-
-    def setup(self, follows: bool) -> list[bytes]:
-        """An exact stop, unless the machine rests already, and the modes of the stream."""
-        rapids, move, dialect = self.rapids, self.move, self.dialect
-        stands = follows or rapids.path[move] in (61, 62)
-        codes: list[int | None] = []
-        if not rapids.distance_stated[move] and dialect.groups.get(G90) == "distance":
-            codes.append(G90)
-        if rapids.feed_mode[move] != 94 or not rapids.feed_mode_stated[move]:
-            codes.append(dialect.feed_code(94))
-        if rapids.path[move] in (61, 62):
-            codes.append(dialect.path_code(64))
-        words = b" ".join(code_name(code) for code in codes if code is not None)
-        return ([] if stands else [self.writing.standstill]) + ([words] if words else [])
-
-    def last_point(self, before_end: dict[int, Decimal], feed: Decimal) -> bytes:
-        """The last point: the block's own words, or what is left of its increments."""
-        words = [self._last_word(word, before_end) for word in self.axis_words]
-        words.append(b"F" + _plain(feed))
-        return b" ".join([b"G1", *self._ending(), *words])
-
-    def _ending(self) -> list[bytes]:
-        """What lets the last point end in a standstill where the rapid did."""
-        path, dialect = int(self.rapids.path[self.move]), self.dialect
-        code = dialect.path_code(path) if path in (61, 62) else None
-        if code is None and (self.exact or dialect.stops_after_rapid):
-            code = dialect.exact_stop
-        return [] if code is None else [code_name(code)]
-
-    def _last_word(self, word: Word, before_end: dict[int, Decimal]) -> bytes:
-        axis = self.turned.get(word.letter)
-        if axis is not None:
-            # The points are absolute: so is the end of an increment.
-            return axis.encode() + _plain(programmed_end(self.rapids, self.move, axis, False))
-        incremental = bool(self.rapids.incremental[self.move])
-        # X=3 of Siemens is X3.
-        text = b"".join(word.text[1:].split()).removeprefix(b"=")
-        number = Decimal(text.decode())
-        if word.whole and number and self.dialect.whole_numbers == "machine":
-            number = programmed_end(self.rapids, self.move, word.letter, incremental)
-            if not incremental:
-                return word.letter.encode() + _plain(number)
-        if not incremental:
-            return word.letter.encode() + text.upper()
-        left = number - before_end.get(AXES.index(word.letter), Decimal(0))
-        return word.letter.encode() + _plain(left)
-
-    def tail(self) -> list[bytes]:
-        """Restore the modal values, then say what the block says when its motion has ended."""
-        rapids, move, dialect = self.rapids, self.move, self.dialect
-        words = [b"G0"]
-        mode = int(rapids.feed_mode[move])
-        code = dialect.feed_code(mode)
-        if mode != 94 and code is not None:
-            words.append(code_name(code))
-        if mode != 93 and not np.isnan(rapids.feed[move]):
-            feed = _plain(Decimal(repr(float(rapids.feed[move]))))
-            words.append(b"F" + (feed.rstrip(b"0").rstrip(b".") if self._whole() else feed))
-        behind = [b" ".join(b"".join(w.text.split()) for w in self.behind)] if self.behind else []
-        return [b" ".join(words), *behind]
-
-    def _whole(self) -> bool:
-        """Whether F has to go without a decimal point, as it was written."""
-        return bool(self.rapids.feed_whole[self.move])
-
-
-def writing_of(dialect: Dialect) -> Writing:
-    """How streams are spelled in a dialect.
-
-    Raises
-    ------
-    EmitError
-        No form is known.
-    """
-    if dialect.writing is None:
-        raise EmitError(
-            f"no form of a stream is known for the dialect {dialect.name}",
-            "use --controller csv, which writes the streams as a table",
-        )
-    return dialect.writing
-
-
-def programmed_end(rapids: Rapids, move: int, axis: str, incremental: bool) -> Decimal:
-    """Where an axis ends, or how far it goes, as it is programmed, to six decimals.
-
-    Parameters
-    ----------
-    rapids : Rapids
-        The program's.
-    move : int
-        Which of them.
-    axis : str
-        Its letter.
-    incremental : bool
-        How far, instead of where.
-
-    Returns
-    -------
-    Decimal
-        In the program's unit; a diameter where the program has diameters.
-    """
-    k = AXES.index(axis)
-    end = float(rapids.target[move, k]) - (float(rapids.start[move, k]) if incremental else 0.0)
-    if rapids.inch[move] and axis not in "ABC":
-        end /= MM_PER_INCH
-    if rapids.diameter[move] and axis == "X":
-        end *= 2.0
-    return Decimal(repr(round(end, 6)))
-
-
-def _plain(number: Decimal) -> bytes:
-    """A number without exponent, with a decimal point, and never minus zero."""
-    text = format(number if number else abs(number), "f")
-    return (text if "." in text else text + ".").encode()
-
-
-def _follows_stream(plans: Plans, rapids: Rapids, move: int) -> bool:
+def follows_stream(plans: Plans, rapids: Rapids, move: int) -> bool:
     """Whether the block directly before is a stream too: the machine then rests."""
     before = move - 1
     return bool(

@@ -1,50 +1,111 @@
-"""Controller `linuxcnc`: the form that was played by the controller and compared.
+"""Controller `linuxcnc`: streams in the form that LinuxCNC plays as planned.
 
-It was measured to follow a profile best (LinuxCNC 2.9, servo period 1 ms): blocks of 2 ms, each
-with F = the larger of the profile's speeds at the block's two ends, since LinuxCNC reaches F at the
-end of a servo period, and ends a block with the smaller of its own F and the next one's. Blocks of
-1 ms would be stretched by 2 % (TP_MIN_SEGMENT_CYCLES).
+What the form has to be, and why, is said where its numbers are made (`planning.aligned`); this
+module writes it. A replaced block becomes, each line only where it is needed::
 
-LinuxCNC 2.9 blends blocks of X, Y and Z alone: where A, B, C, U, V or W moves, it stops after every
-block, and a stream of 112 ms was played in 515 ms (A and U alike).
+    (gcodejerk: G0 X10. Y5.)     names the original
+    N120 G0 M8 (go)              what else the block says, byte for byte
+    G94 G64                      modes of the stream that are not in force, or not stated
+    G0 X0.0000003                where something was waited for: ten milliseconds in which
+    G1 X0.0000006 F0.0018        the queue of motions fills
+    G0 X0.000001                 a change from G0 to G1 ends the motion before, and keeps the queue
+    G1 X0.000102 Y0.000051 F38.40000001
+    G0 G61 X10. Y5.              the block's own words, which are a step away; and the exact stop
+    F600.                        the modal values that the program relies on
+    M0                           what the control runs after the motion
+
+Rule 1: F of a block is the larger of the speeds at its ends, since LinuxCNC ends a block with the
+smaller of its own F and the next one's.
+Rule 2: no two successive F are equal: under G64 P the naive CAM detector joins such blocks.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from decimal import Decimal
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Form
-from gcodejerk.emit.feeds import Feeds, end_feeds
-from gcodejerk.emit.gcode import GcodeController
-from gcodejerk.machine import LINUXCNC
-from gcodejerk.nc import Rapids
+from gcodejerk.emit.base import Controller, Form, Options
+from gcodejerk.emit.frame import Frame
+from gcodejerk.emit.gcode import line_ends_of
+from gcodejerk.emit.number_format import Column, format_lines
+from gcodejerk.machine import LINUXCNC, Machine
+from gcodejerk.nc import Dialect, Rapids, parse_block
+from gcodejerk.planning.aligned import HEADROOM
+from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import Batch
+from gcodejerk.units import MM_PER_INCH, per_minute
 
-STREAMS_NEED = 1.05
-"""MAX_ACCELERATION over the largest acceleration of a stream, played: 1.05 to 4 times."""
+BLOCK_TIME = 0.002
+"""Of a block where the machine is not slow; two servo periods at least. [s]"""
+DECIMALS, INCH_DECIMALS = 6, 7
+"""Of positions, whatever the resolution: LinuxCNC computes in doubles, and speeds follow from
+lengths of blocks. Played: 6 decimals of mm are enough, 4 are not."""
+FEED_DECIMALS, INCH_FEED_DECIMALS = 8, 9
+"""Of F."""
+LEAD_TIME = 0.01
+"""In which the queue of motions fills. [s]"""
 
 
-class LinuxcncController(GcodeController):
-    """Writes G1 blocks of 2 ms with end-point speeds."""
+class LinuxcncController(Controller):
+    """Writes G1 blocks that end on servo periods, with fitted speeds."""
 
     name = "linuxcnc"
-    play = Play.PROFILE
+    play = Play.ALIGNED
     unblended = "ABCUVW"
     forms = (
         Form(
             "stream",
             "measured",
-            "LinuxCNC 2.9: follows within 0.02 mm and 3 ms; needs G64, ARC_BLEND_ENABLE = 1 and "
-            "MAX_ACCELERATION a little (5 %) above the axis's limit.acceleration",
+            "LinuxCNC 2.9: played within 0.01 mm, the residual within a hundredth of today's; needs "
+            "ARC_BLEND_ENABLE = 1 and MAX_ACCELERATION 1.05 to 4 times the axis's "
+            "limit.acceleration",
         ),
     )
 
-    def feeds(self, batch: Batch, rapids: Rapids) -> Feeds:
-        """The larger of the speeds at the ends of each block."""
-        return end_feeds(batch, rapids)
+    def stride(self, interval: float) -> int:
+        """About 2 ms, and two periods at least."""
+        return max(2, round(BLOCK_TIME / interval))
+
+    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
+        """Steps of the last decimal, in mm; increments are counted from the start."""
+        inch = MM_PER_INCH * 10.0**-INCH_DECIMALS
+        step = np.where(rapids.inch[:, np.newaxis], inch, 10.0**-DECIMALS)
+        step = np.broadcast_to(step, rapids.start.shape)
+        origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
+        return NumberFormat(rapids.start, step, origin)
+
+    def render(
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        blocks: Sequence[bytes],
+        newline: bytes,
+        options: Options,
+    ) -> list[bytes]:
+        """Text of each move."""
+        ends, last_ends = line_ends_of(rapids, batch.moves, newline)
+        feed = _feeds(batch, rapids)
+        out = []
+        for row, move in enumerate(batch.moves.tolist()):
+            block = parse_block(blocks[row], options.dialect)
+            frame = Frame(rapids, move, block, blocks[row], options.dialect)
+            points = _Points(batch, rapids, row, feed[row])
+            lines = [
+                *frame.head(options.comments),
+                *frame.modes(),
+                *points.lead(filled=bool(rapids.queued[move])),
+                points.text(ends[row]),
+                frame.last_point(points.reached(), b"G0"),
+                *([b" ".join(words)] if (words := frame.restored()) else []),
+                *frame.after(),
+            ]
+            out.append(ends[row].join(line for line in lines if line) + last_ends[row])
+        return out
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """Where the machine file contradicts how LinuxCNC moves; what the program leaves open."""
@@ -70,7 +131,7 @@ def _too_slow(plans: Plans) -> list[str]:
     """What the INI file has to allow before streams run, where today's rapids have less."""
     raised = []
     for axis in plans.machine.axes:
-        today, needed = axis.rapid.acceleration, STREAMS_NEED * axis.limit.acceleration
+        today, needed = axis.rapid.acceleration, HEADROOM * axis.limit.acceleration
         moves = plans.planned & (plans.displacement[:, AXES.index(axis.name)] != 0.0)
         if axis.planner == LINUXCNC and today < needed * (1.0 - 1e-6) and moves.any():
             raised.append(f"{axis.name} from {today:g} to {needed:g}")
@@ -81,3 +142,74 @@ def _too_slow(plans: Plans) -> list[str]:
         "limit.acceleration), or LinuxCNC plays the streams slower; rapids that were left alone "
         "then use it, too"
     ]
+
+
+def _feeds(batch: Batch, rapids: Rapids) -> NDArray[np.int64]:
+    """F of the block that ends at each knot, in whole units of its last decimal, shape (b, k)."""
+    assert batch.path_speed is not None
+    speed, knots = batch.path_speed, batch.grid.knots
+    inch = rapids.inch[batch.moves]
+    unit = np.where(inch, MM_PER_INCH, 1.0)
+    decimals = np.where(inch, INCH_FEED_DECIMALS, FEED_DECIMALS)
+    ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
+    scale = per_minute(1.0) * 10.0**decimals / unit
+    feed: NDArray[np.int64] = np.rint(ends * scale[:, np.newaxis]).astype(np.int64)
+    for k in range(1, feed.shape[1]):
+        feed[:, k] += (knots[:, k - 1] > 0) & (feed[:, k] == feed[:, k - 1])
+    return feed
+
+
+class _Points:
+    """The points of one move as text."""
+
+    def __init__(self, batch: Batch, rapids: Rapids, row: int, feed: NDArray[np.int64]) -> None:
+        move = batch.moves[row]
+        self.inch = bool(rapids.inch[move])
+        self.incremental = bool(rapids.incremental[move])
+        self.decimals = INCH_DECIMALS if self.inch else DECIMALS
+        moving = batch.plans.displacement[move] != 0.0
+        self.axes = np.flatnonzero(moving).tolist()
+        self.leading = max(self.axes, key=lambda a: abs(float(batch.plans.displacement[move, a])))
+        self.sign = int(np.sign(batch.plans.displacement[move, self.leading]))
+        first = int(np.flatnonzero(batch.grid.knots[row] > 0)[0]) - 1
+        scale = {a: 2 if rapids.diameter[move] and AXES[a] == "X" else 1 for a in self.axes}
+        self.whole = {a: batch.whole[a][row, first:] * scale[a] for a in self.axes}
+        self.scale = scale[self.leading]
+        self.feed = feed[first + 1 :]
+
+    def lead(self, filled: bool) -> list[bytes]:
+        """The tiny G0 in front of the points; a slow block in front of it where nothing queues."""
+        finer = self.decimals + 1
+        end = int(self.whole[self.leading][0]) * 10
+        way = 10 * self.sign * self.scale
+        if self.incremental:
+            # Increments are counted from the start, which the first of them leaves.
+            end = way
+        at = [end] if filled else [end - 7 * way // 10, end - 4 * way // 10, end]
+        if self.incremental:
+            at = np.diff([0, *at]).tolist()
+        feed = Decimal(str(0.3 * self.scale * 10.0**-self.decimals / LEAD_TIME * 60.0))
+        feed = Decimal(repr(round(float(feed), INCH_FEED_DECIMALS)))
+        words = [
+            AXES[self.leading].encode() + format(Decimal(value).scaleb(-finer), "f").encode()
+            for value in at
+        ]
+        if filled:
+            return [b"G0 " + words[0]]
+        return [b"G0 " + words[0], b"G1 " + words[1] + b" F%.9f" % feed, b"G0 " + words[2]]
+
+    def text(self, line_end: bytes) -> bytes:
+        """The G1 blocks."""
+        columns = []
+        for axis in self.axes:
+            values = self.whole[axis]
+            values = np.diff(values) if self.incremental else values[1:]
+            prefix = (b" " if columns else b"G1 ") + AXES[axis].encode()
+            columns.append(Column(prefix, values, self.decimals))
+        places = INCH_FEED_DECIMALS if self.inch else FEED_DECIMALS
+        columns.append(Column(b" F", self.feed, places))
+        return format_lines(columns, line_end)[0].removesuffix(line_end)
+
+    def reached(self) -> dict[int, Decimal]:
+        """How far the increments of all points lead, in the program's unit."""
+        return {a: Decimal(int(v[-1])).scaleb(-self.decimals) for a, v in self.whole.items()}

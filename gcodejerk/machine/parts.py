@@ -192,6 +192,24 @@ class ProgramStart:
 
 
 @dataclass(frozen=True, slots=True)
+class ControllerOptions:
+    """What streams depend on that is set in the control, not on the machine."""
+
+    version: str | None = None
+    """Of the control; None unknown."""
+    planner_type: int | None = None
+    """LinuxCNC 2.10's [TRAJ] PLANNER_TYPE; None unknown."""
+    servo_period: float | None = None
+    """What the control's motion really runs at, where the machine says so. [s]"""
+    optimization_depth: int = 50
+    """Blocks that LinuxCNC looks ahead, [TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH."""
+    max_acceleration: Mapping[str, float] = field(default_factory=dict, hash=False)
+    """Axis -> its MAX_ACCELERATION when streams run. [mm/s^2] or [deg/s^2]"""
+    override_guard: bool = False
+    """Streams run at 100 % of all overrides only."""
+
+
+@dataclass(frozen=True, slots=True)
 class Description:
     """What a machine file says, in mm (or deg), s and Hz.
 
@@ -214,6 +232,7 @@ class Description:
     """Structure modes, which several axes excite together."""
     design: Design
     program: ProgramStart
+    controller_options: ControllerOptions = field(default_factory=ControllerOptions)
     spindle: str | None = None
     """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
     inch: bool = field(default=False, compare=False)
@@ -236,6 +255,11 @@ class Description:
         """
         found = {axis.planner for axis in self.axes}
         return min(found, key=(JERK_LIMITED, TRAPEZOIDAL, LINUXCNC, BELL).index)
+
+    @property
+    def neighbours_matter(self) -> bool:
+        """Whether what stands around a rapid changes how the control moves, or what is written."""
+        return self.planner == LINUXCNC or self.controller == "linuxcnc"
 
     def axis(self, name: str) -> Axis:
         """Find the axis of that letter.

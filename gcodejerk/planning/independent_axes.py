@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.motion import sample_profiles
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import Batch
 
 WINDOW = 24
 """The control's path is searched this many points before and after the same moment."""

@@ -23,11 +23,19 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion import Grid, Objective, grouped, knots_steps
+from gcodejerk.motion import (
+    Grid,
+    Objective,
+    grouped,
+    knots_response,
+    knots_steps,
+    residual_displacement,
+)
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.sampling import Counts
 from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
+from gcodejerk.planning.plans import Plans
 
 CELLS = 1 << 20
 """Exponentials that are computed at a time, of moments at frequencies: 16 MB."""
@@ -36,7 +44,7 @@ CELLS = 1 << 20
 class Play(Enum):
     """What a control makes of the points of a stream."""
 
-    PROFILE = "the profile itself, between the points too, within their speeds"
+    ALIGNED = "speeds that are straight lines between points on servo periods, filtered"
     TABLE = "straight lines between points, each at its own time"
     HELD = "straight lines between points, each at the F of its block"
 
@@ -118,6 +126,52 @@ def missing_times(times: Counts, grid: Grid) -> Counts:
     """How much earlier than planned such a control arrives, shape (n,) [intervals]."""
     missing: Counts = grid.counts - np.where(times > 0, grid.knots, 0).max(axis=1, initial=0)
     return missing
+
+
+def left_by_lines(
+    plans: Plans,
+    moves: NDArray[np.int64],
+    positions: Mapping[int, Array],
+    grid: Grid,
+    early: Counts,
+) -> tuple[Array, Array]:
+    """What straight lines leave in a machine's modes.
+
+    Parameters
+    ----------
+    plans : Plans
+        All of them.
+    moves : ndarray of int, shape (n,)
+        Those that are looked at.
+    positions : mapping of int to ndarray, shape (n, k)
+        Of each axis (index in `AXES`) at the knots. [mm]
+    grid : Grid
+        The knots.
+    early : ndarray of int, shape (n,)
+        How much earlier than the grid's end the moves arrive. [intervals]
+
+    Returns
+    -------
+    residual : ndarray, shape (n, m)
+        Of each mode, at arrival. [mm]
+    worst : ndarray, shape (n,)
+        The largest with every frequency anywhere within `design.band`; NaN where the plans do not
+        say it of their profiles. [mm]
+    """
+    modes = plans.modes
+    response = np.zeros((len(moves), len(modes.poles)), dtype=np.complex128)
+    for axis, values in positions.items():
+        participation = modes.participation[:, axis]
+        felt = participation != 0.0
+        found = knots_response(values, grid, modes.poles[felt])
+        response[:, felt] += found * participation[felt]
+    residual = residual_displacement(response, modes.poles)
+    residual *= undecayed(early, modes.poles * grid.interval)
+    worst = plans.worst_in_band[moves]
+    if np.isfinite(worst).any():
+        every = Objective(modes.poles, modes.participation.T, modes.group)
+        worst = worst_of_lines(positions, grid, every, plans.machine.design.band, early)
+    return residual, worst
 
 
 def worst_of_lines(

@@ -15,10 +15,11 @@ from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion import profiles_response
 from gcodejerk.motion.profiles.profile import Array, Profiles
+from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.stream import Batch, NumberFormat, make_streams
+from gcodejerk.planning.stream import make_streams
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 

@@ -21,7 +21,7 @@ from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
-from gcodejerk.machine import LINUXCNC, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
@@ -191,7 +191,7 @@ def _process(
 ) -> Result:
     """Process a program; the source is that with its cycles written out, if they are."""
     lines = None if expansion is None else expansion.map
-    program = _read(source, machine, settings, name, report, lines)
+    program = _read(source, machine, settings, name, emitter, report, lines)
     plans = _plan(source, program, machine, settings, emitter, report)
     writer = Rewriter(
         source, target, program, emitter,
@@ -236,6 +236,7 @@ def _read(
     machine: Machine,
     settings: Settings,
     name: str,
+    emitter: Controller,
     report: Progress,
     lines: LineMap | None,
 ) -> Program:
@@ -251,7 +252,7 @@ def _read(
         dialect=settings.dialect or machine.dialect,
         start=machine.program_start(),
         progress=lambda done: report("reading", done, size),
-        neighbours=machine.planner == LINUXCNC,
+        neighbours=replace(machine, controller=emitter.name).neighbours_matter,
     )
     if program.stamp is not None and not settings.force:
         raise ProgramError(

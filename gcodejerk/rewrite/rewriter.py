@@ -16,7 +16,7 @@ from gcodejerk.emit import Controller, Options
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program
-from gcodejerk.planning.stream import Batch
+from gcodejerk.planning.batch import Batch
 from gcodejerk.rewrite.expanded import TERMINATOR_LENGTH
 from gcodejerk.rewrite.stamp import SUM_DIGITS, SUM_MARK, SUM_UNKNOWN, SUM_WITHIN
 

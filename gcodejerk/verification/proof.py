@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from gcodejerk.errors import VerifyError
-from gcodejerk.machine import LINUXCNC, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
 from gcodejerk.verification.bytes.alignment import Alignment
 from gcodejerk.verification.bytes.form import Stream
@@ -201,7 +201,7 @@ def _read(
         name=name,
         dialect=dialect or machine.dialect,
         start=start,
-        neighbours=machine.planner == LINUXCNC,
+        neighbours=machine.neighbours_matter,
     )
     original.seek(begin)
     return program

@@ -16,7 +16,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.planning.designs import _remembered
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.stream import NumberFormat, make_streams
+from gcodejerk.planning.batch import NumberFormat
+from gcodejerk.planning.stream import make_streams
 
 
 def moves(machine, axes, count, longest):

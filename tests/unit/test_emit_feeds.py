@@ -13,7 +13,8 @@ from gcodejerk import Machine, plan_move, process
 from gcodejerk.axes import AXES
 from gcodejerk.emit.feeds import end_feeds, mean_feeds
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.stream import NumberFormat, make_streams
+from gcodejerk.planning.batch import NumberFormat
+from gcodejerk.planning.stream import make_streams
 from gcodejerk.verification import Kind, verify, verify_files
 
 TEXT = """

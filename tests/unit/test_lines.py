@@ -10,7 +10,8 @@ from gcodejerk.motion import Grid
 from gcodejerk.planning.lines import Play, block_times, missing_times, played_positions
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.stream import NumberFormat, make_streams
+from gcodejerk.planning.batch import NumberFormat
+from gcodejerk.planning.stream import make_streams
 
 MACHINE = Machine.loads(
     """

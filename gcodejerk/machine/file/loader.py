@@ -17,7 +17,16 @@ from gcodejerk.machine.file.document import Document
 from gcodejerk.machine.file.planner import choose_planners, planner_warnings
 from gcodejerk.machine.file.plausibility import COARSEST_RESOLUTION, plausibility_warnings
 from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
-from gcodejerk.machine.parts import Axis, Description, Design, Limits, Mode, ProgramStart, Spectrum
+from gcodejerk.machine.parts import (
+    Axis,
+    ControllerOptions,
+    Description,
+    Design,
+    Limits,
+    Mode,
+    ProgramStart,
+    Spectrum,
+)
 from gcodejerk.machine.problems import Problems, place_order
 from gcodejerk.machine.spectrum import load_spectrum
 
@@ -220,6 +229,7 @@ def _machine(
         ),
         design=Design(**values["design"]),
         program=_program(values["program"]),
+        controller_options=_controller_options(values.get("controller_options", {})),
         inch=checker.inch,
         source=name,
         warnings=tuple(
@@ -273,6 +283,18 @@ def _mode(values: dict[str, Any], participation: dict[str, float]) -> Mode:
         frequency=values["frequency"],
         damping=values["damping"],
         participation=tuple((a, participation[a]) for a in AXES if a in participation),
+    )
+
+
+def _controller_options(values: dict[str, Any]) -> ControllerOptions:
+    planner = values.get("planner_type")
+    return ControllerOptions(
+        version=values.get("version"),
+        planner_type=None if planner is None else int(planner),
+        servo_period=values.get("servo_period"),
+        optimization_depth=int(values["optimization_depth"]),
+        max_acceleration=values.get("max_acceleration", {}),
+        override_guard=values["override_guard"],
     )
 
 

@@ -315,6 +315,30 @@ _PROGRAM = Section(
     )
 )  # fmt: skip
 
+_CONTROLLER_OPTIONS = Section(
+    (
+        Key("version", Choice(("2.9", "2.10")),
+            "Of LinuxCNC. Left out: unknown; streams were played on 2.9.", example="2.9"),
+        Key("planner_type", Choice(("0", "1")),
+            "LinuxCNC 2.10: [TRAJ] PLANNER_TYPE, 0 trapezoidal, 1 S-curves, which stop in every "
+            "block of a stream.", example="0"),
+        Key("servo_period", Number("s", above=0.0, smallest=1e-6, at_most=1.0),
+            "LinuxCNC: what `halcmd show thread` says of the servo thread; interval has to be the "
+            "same. (With a BASE_PERIOD of 30000 ns, 1 ms becomes 0.99 ms.)", example="0.001"),
+        Key("optimization_depth", Number("-", at_least=20.0, at_most=100000.0),
+            "LinuxCNC: [TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH, the blocks that it looks ahead.",
+            default=50.0, example="50"),
+        Key("max_acceleration", Table(
+            ((_LETTERS, Number("mm/s^2", above=0.0)),), _AXIS_NAMES, tuple(AXES)),
+            "LinuxCNC: MAX_ACCELERATION of axes when streams run, at least 1.05 times what profiles "
+            "use. Left out: 1.05 times limit.acceleration.", example="{X: 5040, Z: 6300}"),
+        Key("override_guard", Flag(),
+            "LinuxCNC: run a stream at 100 % rapid and feed override and without single step only, "
+            "else the original block (needs the HAL lines of `gcodejerk install linuxcnc`).",
+            default=False),
+    )
+)  # fmt: skip
+
 MACHINE: Final = Section(
     (
         Key("schema", Choice((str(SCHEMA_VERSION),)), "Version of this format.",
@@ -343,6 +367,8 @@ MACHINE: Final = Section(
                   "How strongly each axis excites the mode.", True), at_most=100),
             "Structure modes, which several axes excite together."),
         Key("design", _DESIGN, "How profiles are chosen."),
+        Key("controller_options", _CONTROLLER_OPTIONS,
+            "What is set in the control and streams depend on; of LinuxCNC in this version."),
         Key("program", _PROGRAM, "What a program may assume when it starts."),
     )
 )  # fmt: skip

@@ -14,7 +14,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from gcodejerk.machine.file.table import SCHEMA_VERSION
-from gcodejerk.machine.parts import Axis, Description, Limits, Mode, Spectrum
+from gcodejerk.machine.parts import (
+    Axis,
+    ControllerOptions,
+    Description,
+    Limits,
+    Mode,
+    Spectrum,
+)
 
 
 def machine_yaml(machine: Description) -> str:
@@ -54,6 +61,7 @@ def machine_yaml(machine: Description) -> str:
             f"  tolerance: {_number(design.tolerance)}",
             f"  minimum_length: {_number(design.minimum_length)}",
             f"  max_extension: {_number(design.max_extension)}",
+            *_controller_options(machine.controller_options),
             "program:",
             f"  start: {_flow(program.start)}",
             f"  offsets: {_braces(offsets | lengths)}",
@@ -71,6 +79,22 @@ def machine_yaml(machine: Description) -> str:
             "",
         ]
     )
+
+
+def _controller_options(options: ControllerOptions) -> list[str]:
+    """What is not as usual."""
+    usual = ControllerOptions()
+    texts = {
+        "version": str(options.version),
+        "planner_type": str(options.planner_type),
+        "servo_period": "" if options.servo_period is None else _number(options.servo_period),
+        "optimization_depth": str(options.optimization_depth),
+        "max_acceleration": _flow(options.max_acceleration),
+        "override_guard": str(options.override_guard).lower(),
+    }
+    said = [name for name in texts if getattr(options, name) != getattr(usual, name)]
+    lines = [f"  {name}: {texts[name]}" for name in said]
+    return ["controller_options:", *lines] if lines else []
 
 
 def settings_text(machine: Description) -> str:

@@ -1,4 +1,4 @@
-"""What follows a rapid: a motion, or something that LinuxCNC waits for.
+"""What stands in front of a rapid and behind it: a motion, or something that LinuxCNC waits for.
 
 LinuxCNC 2.9 keeps half of a G0's acceleration back for the blend with its successor as long as it
 knows none (tcGetOverallMaxAccel: a parabolic end). Played (2.9, G64 with and without P): where a
@@ -6,8 +6,12 @@ motion follows directly, be it a feed, another rapid or a cycle, the G0 has all 
 G4, M3 to M9, M64, S, G43, G49 and G92, and at the program's end it has half. G61 and G61.1 give all
 of it always.
 
+In front of a rapid, whatever LinuxCNC waits for leaves its queue of motions empty, and what follows
+directly is planned with little look-ahead. A motion of some 20 ms in between fills it.
+
 Rule: what is not understood counts as something that is waited for: the rapid is then taken for as
-slow as it can be, and no stream is held to a time that the control would not keep.
+slow as it can be, its queue for empty, and no stream is held to a time that the control would not
+keep.
 """
 
 from __future__ import annotations
@@ -21,10 +25,18 @@ from numpy.typing import NDArray
 
 from gcodejerk.nc.interpreter.rapids import Rapids
 from gcodejerk.reasons import CERTAIN
+from gcodejerk.units import MM_PER_INCH
 
 WINDOW = 512
 """Bytes behind a rapid that are looked at first, and how far at most. [bytes]"""
 FARTHEST = 1 << 14
+IN_FRONT = 512
+"""Bytes in front of a rapid that are looked at. [bytes]"""
+LONG_TIME, LONG_RAPID = 0.02, 2.0
+"""A motion that fills the queue: of so long at F, or over such a way. [s], [mm]"""
+_MEANING = frozenset({10, 20, 21, 28, 30, 52, 53, 54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3, 68, 69})
+_MEANING |= {90, 91, 92, 92.1, 92.2, 92.3, 7, 8, 93, 95, 43, 43.1, 49}
+"""G codes behind which a number means another place, or F another time."""
 _COMMENT = re.compile(rb"\([^()\n]*\)|;[^\n]*")
 _WORD = re.compile(rb"([A-Z])([+-]?[0-9.]+)?")
 _COMPUTED = re.compile(rb"(N[0-9]+)?(G0?[0-3])?[XYZABCUVW]")
@@ -54,12 +66,77 @@ def with_neighbours(file: BinaryIO, origin: int, rapids: Rapids) -> Rapids:
     Returns
     -------
     Rapids
-        The same; `lone` is false also where a motion follows.
+        The same; `lone` is false also where a motion follows, `queued` true where one precedes.
     """
     lone: NDArray[np.bool_] = rapids.lone.copy()
-    for i in np.flatnonzero(lone & (rapids.reason == CERTAIN)).tolist():
-        lone[i] = not _followed(file, origin + int(rapids.begin[i]), origin + int(rapids.end[i]))
-    return replace(rapids, lone=lone)
+    queued: NDArray[np.bool_] = rapids.queued.copy()
+    unit = np.where(rapids.inch, MM_PER_INCH, 1.0)
+    for i in np.flatnonzero(rapids.reason == CERTAIN).tolist():
+        begin, end = origin + int(rapids.begin[i]), origin + int(rapids.end[i])
+        file.seek(max(begin - IN_FRONT, origin))
+        text = file.read(end - file.tell())
+        before, block = text[: len(text) - (end - begin)], text[len(text) - (end - begin) :]
+        whole = len(before) < IN_FRONT
+        lines = before.split(b"\n")[0 if whole else 1 : -1]
+        feed = float(rapids.feed[i]) * unit[i] if rapids.feed_mode[i] == 94 else np.nan
+        if _kind(block):
+            queued[i] = _long_motion(lines, bool(rapids.incremental[i]), float(unit[i]), feed)
+        if lone[i]:
+            lone[i] = not _followed(file, begin, end)
+    return replace(rapids, lone=lone, queued=queued)
+
+
+def _long_motion(lines: list[bytes], incremental: bool, unit: float, feed: float) -> bool:
+    """Whether the last motion of these lines, or one directly before it, lasts some time.
+
+    The way of one axis is the least that a motion can be long. A line that is not understood, or
+    that changes what lengths mean, ends the search.
+    """
+    for at in range(len(lines) - 1, -1, -1):
+        kind = _kind(lines[at])
+        if kind is None and not _words(lines[at]).keys() & {"G", "F"}:
+            continue
+        words = _words(lines[at])
+        if kind is False or not _MEANING.isdisjoint(words.get("G", ())):
+            return False
+        fast = bool({0, 53} & set(words.get("G", ())))
+        least = LONG_RAPID if fast or not feed > 0.0 else min(LONG_RAPID, feed * LONG_TIME / 60.0)
+        for axis in "XYZ":
+            if axis in words:
+                way = words[axis][0]
+                if not incremental:
+                    way -= _value_before(lines[:at], axis)
+                if abs(way) * unit >= least:
+                    return True
+        if "F" in words:
+            feed = np.nan
+    return False
+
+
+def _value_before(lines: list[bytes], axis: str) -> float:
+    """The last position of an axis that these lines state; NaN where none does for certain."""
+    for line in reversed(lines):
+        words = _words(line)
+        if (not words and _plain(line)) or not _MEANING.isdisjoint(words.get("G", ())):
+            return float("nan")
+        if axis in words:
+            return words[axis][0]
+    return float("nan")
+
+
+def _words(line: bytes) -> dict[str, tuple[float, ...]]:
+    """The numbers of a line by letter; empty where it holds anything but words with numbers."""
+    text = _plain(line)
+    found = _WORD.findall(text)
+    if b"".join(letter + value for letter, value in found) != text:
+        return {}
+    out: dict[str, tuple[float, ...]] = {}
+    for letter, value in found:
+        number = _number(value)
+        if number is None:
+            return {}
+        out[letter.decode()] = (*out.get(letter.decode(), ()), number)
+    return out
 
 
 def _followed(file: BinaryIO, begin: int, end: int) -> bool:

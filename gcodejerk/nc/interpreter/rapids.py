@@ -65,6 +65,9 @@ class Rapids:
     lone: NDArray[np.bool_]
     """Under G64, or in a path mode that is not known; and nothing that moves follows directly,
     where `neighbours` has looked. LinuxCNC 2.9 gives such a rapid half of its acceleration."""
+    queued: NDArray[np.bool_]
+    """A motion of some length stands in front, and nothing that the control waits for in between,
+    where `neighbours` has looked: LinuxCNC's queue of motions is then filled."""
     offset: NDArray[np.float64]
     """Shape (n, 9): machine = program + offset [mm, deg]; NaN where unknown."""
     turned: NDArray[np.uint16]
@@ -87,7 +90,7 @@ _TYPES: dict[str, tuple[type, int]] = {
         name: (np.bool_, 0)
         for name in (
             *("inch", "incremental", "diameter", "distance_stated"),
-            *("feed_mode_stated", "feed_needed", "feed_whole", "beam", "lone"),
+            *("feed_mode_stated", "feed_needed", "feed_whole", "beam", "lone", "queued"),
         )
     },
 }

@@ -48,6 +48,7 @@ class ModeColumns:
     beam: bool
     speed: float = NAN
     turned: int = 0
+    queued: bool = False
 
     @classmethod
     def of(cls, state: State) -> Self:

@@ -1,0 +1,189 @@
+"""The lines around the points of a stream: what its block says besides, and what it relies on.
+
+This module owns what every form of a stream in place has in common: the comment that names the
+block, the block's other words, the modes that points need, the block's own words at the end, and
+the modal values that the program relies on behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import Decimal
+
+import numpy as np
+
+from gcodejerk.axes import AXES
+from gcodejerk.errors import EmitError
+from gcodejerk.nc import Block, Dialect, Rapids, Word
+from gcodejerk.nc.dialects.dialect import Writing, code_name
+from gcodejerk.nc.dialects.gcodes import G90
+from gcodejerk.units import MM_PER_INCH
+
+COMMENT_LENGTH = 69
+"""Controllers and senders with short lines choke on longer comments."""
+
+
+class Frame:
+    """The lines around a move's points: what its block says besides, and what it relies on."""
+
+    def __init__(
+        self, rapids: Rapids, move: int, block: Block, text: bytes, dialect: Dialect
+    ) -> None:
+        self.rapids, self.move, self.block, self.text = rapids, move, block, text
+        self.dialect, self.writing = dialect, writing_of(dialect)
+        self.axis_words = [w for w in block.words if w.letter in AXES or w.letter in self.turned]
+        after = dialect.after_m
+        self.behind = [w for w in block.words if w.letter == "M" and w.value in after]
+        """What the control runs when the motion has ended."""
+        exact = None if dialect.exact_stop is None else dialect.exact_stop / 10
+        self.exact = [w for w in block.words if w.letter == "G" and w.value == exact]
+        """G9, which is about the end of the motion of its own block."""
+
+    @property
+    def turned(self) -> Mapping[str, str]:
+        """Addresses of increments, with their axes."""
+        return self.dialect.increments
+
+    def head(self, comments: bool) -> list[bytes]:
+        """A comment that names the block, and the block without its axis words."""
+        out = [self._comment()] if comments else []
+        rest, at = [], 0
+        moved = [*self.axis_words, *self.behind, *self.exact]
+        for word in sorted(moved, key=lambda w: w.begin):
+            rest.append(self.text[at : word.begin])
+            at = word.end
+        rest.append(self.text[at:])
+        others = [w for w in self.block.words if w not in moved]
+        if self.block.comments or any(not (w.letter == "G" and w.value == 0.0) for w in others):
+            out.append(b"".join(rest).rstrip(b" \t\r"))
+        return out
+
+    def _comment(self) -> bytes:
+        """`(gcodejerk: ...)` with the words of the block, in at most COMMENT_LENGTH characters."""
+        opens, closes = self.writing.comment
+        words = b" ".join(b"".join(w.text.split()) for w in self.block.words)
+        shown = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
+        room = COMMENT_LENGTH - len(opens + b"gcodejerk: " + closes)
+        if len(shown) > room:
+            shown = shown[: room - 3] + b"..."
+        return opens + b"gcodejerk: " + shown + closes
+
+    def standstill(self, follows: bool) -> list[bytes]:
+        """An exact stop, unless the machine rests already."""
+        stands = follows or self.rapids.path[self.move] in (61, 62)
+        return [] if stands else [self.writing.standstill]
+
+    def modes(self) -> list[bytes]:
+        """The modes of the stream that are not in force, or not stated."""
+        rapids, move, dialect = self.rapids, self.move, self.dialect
+        codes: list[int | None] = []
+        if not rapids.distance_stated[move] and dialect.groups.get(G90) == "distance":
+            codes.append(G90)
+        if rapids.feed_mode[move] != 94 or not rapids.feed_mode_stated[move]:
+            codes.append(dialect.feed_code(94))
+        if rapids.path[move] in (61, 62):
+            codes.append(dialect.path_code(64))
+        words = b" ".join(code_name(code) for code in codes if code is not None)
+        return [words] if words else []
+
+    def last_point(self, before_end: Mapping[int, Decimal], code: bytes = b"G1") -> bytes:
+        """The last point: the block's own words, or what is left of its increments."""
+        words = [self._last_word(word, before_end) for word in self.axis_words]
+        return b" ".join([code, *self._ending(), *words])
+
+    def _ending(self) -> list[bytes]:
+        """What lets the last point end in a standstill where the rapid did."""
+        path, dialect = int(self.rapids.path[self.move]), self.dialect
+        code = dialect.path_code(path) if path in (61, 62) else None
+        if code is None and (self.exact or dialect.stops_after_rapid):
+            code = dialect.exact_stop
+        return [] if code is None else [code_name(code)]
+
+    def _last_word(self, word: Word, before_end: Mapping[int, Decimal]) -> bytes:
+        axis = self.turned.get(word.letter)
+        if axis is not None:
+            # The points are absolute: so is the end of an increment.
+            return axis.encode() + plain(programmed_end(self.rapids, self.move, axis, False))
+        incremental = bool(self.rapids.incremental[self.move])
+        # X=3 of Siemens is X3.
+        text = b"".join(word.text[1:].split()).removeprefix(b"=")
+        number = Decimal(text.decode())
+        if word.whole and number and self.dialect.whole_numbers == "machine":
+            number = programmed_end(self.rapids, self.move, word.letter, incremental)
+            if not incremental:
+                return word.letter.encode() + plain(number)
+        if not incremental:
+            return word.letter.encode() + text.upper()
+        left = number - before_end.get(AXES.index(word.letter), Decimal(0))
+        return word.letter.encode() + plain(left)
+
+    def restored(self) -> list[bytes]:
+        """Words that restore the feed mode and F."""
+        rapids, move, dialect = self.rapids, self.move, self.dialect
+        words = []
+        mode = int(rapids.feed_mode[move])
+        code = dialect.feed_code(mode)
+        if mode != 94 and code is not None:
+            words.append(code_name(code))
+        if mode != 93 and not np.isnan(rapids.feed[move]):
+            feed = plain(Decimal(repr(float(rapids.feed[move]))))
+            words.append(b"F" + (feed.rstrip(b"0").rstrip(b".") if self._whole() else feed))
+        return words
+
+    def after(self) -> list[bytes]:
+        """What the block says when its motion has ended."""
+        return [b" ".join(b"".join(w.text.split()) for w in self.behind)] if self.behind else []
+
+    def _whole(self) -> bool:
+        """Whether F has to go without a decimal point, as it was written."""
+        return bool(self.rapids.feed_whole[self.move])
+
+
+def writing_of(dialect: Dialect) -> Writing:
+    """How streams are spelled in a dialect.
+
+    Raises
+    ------
+    EmitError
+        No form is known.
+    """
+    if dialect.writing is None:
+        raise EmitError(
+            f"no form of a stream is known for the dialect {dialect.name}",
+            "use --controller csv, which writes the streams as a table",
+        )
+    return dialect.writing
+
+
+def programmed_end(rapids: Rapids, move: int, axis: str, incremental: bool) -> Decimal:
+    """Where an axis ends, or how far it goes, as it is programmed, to six decimals.
+
+    Parameters
+    ----------
+    rapids : Rapids
+        The program's.
+    move : int
+        Which of them.
+    axis : str
+        Its letter.
+    incremental : bool
+        How far, instead of where.
+
+    Returns
+    -------
+    Decimal
+        In the program's unit; a diameter where the program has diameters.
+    """
+    k = AXES.index(axis)
+    end = float(rapids.target[move, k]) - (float(rapids.start[move, k]) if incremental else 0.0)
+    if rapids.inch[move] and axis not in "ABC":
+        end /= MM_PER_INCH
+    if rapids.diameter[move] and axis == "X":
+        end *= 2.0
+    return Decimal(repr(round(end, 6)))
+
+
+def plain(number: Decimal) -> bytes:
+    """A number without exponent, with a decimal point, and never minus zero."""
+    text = format(number if number else abs(number), "f")
+    return (text if "." in text else text + ".").encode()

@@ -1,0 +1,323 @@
+r"""Speeds at the knots of moves, straight lines between them, that follow given speeds best.
+
+A control that changes its speed linearly within each block is told speeds at knots. This module
+owns the choice of these speeds, for many moves at once: least squares on the speed of every
+interval, with the length exact, the complex responses of the modes as wanted, and
+
+- accelerations within a limit, speeds between a floor and a limit;
+- each block only faster, only slower, or even, as wanted.
+
+What is minimised is a sum of squares with linear rows and one-sided limits. Limits count as
+penalties of their violation, far stiffer than the rest, so that the sum is convex and piecewise
+quadratic: which limits hold is found by Newton's method (O. Mangasarian, Optimization Methods and
+Software 17, 2002), one solution a step, all moves at once. Each is a symmetric tridiagonal system
+for each move, as speeds touch their neighbours only, and a small dense one for the rows.
+`scipy.optimize.lsq_linear` gives the same one move at a time (`tests/unit/test_speed_fit.py`).
+
+Speeds are in units of each move's mean speed, times in intervals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.sampling import Counts
+from gcodejerk.motion.spline_filter import filter_gain
+
+PENALTY = 1e7
+"""Stiffness of a limit, against 1 of the speed of an interval."""
+LENGTH_WEIGHT, RESPONSE_WEIGHT = 1e10, 1e6
+"""The same of the length and of the responses: a limit is kept before a response is met."""
+CELLS = 1 << 21
+"""Numbers of right sides that are worked on at a time: 16 MB."""
+STEPS = 40
+"""Of Newton's method, at most; nearly all moves need less than ten."""
+
+FASTER, SLOWER, EVEN, ANY = 1, -1, 0, 2
+"""What a block may be."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wanted:
+    """What speeds have to do: columns of n moves, knots aligned at their end as in `Grid`.
+
+    Attributes
+    ----------
+    knots : ndarray of int, shape (n, k)
+        Since each move's start; zeros in front of it. [intervals]
+    speeds : ndarray, shape (n, longest)
+        Mean speed of each interval, aligned at the end. [of the mean]
+    length : ndarray, shape (n,)
+        [of the mean speed times the duration]
+    end_speed : ndarray, shape (n,)
+        At the last knot; at the first it is 0. [of the mean]
+    acceleration : ndarray, shape (n,)
+        Limit. [of the mean, per interval]
+    least, most : ndarray, shape (n,)
+        Limits of the speed at all knots but the first and the last. [of the mean]
+    kind : ndarray of int, shape (n, k - 1)
+        FASTER, SLOWER, EVEN or ANY: of the block behind each knot but the last.
+    poles : ndarray of complex, shape (m,)
+        Of the modes. [rad/s]
+    response : ndarray of complex, shape (n, m)
+        Displacement that each is to keep behind the control's filter, of a move of length 1. [-]
+    felt : ndarray of bool, shape (n, m)
+        Which modes are looked at.
+    interval : float
+        [s]
+    """
+
+    knots: Counts
+    speeds: Array
+    length: Array
+    end_speed: Array
+    acceleration: Array
+    least: Array
+    most: Array
+    kind: NDArray[np.int64]
+    poles: Complex
+    response: Complex
+    felt: NDArray[np.bool_]
+    interval: float
+
+    def take(self, rows: slice) -> Wanted:
+        """Some of the moves."""
+        whole = ("poles", "interval")
+        columns = (field.name for field in fields(self) if field.name not in whole)
+        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
+
+
+def fit_speeds(wanted: Wanted) -> Array:
+    """Speeds at the knots.
+
+    Parameters
+    ----------
+    wanted : Wanted
+        n moves with k knots.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        [of the mean]
+    """
+    size = max(1, CELLS // (wanted.knots.shape[1] * (2 * len(wanted.poles) + 2)))
+    parts = [
+        _Fit(wanted.take(slice(begin, begin + size))).solve()
+        for begin in range(0, len(wanted.knots), size)
+    ]
+    return np.concatenate(parts) if parts else np.zeros(wanted.knots.shape)
+
+
+class _Fit:
+    """The sums of squares of many moves."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted = wanted
+        knots = wanted.knots
+        self.h = np.diff(knots, axis=1)
+        self.on = self.h > 0
+        self.fixed = knots == 0
+        self.fixed[:, -1] = True
+        self.ends = np.zeros(knots.shape)
+        self.ends[:, -1] = wanted.end_speed
+        self._squares()
+        self._rows()
+        self._limits()
+
+    def _squares(self) -> None:
+        """The sum of squares of all intervals as a tridiagonal matrix and a vector."""
+        h = np.maximum(self.h, 1).astype(np.float64)
+        # Sums over the middles of a block's intervals, tau = (i - 1/2) / h.
+        own = np.where(self.on, h / 3.0 - 1.0 / (12.0 * h), 0.0)
+        mixed = np.where(self.on, h / 2.0, 0.0) - own
+        self.diagonal = np.zeros(self.fixed.shape)
+        self.diagonal[:, 1:] += own
+        self.diagonal[:, :-1] += own
+        self.beside = mixed
+        late, early = _block_sums(self.wanted.speeds, self.wanted.knots)
+        self.vector = np.zeros(self.fixed.shape)
+        self.vector[:, 1:] += late
+        self.vector[:, :-1] += early
+
+    def _rows(self) -> None:
+        """The length, and real and imaginary part of each response, as rows."""
+        wanted, h = self.wanted, self.h
+        total = wanted.knots[:, -1:].astype(np.float64)
+        length = np.zeros(self.fixed.shape)
+        length[:, 1:] += h / 2.0
+        length[:, :-1] += h / 2.0
+        rows = response_rows(wanted.knots, wanted.poles, wanted.interval)
+        rows *= wanted.felt[:, np.newaxis, :]
+        response = wanted.response * wanted.felt
+        self.rows = np.concatenate(
+            [(length / total)[:, :, np.newaxis], rows.real, rows.imag], axis=2
+        )
+        self.goal = np.concatenate(
+            [wanted.length[:, np.newaxis], response.real, response.imag], axis=1
+        )
+        self.goal = self.goal - np.einsum("bkr,bk->br", self.rows, self.ends)
+        self.rows[self.fixed] = 0.0
+        weights = np.full(self.goal.shape[1], RESPONSE_WEIGHT)
+        weights[0] = LENGTH_WEIGHT
+        self.softness = np.diag(1.0 / weights)
+        # What the fixed ends do to their neighbours goes to the right side.
+        self.vector[:, 1:] -= self.beside * self.ends[:, :-1]
+        self.vector[:, :-1] -= self.beside * self.ends[:, 1:]
+        self.vector = np.where(self.fixed, self.ends, self.vector)
+        self.diagonal = np.where(self.fixed, 1.0, self.diagonal)
+        self.beside = np.where(self.fixed[:, 1:] | self.fixed[:, :-1], 0.0, self.beside)
+
+    def _limits(self) -> None:
+        """Bounds of the change of speed over each block."""
+        kind, most = self.wanted.kind, self.wanted.acceleration[:, np.newaxis] * self.h
+        self.lowest = np.where((kind == FASTER) | (kind == EVEN), 0.0, -most)
+        self.highest = np.where((kind == SLOWER) | (kind == EVEN), 0.0, most)
+        self.lowest[~self.on], self.highest[~self.on] = -np.inf, np.inf
+        self.even = (kind == EVEN) & self.on
+
+    def solve(self) -> Array:
+        """Newton's method on the moves whose limits are still looked for."""
+        out = np.zeros(self.fixed.shape)
+        blocks = np.where(self.even, 1, 0)
+        points = np.zeros(self.fixed.shape, dtype=np.int64)
+        left = np.arange(len(out))
+        for _ in range(STEPS):
+            speeds = self._step(left, blocks[left], points[left])
+            change = np.diff(speeds, axis=1)
+            blocks_now = np.where(
+                self.even[left], 1, (change > self.highest[left]) * 1 - (change < self.lowest[left])
+            )
+            least, most = self.wanted.least[left, np.newaxis], self.wanted.most[left, np.newaxis]
+            points_now = np.where(self.fixed[left], 0, (speeds > most) * 1 - (speeds < least))
+            same = (blocks_now == blocks[left]).all(axis=1) & (points_now == points[left]).all(
+                axis=1
+            )
+            out[left], blocks[left], points[left] = speeds, blocks_now, points_now
+            left = left[~same]
+            if not len(left):
+                break
+        return out
+
+    def _step(
+        self, rows: NDArray[np.int64], blocks: NDArray[np.int64], points: NDArray[np.int64]
+    ) -> Array:
+        """The least sum for limits that hold: 1 the upper, -1 the lower, of blocks and points."""
+        fixed, ends = self.fixed[rows], self.ends[rows]
+        diagonal, vector = self.diagonal[rows], self.vector[rows]
+        stiff = np.where(blocks != 0, PENALTY, 0.0)
+        bound = np.where(blocks == 1, self.highest[rows], self.lowest[rows])
+        bound = np.where(blocks != 0, bound, 0.0)
+        late, early = ~fixed[:, 1:], ~fixed[:, :-1]
+        diagonal[:, 1:] += np.where(late, stiff, 0.0)
+        diagonal[:, :-1] += np.where(early, stiff, 0.0)
+        beside = self.beside[rows] - np.where(late & early, stiff, 0.0)
+        vector[:, 1:] += np.where(late, stiff * (bound + ends[:, :-1]), 0.0)
+        vector[:, :-1] += np.where(early, stiff * (ends[:, 1:] - bound), 0.0)
+        held = np.where(points != 0, PENALTY, 0.0)
+        wanted = self.wanted
+        to = np.where(points == 1, wanted.most[rows, np.newaxis], wanted.least[rows, np.newaxis])
+        diagonal += held
+        vector += np.where(points != 0, held * to, 0.0)
+        matrix = self.rows[rows]
+        right = np.concatenate([vector[:, :, np.newaxis], matrix], axis=2)
+        solved = solve_tridiagonal(diagonal, beside, right)
+        free, moved = solved[:, :, 0], solved[:, :, 1:]
+        miss = self.goal[rows] - np.einsum("bkr,bk->br", matrix, free)
+        dense = matrix.transpose(0, 2, 1) @ moved + self.softness
+        force = np.linalg.solve(dense, miss[:, :, np.newaxis])[:, :, 0]
+        out: Array = free + np.einsum("bkr,br->bk", moved, force)
+        return out
+
+
+def _block_sums(speeds: Array, knots: Counts) -> tuple[Array, Array]:
+    """Sums of the intervals' speeds over each block, weighted towards its end and its begin."""
+    total, width = knots[:, -1], speeds.shape[1]
+    h = np.diff(knots, axis=1).ravel()
+    used = speeds[np.arange(width) >= (width - total)[:, np.newaxis]]
+    block = np.repeat(np.arange(len(h)), h)
+    begin = np.cumsum(h) - h
+    tau = (np.arange(len(block)) - begin[block] + 0.5) / h[block]
+    shape = (len(knots), knots.shape[1] - 1)
+    late = np.bincount(block, used * tau, len(h)).reshape(shape)
+    early = np.bincount(block, used * (1.0 - tau), len(h)).reshape(shape)
+    return late, early
+
+
+def response_rows(knots: Counts, poles: Complex, interval: float) -> Complex:
+    r"""What a speed of 1 at each knot leaves behind the filter, as displacement at the last knot.
+
+    A mode keeps :math:`\sum_i w_i (e^{\lambda h} - 1) e^{\lambda (T - t_i)} / \omega_d` of the mean
+    speeds :math:`w_i` of the intervals h that end at :math:`t_i`; with speeds that are straight
+    lines between knots the sum over a block is one over its own intervals.
+
+    Parameters
+    ----------
+    knots : ndarray of int, shape (n, k)
+        As in `Wanted`. [intervals]
+    poles : ndarray of complex, shape (m,)
+        [rad/s]
+    interval : float
+        [s]
+
+    Returns
+    -------
+    ndarray of complex, shape (n, k, m)
+        For speeds of the mean and moves of length 1. [-]
+    """
+    h = np.diff(knots, axis=1)
+    turn = poles * interval
+    late = np.zeros((int(h.max(initial=0)) + 1, len(poles)), dtype=np.complex128)
+    early = np.zeros_like(late)
+    for size in range(1, len(late)):
+        tau = ((np.arange(size) + 0.5) / size)[:, np.newaxis]
+        decay = np.exp(turn * np.arange(size - 1, -1, -1)[:, np.newaxis])
+        late[size], early[size] = (tau * decay).sum(axis=0), ((1.0 - tau) * decay).sum(axis=0)
+    total = knots[:, -1:]
+    left = np.exp(turn * (total - knots)[:, 1:, np.newaxis])
+    out = np.zeros((*knots.shape, len(poles)), dtype=np.complex128)
+    out[:, 1:] += left * late[h]
+    out[:, :-1] += left * early[h]
+    out *= (np.exp(turn) - 1.0) * filter_gain(poles, interval) / (poles.imag * interval)
+    rows: Complex = out / total[:, :, np.newaxis]
+    return rows
+
+
+def solve_tridiagonal(diagonal: Array, beside: Array, right: Array) -> Array:
+    """Solve n symmetric, positive definite tridiagonal systems (Thomas).
+
+    Parameters
+    ----------
+    diagonal : ndarray, shape (n, k)
+        The matrices' diagonals.
+    beside : ndarray, shape (n, k - 1)
+        What stands above them, and below.
+    right : ndarray, shape (n, k, r)
+        r right sides of each.
+
+    Returns
+    -------
+    ndarray, shape (n, k, r)
+
+    Examples
+    --------
+    >>> right = np.array([[[1.0], [0.0], [1.0]]])
+    >>> solve_tridiagonal(np.full((1, 3), 2.0), np.full((1, 2), -1.0), right)[0, :, 0]
+    array([1., 1., 1.])
+    """
+    out = np.array(right)
+    upper = np.empty_like(beside)
+    pivot = diagonal[:, 0]
+    out[:, 0] /= pivot[:, np.newaxis]
+    for k in range(1, diagonal.shape[1]):
+        upper[:, k - 1] = beside[:, k - 1] / pivot
+        pivot = diagonal[:, k] - beside[:, k - 1] * upper[:, k - 1]
+        out[:, k] -= beside[:, k - 1, np.newaxis] * out[:, k - 1]
+        out[:, k] /= pivot[:, np.newaxis]
+    for k in range(diagonal.shape[1] - 2, -1, -1):
+        out[:, k] -= upper[:, k, np.newaxis] * out[:, k + 1]
+    return out
