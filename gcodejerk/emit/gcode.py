@@ -1,8 +1,9 @@
 """Streams as G1 blocks in the place of the rapid's block, spelled in the program's own dialect.
 
-Blocks of 2 ms in per-minute feed and continuous path, F their mean speed (`feeds`), so that a control
-that holds F over a block takes the time that it was planned for. How controls follow such blocks was
-not measured: their emitters say so (`controls`). LinuxCNC has a form of its own (`linuxcnc`).
+Blocks of 2 ms in per-minute feed and continuous path, F their mean speed (`feeds`), so that a
+control that holds F over a block takes the time that it was planned for. How controls follow such
+blocks was not measured: their emitters say so (`controls`). LinuxCNC has a form of its own
+(`linuxcnc`).
 
 A replaced block becomes, each line only where it is needed::
 

@@ -45,7 +45,7 @@ BLOCK_TIME = 0.002
 DECIMALS, INCH_DECIMALS = 6, 7
 """Of positions, whatever the resolution: LinuxCNC computes in doubles, and speeds follow from
 lengths of blocks. Played: 6 decimals of mm are enough, 4 are not."""
-FEED_DECIMALS, INCH_FEED_DECIMALS = 8, 9
+FEED_DECIMALS, INCH_FEED_DECIMALS = 11, 12
 """Of F."""
 LEAD_TIME = 0.01
 """In which the queue of motions fills. [s]"""
@@ -61,8 +61,8 @@ class LinuxcncController(Controller):
         Form(
             "stream",
             "measured",
-            "LinuxCNC 2.9: played within 0.01 mm, the residual within a hundredth of today's; needs "
-            "ARC_BLEND_ENABLE = 1 and MAX_ACCELERATION 1.05 to 4 times the axis's "
+            "LinuxCNC 2.9: played within 0.01 mm, what is left within a hundredth of today's; "
+            "needs ARC_BLEND_ENABLE = 1 and MAX_ACCELERATION 1.05 to 4 times the axis's "
             "limit.acceleration",
         ),
     )
@@ -200,7 +200,7 @@ class _Points:
 
     def text(self, line_end: bytes) -> bytes:
         """The G1 blocks."""
-        columns = []
+        columns: list[Column] = []
         for axis in self.axes:
             values = self.whole[axis]
             values = np.diff(values) if self.incremental else values[1:]

@@ -31,12 +31,14 @@ from gcodejerk.motion.spline_filter import filter_gain
 
 PENALTY = 1e7
 """Stiffness of a limit, against 1 of the speed of an interval."""
-LENGTH_WEIGHT, RESPONSE_WEIGHT = 1e10, 1e6
-"""The same of the length and of the responses: a limit is kept before a response is met."""
+LENGTH_WEIGHT = 1e10
+"""The same of the length."""
 CELLS = 1 << 21
 """Numbers of right sides that are worked on at a time: 16 MB."""
-STEPS = 40
-"""Of Newton's method, at most; nearly all moves need less than ten."""
+STEPS, HALVINGS = 40, 12
+"""Of Newton's method, at most; nearly all moves need less than ten, and whole steps."""
+SETTLED = 1e-9
+"""Share of the sum that a shortened step has to gain for another one."""
 
 FASTER, SLOWER, EVEN, ANY = 1, -1, 0, 2
 """What a block may be."""
@@ -66,8 +68,8 @@ class Wanted:
         Of the modes. [rad/s]
     response : ndarray of complex, shape (n, m)
         Displacement that each is to keep behind the control's filter, of a move of length 1. [-]
-    felt : ndarray of bool, shape (n, m)
-        Which modes are looked at.
+    weight : ndarray, shape (n, m)
+        Of each response; 0 where it may be anything. [-]
     interval : float
         [s]
     """
@@ -82,7 +84,7 @@ class Wanted:
     kind: NDArray[np.int64]
     poles: Complex
     response: Complex
-    felt: NDArray[np.bool_]
+    weight: Array
     interval: float
 
     def take(self, rows: slice) -> Wanted:
@@ -152,8 +154,9 @@ class _Fit:
         length[:, 1:] += h / 2.0
         length[:, :-1] += h / 2.0
         rows = response_rows(wanted.knots, wanted.poles, wanted.interval)
-        rows *= wanted.felt[:, np.newaxis, :]
-        response = wanted.response * wanted.felt
+        felt = wanted.weight > 0.0
+        rows *= felt[:, np.newaxis, :]
+        response = wanted.response * felt
         self.rows = np.concatenate(
             [(length / total)[:, :, np.newaxis], rows.real, rows.imag], axis=2
         )
@@ -162,9 +165,9 @@ class _Fit:
         )
         self.goal = self.goal - np.einsum("bkr,bk->br", self.rows, self.ends)
         self.rows[self.fixed] = 0.0
-        weights = np.full(self.goal.shape[1], RESPONSE_WEIGHT)
-        weights[0] = LENGTH_WEIGHT
-        self.softness = np.diag(1.0 / weights)
+        softness = 1.0 / np.where(felt, wanted.weight, 1.0)
+        length = np.full((len(softness), 1), 1.0 / LENGTH_WEIGHT)
+        self.softness = np.concatenate([length, softness, softness], axis=1)
         # What the fixed ends do to their neighbours goes to the right side.
         self.vector[:, 1:] -= self.beside * self.ends[:, :-1]
         self.vector[:, :-1] -= self.beside * self.ends[:, 1:]
@@ -182,26 +185,70 @@ class _Fit:
 
     def solve(self) -> Array:
         """Newton's method on the moves whose limits are still looked for."""
-        out = np.zeros(self.fixed.shape)
-        blocks = np.where(self.even, 1, 0)
-        points = np.zeros(self.fixed.shape, dtype=np.int64)
+        out = np.where(self.fixed, self.ends, 1.0)
         left = np.arange(len(out))
+        value = self._value(left, out)
         for _ in range(STEPS):
-            speeds = self._step(left, blocks[left], points[left])
-            change = np.diff(speeds, axis=1)
-            blocks_now = np.where(
-                self.even[left], 1, (change > self.highest[left]) * 1 - (change < self.lowest[left])
-            )
-            least, most = self.wanted.least[left, np.newaxis], self.wanted.most[left, np.newaxis]
-            points_now = np.where(self.fixed[left], 0, (speeds > most) * 1 - (speeds < least))
-            same = (blocks_now == blocks[left]).all(axis=1) & (points_now == points[left]).all(
-                axis=1
-            )
-            out[left], blocks[left], points[left] = speeds, blocks_now, points_now
-            left = left[~same]
+            blocks, points = self._active(left, out[left])
+            there = self._step(left, blocks, points)
+            share = np.ones(len(left))
+            reached = self._value(left, there)
+            for _ in range(HALVINGS):
+                longer = np.flatnonzero(reached > value[left])
+                if not len(longer):
+                    break
+                share[longer] *= 0.5
+                rows, part = left[longer], share[longer, np.newaxis]
+                reached[longer] = self._value(rows, out[rows] + part * (there - out[left])[longer])
+            out[left] += share[:, np.newaxis] * (there - out[left])
+            same = self._same(left, out[left], blocks, points) & (share == 1.0)
+            gained = value[left] - reached > SETTLED * np.abs(value[left])
+            value[left] = reached
+            left = left[~same & (gained | (share == 1.0))]
             if not len(left):
                 break
         return out
+
+    def _active(
+        self, rows: NDArray[np.int64], speeds: Array
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Which limits of blocks and points hold: 1 the upper, -1 the lower, 0 none."""
+        change = np.diff(speeds, axis=1)
+        blocks = (change > self.highest[rows]) * 1 - (change < self.lowest[rows])
+        blocks = np.where(self.even[rows], 1, blocks)
+        least, most = self.wanted.least[rows, np.newaxis], self.wanted.most[rows, np.newaxis]
+        points = np.where(self.fixed[rows], 0, (speeds > most) * 1 - (speeds < least))
+        return blocks, points
+
+    def _same(
+        self,
+        rows: NDArray[np.int64],
+        speeds: Array,
+        blocks: NDArray[np.int64],
+        points: NDArray[np.int64],
+    ) -> NDArray[np.bool_]:
+        """Whether the limits that were taken to hold are those that do."""
+        now, then = self._active(rows, speeds)
+        same: NDArray[np.bool_] = (now == blocks).all(axis=1) & (then == points).all(axis=1)
+        return same
+
+    def _value(self, rows: NDArray[np.int64], speeds: Array) -> Array:
+        """What is minimised, but for a constant, shape (rows,)."""
+        change = np.diff(speeds, axis=1)
+        wanted = self.wanted
+        over = np.maximum(change - self.highest[rows], 0.0) + np.maximum(
+            self.lowest[rows] - change, 0.0
+        )
+        least, most = wanted.least[rows, np.newaxis], wanted.most[rows, np.newaxis]
+        beyond = np.maximum(speeds - most, 0.0) + np.maximum(least - speeds, 0.0)
+        beyond[self.fixed[rows]] = 0.0
+        miss = self.goal[rows] - np.einsum("bkr,bk->br", self.rows[rows], speeds)
+        own = 0.5 * self.diagonal[rows] * speeds - self.vector[rows]
+        beside = self.beside[rows] * speeds[:, 1:] * speeds[:, :-1]
+        value: Array = (own * speeds).sum(axis=1) + beside.sum(axis=1)
+        value += 0.5 * PENALTY * ((over**2).sum(axis=1) + (beyond**2).sum(axis=1))
+        value += 0.5 * (miss**2 / self.softness[rows]).sum(axis=1)
+        return value
 
     def _step(
         self, rows: NDArray[np.int64], blocks: NDArray[np.int64], points: NDArray[np.int64]
@@ -228,7 +275,9 @@ class _Fit:
         solved = solve_tridiagonal(diagonal, beside, right)
         free, moved = solved[:, :, 0], solved[:, :, 1:]
         miss = self.goal[rows] - np.einsum("bkr,bk->br", matrix, free)
-        dense = matrix.transpose(0, 2, 1) @ moved + self.softness
+        dense = matrix.transpose(0, 2, 1) @ moved
+        diagonal = np.arange(dense.shape[1])
+        dense[:, diagonal, diagonal] += self.softness[rows]
         force = np.linalg.solve(dense, miss[:, :, np.newaxis])[:, :, 0]
         out: Array = free + np.einsum("bkr,br->bk", moved, force)
         return out
@@ -283,8 +332,7 @@ def response_rows(knots: Counts, poles: Complex, interval: float) -> Complex:
     out[:, 1:] += left * late[h]
     out[:, :-1] += left * early[h]
     out *= (np.exp(turn) - 1.0) * filter_gain(poles, interval) / (poles.imag * interval)
-    rows: Complex = out / total[:, :, np.newaxis]
-    return rows
+    return np.asarray(out / total[:, :, np.newaxis], dtype=np.complex128)
 
 
 def solve_tridiagonal(diagonal: Array, beside: Array, right: Array) -> Array:

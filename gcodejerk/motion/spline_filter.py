@@ -87,6 +87,5 @@ def filter_gain(poles: Complex, interval: float) -> Complex:
     ndarray of complex, shape (m,)
         [-]
     """
-    turn = np.exp(poles * interval)
-    gain: Complex = (turn + 4.0 + 1.0 / turn) / 6.0
-    return gain
+    turn: Complex = np.exp(poles * interval)
+    return np.asarray((turn + 4.0 + 1.0 / turn) / 6.0, dtype=np.complex128)

@@ -21,7 +21,7 @@ Rule 2: what the model does not show to be played within `TOLERANCE` of the prof
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,26 +35,45 @@ from gcodejerk.motion.spline_filter import filtered, unfiltered
 from gcodejerk.planning.batch import Batch, Sampler
 from gcodejerk.planning.lines import left_by_lines
 
-LONGEST = 0.0095
-"""Of a block: from 10 ms on the planner no longer blends it as the others. [s]"""
+LONGEST = 0.0085
+"""Of a block, and a period more: from 10 ms on the planner no longer blends it. [s]"""
 END_PERIODS = 3
 """Of the first and the last block, at least. [intervals]"""
 LOOK_AHEAD = 0.9
 """Share of the planner's look-ahead (ARC_BLEND_OPTIMIZATION_DEPTH) that is relied on."""
-HAIR = 2e-10
-"""By how much blocks end before a period. [s]"""
+HAIR = 4e-12
+"""By how much blocks end before a period: more than what LinuxCNC takes for nothing (1e-12). [s]"""
 TAIL, CREEP = 2e-5, 0.01
 """Way at the end that is crept, and its speed, which is the least of all speeds. [mm], [mm/s]"""
 HEADROOM, USED = 1.05, 0.99
 """MAX_ACCELERATION over what profiles use at least, and the share of it that speeds may use."""
+FULLEST = 1.5
+"""The same at most, where the machine file does not say it."""
 FEEDBACK = 0.2
 """Share of the way by which rounding is behind that each block makes good."""
 DIP = 0.005
 """A speed that falls and rises by less than this share of the peak goes on rising or falling."""
 SEEN = 0.8
 """Modes up to this share of half the rate of knots are fitted; no speeds have higher ones."""
+WEIGHTS = np.array([1e6, 1e6, 1e6])
+"""Of the responses at the modes, and at the ends of the band, against 1 of an interval's speed."""
+EMPHASES = (1.0, 0.03, 1e-3, 1e-5, 1e-8)
+"""By which these are multiplied, one after the other, until a stream is near its profile."""
+LAST = 3
+"""Blocks at the end of which no early end matters."""
+KICK = 0.1
+"""What the end of a block in front of its period may do to the speed, about. [mm/s]"""
+NEAR = 0.8
+"""Share of `TOLERANCE`."""
 MOST_MODES = 24
 """Oscillators whose responses are fitted: of a spectrum the strongest."""
+ROUNDS = 6
+"""Of an iteration whose steps shrink by the rounding of a position."""
+SLOW = 20.0
+"""Speeds below this are kept from dips that rounding would make. [mm/s]"""
+EARLIEST = 2e-6
+"""A block may end so much before its period: until then the control runs the next one at full
+acceleration, which changes its speed by some 0.01 mm/s. [s]"""
 TOLERANCE = 0.01
 """How far a stream may be played from its profile. [mm]"""
 LINEAR = "XYZ"
@@ -78,9 +97,9 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         the time is in none of its times. `unplayable` says which moves the control would not play
         as planned.
     """
-    moves = _Moves.of(sampler, stride)
-    knots = aligned_knots(moves.count, moves.stride)
-    speeds = _fitted(moves, knots)
+    moves = _Moves.of(sampler)
+    knots, enough = _knots(moves, stride)
+    speeds = _followed(moves, knots)
     written = _Written.of(moves, knots, speeds)
     played, grid = written.played()
     positions = {
@@ -109,7 +128,7 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         conventional_residual=sampler.conventional_residual(),
         worst_in_band=worst,
         profiles=sampler.profiles,
-        unplayable=~moves.possible | (off > TOLERANCE),
+        unplayable=~(moves.possible & enough) | (off > TOLERANCE) | (written.early > EARLIEST),
         path_speed=written.speed,
     )
 
@@ -126,28 +145,34 @@ class _Moves:
         Unit profile of each.
     possible : ndarray of bool, shape (b,)
         Nothing stands against playing it. What is impossible is computed as if it were not.
-    count, stride : ndarray of int, shape (b,)
-        T_SUM, and periods of a block. [intervals]
+    count : ndarray of int, shape (b,)
+        T_SUM. [intervals]
     length : ndarray, shape (b,)
         [mm]
     direction : ndarray, shape (b, 3)
         [-]
     velocity, acceleration : ndarray, shape (b,)
-        What a stream may use along the path. [mm/s], [mm/s^2]
+        What profiles may use along the path. [mm/s], [mm/s^2]
+    most, full : ndarray, shape (b,)
+        What speeds between knots may use, and what the control may be set to. [mm/s^2]
+    step : ndarray, shape (b,)
+        Of the numbers that are written. [mm]
     """
 
     sampler: Sampler
     profiles: Profiles
     possible: NDArray[np.bool_]
     count: Counts
-    stride: Counts
     length: Array
     direction: Array
     velocity: Array
     acceleration: Array
+    most: Array
+    full: Array
+    step: Array
 
     @classmethod
-    def of(cls, sampler: Sampler, stride: int) -> _Moves:
+    def of(cls, sampler: Sampler) -> _Moves:
         """Look at what the machine and the control allow."""
         plans = sampler.plans
         way = plans.displacement[sampler.moves][:, : len(LINEAR)]
@@ -163,28 +188,36 @@ class _Moves:
         first = np.searchsorted(sampler.row_of, np.arange(len(count)))
         profiles = plans.profiles.take(sampler.rows[first])
         options = plans.machine.controller_options
-        most, limit, velocity = (np.full(len(LINEAR), np.inf) for _ in range(3))
+        most, full, limit, velocity = (np.full(len(LINEAR), np.inf) for _ in range(4))
         for axis in plans.machine.axes:
             if axis.name in LINEAR:
                 k = LINEAR.index(axis.name)
                 limit[k], velocity[k] = axis.limit.acceleration, axis.limit.velocity
                 most[k] = options.max_acceleration.get(axis.name, HEADROOM * limit[k])
+                full[k] = options.max_acceleration.get(axis.name, FULLEST * limit[k])
         peak = profiles.peak_acceleration * length
         possible &= HEADROOM * peak <= _along(most, direction) * (1.0 + 1e-6)
-        strides, enough = _strides(
-            profiles, count, length, _along(limit, direction), stride, sampler.interval,
-            int(LOOK_AHEAD * options.optimization_depth),
-        )  # fmt: skip
         return cls(
             sampler=sampler,
             profiles=profiles,
-            possible=possible & enough,
+            possible=possible,
             count=count,
-            stride=strides,
             length=length,
             direction=direction,
             velocity=_along(velocity, direction),
-            acceleration=USED * _along(np.minimum(most, HEADROOM * limit), direction),
+            acceleration=_along(limit, direction),
+            most=USED * _along(np.minimum(most, HEADROOM * limit), direction),
+            full=_along(full, direction),
+            step=sampler.number_format.step[:, 0],
+        )
+
+    def take(self, rows: NDArray[np.int64]) -> _Moves:
+        """Some of them."""
+        columns = (f.name for f in fields(self) if f.name not in ("sampler", "profiles"))
+        return replace(
+            self,
+            profiles=self.profiles.take(rows),
+            **{name: getattr(self, name)[rows] for name in columns},
         )
 
 
@@ -195,82 +228,176 @@ def _along(limits: Array, direction: Array) -> Array:
     return np.where(np.isfinite(out), out, 1.0)
 
 
-def aligned_knots(count: Counts, stride: Counts) -> Counts:
+def aligned_knots(
+    count: Counts, stride: int, ahead: int, way: Array, speed: Array, brake: Array, interval: float
+) -> tuple[Counts, NDArray[np.bool_]]:
     """Ends of the blocks of moves, whole periods, aligned at the last.
+
+    A block has `stride` periods where the planner looks far enough ahead: it enters no block faster
+    than it could stop within the blocks that it looks at. Where that needs longer blocks they are
+    longer, from the end backwards.
 
     Parameters
     ----------
-    count, stride : ndarray of int, shape (b,)
-        Duration of each move, and of its blocks. [intervals]
+    count : ndarray of int, shape (b,)
+        Duration of each move. [intervals]
+    stride : int
+        Periods of a block, at least 2.
+    ahead : int
+        Blocks that the planner looks ahead.
+    way, speed : ndarray, shape (b, longest + 1)
+        Of each move at every period, aligned at the end. [mm], [mm/s]
+    brake : ndarray, shape (b,)
+        Acceleration with which it can stop. [mm/s^2]
+    interval : float
+        [s]
 
     Returns
     -------
-    ndarray of int, shape (b, k)
+    knots : ndarray of int, shape (b, k)
         [intervals]
+    enough : ndarray of bool, shape (b,)
+        The planner looks far enough ahead everywhere.
 
     Examples
     --------
     The first and the last block have three periods at least, one in the middle what is left over:
 
-    >>> aligned_knots(np.array([11, 12, 40]), np.array([2, 2, 10]))
-    array([[ 0,  3,  5,  8, 11],
-           [ 0,  3,  5,  9, 12],
-           [ 0, 10, 20, 30, 40]])
+    >>> slow = np.zeros((2, 13))
+    >>> aligned_knots(np.array([11, 12]), 2, 45, slow, slow, np.ones(2), 0.001)[0]
+    array([[ 0,  0,  3,  6,  8, 11],
+           [ 0,  3,  5,  7,  9, 12]])
     """
-    end = np.maximum(stride, END_PERIODS)
-    inner = np.maximum((count - 2 * end) // stride, 0)
-    # A block of one period would be slowed down: where there is no inner one, the last is longer.
-    rest = count - (2 * end + inner * stride)
-    short = np.minimum(rest, 0)
-    rest = np.maximum(rest, 0)
-    blocks = inner + 2
-    width = int(blocks.max(initial=1))
-    number = np.arange(width) - (width - blocks[:, np.newaxis])
-    last = blocks[:, np.newaxis] - 1
-    middle = np.where(inner > 0, blocks // 2, blocks - 1)[:, np.newaxis]
-    h = np.where(number >= 0, stride[:, np.newaxis], 0)
-    h = np.where((number == 0) | (number == last), end[:, np.newaxis], h)
-    h += np.where(number == middle, rest[:, np.newaxis], 0)
-    # Less than two whole end blocks: halves.
-    h += np.where(number == 0, -((-short[:, np.newaxis]) // 2), 0)
-    h += np.where(number == last, -((1 - short[:, np.newaxis]) // 2), 0)
-    knots: Counts = np.concatenate([np.zeros_like(count)[:, np.newaxis], np.cumsum(h, 1)], axis=1)
-    return knots
+    rows = np.arange(len(count))
+    longest = max(stride, int(LONGEST / interval))
+    end = max(END_PERIODS, stride)
+    last = way.shape[1] - 1
+    over = np.maximum(count - 2 * end, 0) % stride
+    enough = np.ones(len(count), dtype=np.bool_)
+    left = np.where(count < end + END_PERIODS, count // 2, end)
+    columns = [np.zeros_like(count), left]
+    needed = 0.5 * speed**2 / brake[:, np.newaxis]
+    while (left < count).any():
+        to = way[rows, last - columns[max(len(columns) - ahead, 0)]]
+        size = np.full(len(count), longest)
+        short = np.ones(len(count), dtype=np.bool_)
+        for periods in range(stride, longest + 1):
+            at = last - np.minimum(left + periods, count)
+            reached = needed[rows, at] <= (to - way[rows, at]) * (1.0 + 1e-6) + CREEP * interval
+            size[short & reached] = periods
+            short &= ~reached
+            if not short.any():
+                break
+        enough &= ~short | (left >= count)
+        # What the division leaves over: a longer block in the middle, or one of its own.
+        middle = (over > 0) & (left + size >= count / 2)
+        size = np.where(middle, np.where(over > 1, over, size + 1), size)
+        over = np.where(middle, 0, over)
+        rest = count - left
+        # The first block has three periods at least, too.
+        size = np.where(rest < size + END_PERIODS, rest, size)
+        size = np.where(size > longest + 1, rest - END_PERIODS, size)
+        left = left + size
+        columns.append(left)
+    knots: Counts = count[:, np.newaxis] - np.stack(columns[::-1], axis=1)
+    return knots, enough
 
 
-def _strides(
-    profiles: Profiles,
-    count: Counts,
-    length: Array,
-    acceleration: Array,
-    least: int,
-    interval: float,
-    ahead: int,
-) -> tuple[Counts, NDArray[np.bool_]]:
-    """Periods of a block of each move, and whether they are enough.
-
-    The planner enters no block faster than it could stop within the blocks that it looks at.
-    """
-    out = np.full(len(count), least, dtype=np.int64)
-    left = np.arange(len(count))
-    for stride in range(least, max(least, int(LONGEST / interval)) + 1):
-        knots = aligned_knots(count[left], np.full(len(left), stride))
-        unit, speed = sample_profiles(profiles.take(left), knots, interval)
-        beyond = np.minimum(np.arange(knots.shape[1]) + ahead, knots.shape[1] - 1)
-        way = (unit[:, beyond] - unit) * length[left, np.newaxis]
-        needed = 0.5 * (speed * length[left, np.newaxis]) ** 2
-        out[left] = stride
-        short = (needed > acceleration[left, np.newaxis] * way + CREEP**2).any(axis=1)
-        left = left[short]
+def _knots(moves: _Moves, stride: int) -> tuple[Counts, NDArray[np.bool_]]:
+    """Knots of all moves, and whether the planner looks far enough ahead for each."""
+    interval, machine = moves.sampler.interval, moves.sampler.plans.machine
+    every = Grid.every(moves.count, 1, interval)
+    unit, speed = sample_profiles(moves.profiles, every.knots, interval)
+    way, speed = (each * moves.length[:, np.newaxis] for each in (unit, speed))
+    brake, full = moves.most / USED, moves.full
+    ahead = int(LOOK_AHEAD * machine.controller_options.optimization_depth)
+    rows = np.arange(len(moves.count))
+    knots = np.zeros((len(rows), 1), dtype=np.int64)
+    enough = np.zeros(len(rows), dtype=np.bool_)
+    steady = np.zeros(len(rows), dtype=np.bool_)
+    for periods in range(stride, max(stride, int(LONGEST / interval)) + 1):
+        left = np.flatnonzero(~(enough & steady))
         if not len(left):
             break
-    enough = np.ones(len(count), dtype=np.bool_)
-    enough[left] = False
-    return out, enough
+        part, far = aligned_knots(
+            moves.count[left], periods, ahead, way[left], speed[left], brake[left], interval
+        )
+        at = np.take_along_axis(
+            speed[left], speed.shape[1] - 1 - moves.count[left, np.newaxis] + part, axis=1
+        )
+        kick = full[left] * early_ends(part * interval, at, np.zeros(at.shape), full[left])
+        calm = kick < KICK
+        # Longer blocks make a slow start less delicate: taken until they no longer need to be.
+        taken = left[(far & calm) | ~enough[left]]
+        chosen = np.isin(left, taken)
+        width = max(knots.shape[1], part.shape[1])
+        knots = np.pad(knots, ((0, 0), (width - knots.shape[1], 0)))
+        knots[taken] = 0
+        knots[taken, width - part.shape[1] :] = part[chosen]
+        enough[taken], steady[taken] = far[chosen], calm[chosen]
+    return knots, enough
 
 
-def _fitted(moves: _Moves, knots: Counts) -> Array:
-    """Speeds at the knots, shape (b, k) [mm/s]."""
+def early_ends(time: Array, speed: Array, early: Array, acceleration: Array) -> Array:
+    """By how much blocks end before their periods at most, in front of which others did.
+
+    The rest of a period is run in the next block at full acceleration A, before its ramp begins:
+    what a block ended too early by, the next one does by 1 + h (A - a)/(v_k + v_(k+1)) as much.
+
+    Parameters
+    ----------
+    time, speed : ndarray, shape (b, k)
+        Of the knots. [s], [mm/s]
+    early : ndarray, shape (b, k)
+        By how much each ends too early by itself, besides `HAIR`. [s]
+    acceleration : ndarray, shape (b,)
+        [mm/s^2]
+
+    Returns
+    -------
+    ndarray, shape (b,)
+        [s]
+    """
+    h, both = np.diff(time, axis=1), speed[:, 1:] + speed[:, :-1]
+    rise = np.diff(speed, axis=1)
+    growth = 1.0 + (acceleration[:, np.newaxis] * h - rise) / np.maximum(both, CREEP)
+    # No faster than F, which the speed at the end of the block is.
+    bound = np.maximum(np.abs(rise), CREEP) / acceleration[:, np.newaxis]
+    now = np.zeros(len(time))
+    most = np.zeros(len(time))
+    # In the last blocks hardly any speed is left that could change.
+    for k in range(h.shape[1] - LAST):
+        begun = h[:, k] > 0.0
+        now = np.where(begun, np.minimum(now, bound[:, k]) * growth[:, k], now)
+        now += np.where(begun, HAIR + early[:, k + 1], 0.0)
+        most = np.maximum(most, now)
+    return most
+
+
+def _followed(moves: _Moves, knots: Counts) -> Array:
+    """Speeds at the knots that stay near the profile, shape (b, k) [mm/s].
+
+    Where limits are near, no speeds leave just what the profile does: then they follow it, and what
+    they leave is said as it is.
+    """
+    out = np.zeros(knots.shape)
+    left = np.arange(len(knots))
+    unit, _ = sample_profiles(moves.profiles, knots, moves.sampler.interval)
+    exact = unit * moves.length[:, np.newaxis]
+    for emphasis in EMPHASES:
+        speeds = _fitted(moves.take(left), knots[left], emphasis)
+        out[left] = speeds
+        h = np.diff(knots[left], axis=1) * moves.sampler.interval
+        way = np.cumsum(0.5 * h * (speeds[:, 1:] + speeds[:, :-1]), axis=1)
+        off = np.abs(way - exact[left, 1:]).max(axis=1, initial=0.0)
+        left = left[off > NEAR * TOLERANCE]
+        if not len(left):
+            break
+    return out
+
+
+def _fitted(moves: _Moves, knots: Counts, emphasis: float) -> Array:
+    """Speeds at the knots, shape (b, k) [mm/s]; `emphasis` is that of the responses."""
     sampler, interval = moves.sampler, moves.sampler.interval
     every = Grid.every(moves.count, 1, interval)
     unit, _ = sample_profiles(moves.profiles, every.knots, interval)
@@ -279,25 +406,29 @@ def _fitted(moves: _Moves, knots: Counts) -> Array:
     share = total * interval / moves.length
     poles, participation = sampler.modes.poles, sampler.modes.participation[:, : len(LINEAR)]
     chosen = np.sort(np.argsort(-np.abs(participation).max(axis=1), kind="stable")[:MOST_MODES])
-    poles = poles[chosen]
+    band = sampler.plans.machine.design.band
+    around = np.array([1.0, 1.0 - band, 1.0 + band]) if band else np.ones(1)
+    poles = (poles[chosen] * around[:, np.newaxis]).ravel()
+    chosen = np.tile(chosen, len(around))
     response = profiles_response(moves.profiles, poles) / poles.imag
     late = total * interval - moves.profiles.total
     response *= np.exp(poles * late[:, np.newaxis])
     felt = np.abs(moves.direction @ participation[chosen].T) > 0.0
-    felt &= poles.imag * moves.stride[:, np.newaxis] * interval < SEEN * np.pi
-    step = sampler.number_format.step[:, 0]
+    block = moves.count / np.count_nonzero(knots, axis=1)
+    felt &= poles.imag * block[:, np.newaxis] * interval < SEEN * np.pi
+    weight = emphasis * np.repeat(WEIGHTS[: len(around)], len(chosen) // len(around))
     wanted = Wanted(
         knots=knots,
         speeds=unfiltered(np.diff(unit, axis=1) * total[:, np.newaxis]),
-        length=1.0 - (TAIL + 2.0 * step) / moves.length,
+        length=1.0 - (TAIL + 2.0 * moves.step) / moves.length,
         end_speed=CREEP * share,
-        acceleration=moves.acceleration * interval * share,
+        acceleration=moves.most * interval * share,
         least=CREEP * share,
         most=moves.velocity * share,
         kind=block_kinds(speed),
         poles=poles,
         response=response,
-        felt=felt,
+        weight=felt * weight,
         interval=interval,
     )
     return fit_speeds(wanted) / share[:, np.newaxis]
@@ -368,6 +499,8 @@ class _Written:
         Along the path from the beginning of the stream. [mm]
     speed : ndarray, shape (b, k)
         Along the path; that of the last column is the tail's. [mm/s]
+    early : ndarray, shape (b,)
+        By how much a block ends before its period, at most, besides `HAIR`. [s]
     """
 
     moves: _Moves
@@ -376,6 +509,7 @@ class _Written:
     moved: Array
     way: Array
     speed: Array
+    early: Array
 
     @classmethod
     def of(cls, moves: _Moves, knots: Counts, speeds: Array) -> _Written:
@@ -383,9 +517,10 @@ class _Written:
 
         With v_k = 2 L_k/h - v_(k-1) an error would come back with the other sign in every block: so
         each position is where the speed that was reached, and the one that is wanted, lead to.
+        Where rounding makes a knot slower than both its neighbours, the control passes it as fast
+        as the slower of these: the block behind it makes up for that.
         """
-        sampler, interval = moves.sampler, moves.sampler.interval
-        step = sampler.number_format.step[:, 0]
+        sampler, interval, step = moves.sampler, moves.sampler.interval, moves.step
         axes = range(len(LINEAR))
         start = np.stack([sampler.start(axis) for axis in axes], axis=1)
         origin = np.stack([sampler.number_format.origin[:, axis] for axis in axes], axis=1)
@@ -410,18 +545,43 @@ class _Written:
         whole[:, 0] = here
         way, speed = np.zeros((len(step), count + 1)), np.zeros((len(step), count + 1))
         ideal, begin = np.zeros(len(step)), step
+        lasts, length = np.zeros(len(step)), np.zeros(len(step))
+        most = np.zeros(len(step))
         for k in range(1, count):
-            h = (knots[:, k] - knots[:, k - 1]) * interval
-            runs = h > 0.0
-            h = np.where(runs, h - np.where(knots[:, k - 1] == 0, HAIR, 0.0), 1.0)
+            whole_h = (knots[:, k] - knots[:, k - 1]) * interval
+            runs = whole_h > 0.0
+            first = knots[:, k - 1] == 0
+            whole_h = np.where(runs, whole_h - np.where(first, HAIR, 0.0), 1.0)
             behind = ideal - way[:, k - 1]
-            ideal = np.where(runs, ideal + 0.5 * h * (speeds[:, k - 1] + speeds[:, k]), ideal)
-            to = way[:, k - 1] + 0.5 * h * (speed[:, k - 1] + speeds[:, k]) + FEEDBACK * behind
+            aim = speed[:, k - 1] + speeds[:, k]
+            ideal = np.where(runs, ideal + 0.5 * whole_h * (speeds[:, k - 1] + speeds[:, k]), ideal)
+            to = way[:, k - 1] + 0.5 * whole_h * aim + FEEDBACK * behind
             here = np.where(runs[:, np.newaxis], whole_of(begin + to), whole[:, k - 1])
             there = np.where(moving, here * size, 0.0)
-            length = np.sqrt(((there - position) ** 2).sum(axis=1))
+            before, length = length, np.sqrt(((there - position) ** 2).sum(axis=1))
+            # Slow blocks go on getting faster, or slower, at the cost of a step.
+            change = 2.0 * (length / whole_h - speed[:, k - 1])
+            wanted = np.sign(speeds[:, k] - speeds[:, k - 1])
+            slow = runs & ~first & (change * wanted < 0.0) & (speeds[:, k] < SLOW)
+            if slow.any():
+                at = np.flatnonzero(slow)
+                here[at, leading[at]] += (wanted[at] * sign[at]).astype(np.int64)
+                there = np.where(moving, here * size, 0.0)
+                length = np.where(slow, np.sqrt(((there - position) ** 2).sum(axis=1)), length)
             way[:, k] = way[:, k - 1] + np.where(runs, length, 0.0)
-            speed[:, k] = np.where(runs, 2.0 * length / h - speed[:, k - 1], 0.0)
+            speed[:, k] = np.where(runs, 2.0 * length / whole_h - speed[:, k - 1], 0.0)
+            dip = runs & ~first & (speed[:, k - 1] < speed[:, k - 2])
+            dip &= speed[:, k] > speed[:, k - 1]
+            early = np.zeros(len(step))
+            if dip.any():
+                at = np.flatnonzero(dip)
+                ends = _passed(
+                    speed[at, k - 2], before[at], length[at], lasts[at] + whole_h[at], speed[at, k]
+                )
+                speed[at, k - 1], speed[at, k], early[at] = ends
+                early[at] = lasts[at] - early[at]
+                most = np.maximum(most, early)
+            lasts = whole_h + early
             whole[:, k] = here
             position = np.where(runs[:, np.newaxis], there, position)
         end = whole_of(moves.length)
@@ -436,7 +596,7 @@ class _Written:
         )
         moved = np.where(moving[:, np.newaxis], whole * step[:, np.newaxis, np.newaxis], 0.0)
         moved -= at_rest[:, np.newaxis]
-        return cls(moves, grid, whole, moved, way, speed)
+        return cls(moves, grid, whole, moved, way, speed, most)
 
     def played(self) -> tuple[Array, Grid]:
         """Way along the path behind the filter, from one period early to one late [mm]."""
@@ -460,6 +620,42 @@ class _Written:
         every[:, 2:-2][inside] = x
         every[:, -2:] = self.way[:, -1:]
         return filtered(every)[:, :-1], Grid.every(total + 2, 1, interval)
+
+
+def _passed(
+    before: Array, first: Array, second: Array, both: Array, after: Array
+) -> tuple[Array, Array, Array]:
+    """Speeds at the knot between two blocks, and behind them, where the knot would be a minimum.
+
+    The control passes it at the smaller of the speeds around it, so that one of the blocks is even.
+
+    Parameters
+    ----------
+    before : ndarray, shape (n,)
+        Speed in front of both blocks. [mm/s]
+    first, second : ndarray, shape (n,)
+        Their lengths. [mm]
+    both : ndarray, shape (n,)
+        How long they last together. [s]
+    after : ndarray, shape (n,)
+        Speed behind them, about. [mm/s]
+
+    Returns
+    -------
+    between, behind : ndarray, shape (n,)
+        Speeds. [mm/s]
+    lasts : ndarray, shape (n,)
+        How long the first block lasts. [s]
+    """
+    even = first / before
+    behind = 2.0 * second / (both - even) - before
+    slow = np.array(after)
+    for _ in range(ROUNDS):
+        slow = second / (both - 2.0 * first / (before + slow))
+    faster = behind >= before
+    between = np.where(faster, before, slow)
+    lasts = np.where(faster, even, 2.0 * first / (before + slow))
+    return between, np.where(faster, behind, slow), lasts
 
 
 def _deviation(moves: _Moves, played: Array, grid: Grid) -> Array:

@@ -7,7 +7,7 @@ planned profiles: where they are, and what they and today's rapids leave in the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,11 +124,11 @@ class Batch:
         owner = np.repeat(
             np.arange(len(self)), [len(self.plans.profiles_of(m)) for m in self.moves]
         )
-        columns = {
+        columns: dict[str, Any] = {
             name: {axis: values[rows] for axis, values in getattr(self, name).items()}
             for name in ("whole", "exact", "written", "velocity")
         }
-        plain = {
+        plain: dict[str, Any] = {
             name: getattr(self, name)[rows]
             for name in (
                 *("moves", "times", "fine", "residual", "conventional_residual"),

@@ -25,6 +25,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
+from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
@@ -202,7 +203,7 @@ def _process(
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
-        verification = _verified(source, target, machine, settings, program, emitter, lines)
+        verification = _verified(source, target, machine, settings, program, plans, emitter, lines)
         report("verifying", 1, 1)
     edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
     differences = hunks(edits, program.rapids, program.insert_at, lines)
@@ -324,6 +325,7 @@ def _verified(
     machine: Machine,
     settings: Settings,
     program: Program,
+    plans: Plans,
     emitter: Controller,
     lines: LineMap | None,
 ) -> Verification:
@@ -339,6 +341,7 @@ def _verified(
             names=(program.name, f"the output for {program.name}"),
             dialect=program.dialect,
             table=not emitter.in_place,
+            reported=_reported(program, plans) if emitter.play is Play.ALIGNED else None,
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):
@@ -346,6 +349,19 @@ def _verified(
             raise changed_error(program.name) from None
         raise
     return found
+
+
+def _reported(program: Program, plans: Plans) -> dict[int, Array]:
+    """The profiles as reports say them: durations and jerks along the path, by line."""
+    out = {}
+    for move in np.flatnonzero(plans.planned).tolist():
+        rows = plans.profiles_of(move)
+        if len(rows) == 1:
+            segments = slice(*plans.profiles.first[rows.start : rows.start + 2].tolist())
+            jerk = plans.profiles.jerk[segments] * plans.length[move]
+            line = int(program.rapids.line[move])
+            out[line] = np.stack([plans.profiles.duration[segments], jerk], axis=1)
+    return out
 
 
 def silent(step: str, done: int, total: int) -> None:

@@ -44,6 +44,7 @@ class Kind(enum.StrEnum):
     FEED = "feed of a block"
     TIME = "duration"
     RESIDUAL = "residual"
+    PROFILE = "off the reported profile"
     TABLE = "table"
     CYCLE = "moves of a cycle"
     READING = "second reading"

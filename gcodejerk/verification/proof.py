@@ -21,6 +21,7 @@ from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
 from gcodejerk.verification.findings import Findings, Verification
+from gcodejerk.verification.physics.aligned import Reported, check_aligned
 from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
 from gcodejerk.verification.second_reading.agreement import confirm
@@ -31,8 +32,6 @@ MOST = 100
 BATCH_BYTES = 1 << 20
 """Text of streams that is judged at a time."""
 NAMES = ("<original>", "<processed>")
-END_SPEEDS = ("linuxcnc",)
-"""Controllers for which F is the speed at an end of a block; all others hold it over the block."""
 
 
 def verify(
@@ -121,6 +120,7 @@ def verify_files(
     start: Start | None = None,
     most: int = MOST,
     table: bool = False,
+    reported: Reported | None = None,
 ) -> Verification:
     """Compare open files; see `verify`.
 
@@ -141,6 +141,9 @@ def verify_files(
     table : bool, optional
         What was processed is a table of the streams (controller `csv`): lines of violations are
         those of the table, and no line counts as kept.
+    reported : mapping of int to array, optional
+        Of the line of each rapid: the profile that was reported, as rows of duration [s] and jerk
+        along the path [mm/s^3]; streams for LinuxCNC are held to it.
 
     Returns
     -------
@@ -159,7 +162,8 @@ def verify_files(
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
     else:
-        replaced, kept = _judge_program(original, processed, program, machine, found)
+        files = (original, processed)
+        replaced, kept = _judge_program(*files, program, machine, found, reported or {})
     original.seek(begin)
     confirmed = confirm(original, program.dialect, start, program.rapids, replaced, found)
     rapids = len(program.rapids)
@@ -167,14 +171,24 @@ def verify_files(
 
 
 def _judge_program(
-    original: BinaryIO, processed: BinaryIO, program: Program, machine: Machine, found: Findings
+    original: BinaryIO,
+    processed: BinaryIO,
+    program: Program,
+    machine: Machine,
+    found: Findings,
+    reported: Reported,
 ) -> tuple[list[int], int]:
     """Compare programs; which rapids were replaced, and how many lines were kept."""
     alignment = Alignment(Window(original), Window(processed), program, machine, found)
     reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
-    stride, end_speeds = stride_of(machine), machine.controller in END_SPEEDS
+    stride = stride_of(machine)
     for streams in _batches(_checked(alignment, reader)):
-        _check_points(reader.paths(streams), program, machine, stride, found, end_speeds)
+        paths = reader.paths(streams)
+        _check_lines(paths, program, machine, found)
+        if alignment.aligned:
+            check_aligned(paths, machine, found, reported)
+        elif _moves(paths):
+            check_dynamics(paths, machine, stride, found)
     alignment.check_sum()
     return alignment.replaced, alignment.kept
 
@@ -183,7 +197,9 @@ def _judge_table(table: BinaryIO, program: Program, machine: Machine, found: Fin
     """Compare a table with its program; which rapids it replaces."""
     reader = TableReader(table, program.rapids, machine, found)
     for paths in reader.paths():
-        _check_points(paths, program, machine, 1, found, end_speeds=False)
+        _check_lines(paths, program, machine, found)
+        if _moves(paths):
+            check_dynamics(paths, machine, 1, found)
     return reader.replaced
 
 
@@ -228,17 +244,12 @@ def _batches(streams: Iterator[Stream]) -> Iterator[list[Stream]]:
         yield batch
 
 
-def _check_points(
-    paths: Paths,
-    program: Program,
-    machine: Machine,
-    stride: int,
-    found: Findings,
-    end_speeds: bool,
-) -> None:
-    """All checks on points."""
+def _check_lines(paths: Paths, program: Program, machine: Machine, found: Findings) -> None:
+    """Where the points are, and whether there may be any."""
     check_rapids(paths, program.rapids, machine, found)
     check_line(paths, machine, found)
-    # A rapid without length has no time profile.
-    if (paths.displacement != 0.0).any(axis=1).all():
-        check_dynamics(paths, machine, stride, found, end_speeds=end_speeds)
+
+
+def _moves(paths: Paths) -> bool:
+    """Whether every stream has a length: without one there is no time profile."""
+    return bool((paths.displacement != 0.0).any(axis=1).all())

@@ -169,4 +169,5 @@ class TableReader:
             speed=self.rapids.speed[index],
             step=np.tile(resolutions(self.machine), (len(index), 1)),
             lone=self.rapids.lone[index],
+            lead=np.zeros(len(index), dtype=np.int64),
         )

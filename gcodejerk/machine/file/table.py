@@ -330,8 +330,8 @@ _CONTROLLER_OPTIONS = Section(
             default=50.0, example="50"),
         Key("max_acceleration", Table(
             ((_LETTERS, Number("mm/s^2", above=0.0)),), _AXIS_NAMES, tuple(AXES)),
-            "LinuxCNC: MAX_ACCELERATION of axes when streams run, at least 1.05 times what profiles "
-            "use. Left out: 1.05 times limit.acceleration.", example="{X: 5040, Z: 6300}"),
+            "LinuxCNC: MAX_ACCELERATION of axes when streams run, at least 1.05 times what "
+            "profiles use. Left out: 1.05 times limit.acceleration.", example="{X: 5040, Z: 6300}"),
         Key("override_guard", Flag(),
             "LinuxCNC: run a stream at 100 % rapid and feed override and without single step only, "
             "else the original block (needs the HAL lines of `gcodejerk install linuxcnc`).",

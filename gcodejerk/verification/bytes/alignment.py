@@ -14,6 +14,7 @@ import numpy as np
 from gcodejerk.advice import STAMP_NOTES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, REASONS, Program, find_dialect
+from gcodejerk.verification.bytes.aligned_form import AlignedReader
 from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
 from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.bytes.source import Window, skip_common
@@ -22,6 +23,8 @@ from gcodejerk.verification.findings import Findings, Kind
 _STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
 _TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400")
 """How a stream may begin."""
+ALIGNED = ("linuxcnc",)
+"""Controllers whose streams have blocks that end on servo periods."""
 
 
 class Alignment:
@@ -46,6 +49,7 @@ class Alignment:
         """Text of the block whose stream was found last."""
         self.dialect = find_dialect(program.dialect)
         self.decimals = decimals_of(machine)
+        self.aligned = machine.controller in ALIGNED
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 
@@ -68,7 +72,8 @@ class Alignment:
                 self.kept += 1
             else:
                 text = block[: end - begin]
-                reader = StreamReader(
+                form = AlignedReader if self.aligned else StreamReader
+                reader = form(
                     self.processed,
                     rapids,
                     i,

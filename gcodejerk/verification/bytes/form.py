@@ -50,6 +50,8 @@ class Stream:
     """Axes of the points in `text`, in the order written."""
     text: bytes
     """The points that are written alike."""
+    lead: list[dict[str, Decimal]] = field(default_factory=list)
+    """What stands in front of them and moves an axis a little, by letter."""
     rest: list[dict[str, Decimal]] = field(default_factory=list)
     """The points after these, by letter, F included."""
 
@@ -71,7 +73,7 @@ class Stream:
             axis = letter.decode()
             if axis in sums:
                 sums[axis] = _EXACT.add(sums[axis], Decimal(number.decode()))
-        for words in self.rest:
+        for words in (*self.lead, *self.rest):
             for axis, number in words.items():
                 sums[axis] = _EXACT.add(sums.get(axis, Decimal(0)), number)
         return sums
@@ -98,7 +100,7 @@ def head_of(block: Block, text: bytes, dialect: Dialect) -> tuple[bytes, bool]:
 
 
 @lru_cache(maxsize=256)
-def _run_of(point: bytes, line_end: bytes) -> re.Pattern[bytes]:
+def run_of(point: bytes, line_end: bytes) -> re.Pattern[bytes]:
     """Points of one pattern, one after another, at most LINES_AT_ONCE of them.
 
     A repeat remembers every turn that it could still take back; so it is bounded, and repeated.
@@ -108,7 +110,7 @@ def _run_of(point: bytes, line_end: bytes) -> re.Pattern[bytes]:
 
 
 def _run_end(pattern: re.Pattern[bytes], data: bytes, begin: int, end: int) -> int:
-    """Where the lines end that a pattern of `_run_of` matches one behind the other."""
+    """Where the lines end that a pattern of `run_of` matches one behind the other."""
     while match := pattern.match(data, begin, end):
         begin = match.end()
     return begin
@@ -334,7 +336,7 @@ class StreamReader:
     def _run(self, letters: str) -> re.Pattern[bytes]:
         """Points with these axes, spelled as they may be."""
         inch = bool(self.rapids.inch[self.i])
-        return _run_of(point_pattern(letters, self.decimals, self.dialect, inch), self.line_end)
+        return run_of(point_pattern(letters, self.decimals, self.dialect, inch), self.line_end)
 
     def _end_of_points(self, ending: int | None) -> None:
         """The last point ends in a standstill where the rapid did."""
@@ -369,6 +371,11 @@ class StreamReader:
         if number := too_long_a_number(line, b""):
             self.complain(Kind.FORM, f"{number[:20].decode()}... has more digits than any word")
         self.last(more=bool(stops))
+        return self._stops()
+
+    def _stops(self) -> bool:
+        """Pass what the control runs when the motion has ended."""
+        stops = list(self.allowed.behind)
         if stops:
             line = self.window.peek_line().rstrip(b"\r\n")
             written = read_words(line) or []

@@ -63,11 +63,35 @@ class Paths:
     """Smallest step that is written of each axis, shape (k, 9). [mm] or [deg]"""
     lone: NDArray[np.bool_]
     """As in `nc.Rapids`."""
+    lead: Index
+    """Rows behind the start that come before the first point, of each stream."""
 
     @property
     def count(self) -> Index:
         """Blocks of each stream."""
         return self.end - self.begin - 1
+
+    def take(self, streams: Index) -> Paths:
+        """Some of the streams."""
+        rows = np.concatenate([np.arange(self.begin[k], self.end[k]) for k in streams.tolist()])
+        size = self.end[streams] - self.begin[streams]
+        end = np.cumsum(size)
+        return Paths(
+            rapid=self.rapid[streams],
+            original_line=self.original_line[streams],
+            line=self.line[streams],
+            begin=end - size,
+            end=end,
+            position=self.position[rows],
+            feed=self.feed[rows],
+            start=self.start[streams],
+            displacement=self.displacement[streams],
+            unit=self.unit[streams],
+            speed=self.speed[streams],
+            step=self.step[streams],
+            lone=self.lone[streams],
+            lead=self.lead[streams],
+        )
 
     @property
     def owner(self) -> Index:
@@ -90,7 +114,7 @@ class Reader:
         """Compare axes and end with the words of the block, exactly; whether the axes are right."""
         wanted = self._wanted(stream.rapid, block)
         line = stream.line + stream.text.count(b"\n") + len(stream.rest) - 1
-        used = set(stream.letters).union(*stream.rest) - {"F"}
+        used = set(stream.letters).union(*stream.rest, *stream.lead) - {"F"}
         if not used <= set(wanted):
             axis = min(used - set(wanted))
             self._complain(
@@ -150,19 +174,23 @@ class Reader:
         index = np.array([stream.rapid for stream in streams], dtype=np.int64)
         fast = _fast_points(streams)
         counts = np.array(
-            [len(f) + len(s.rest) for f, s in zip(fast, streams, strict=True)], dtype=np.int64
+            [len(s.lead) + len(f) + len(s.rest) for f, s in zip(fast, streams, strict=True)],
+            dtype=np.int64,
         )
         end = np.cumsum(counts + 1)
         begin = end - counts - 1
         raw = np.full((int(end[-1]), len(AXES) + 1), np.nan)
         for stream, first, numbers in zip(streams, begin.tolist(), fast, strict=True):
             columns = [_COLUMN[letter] for letter in stream.letters + "F"]
-            at = first + 1 + len(numbers)
-            raw[first + 1 : at, columns] = numbers
-            for words in stream.rest:
+            begun = first + 1 + len(stream.lead)
+            raw[begun : begun + len(numbers), columns] = numbers
+            others = (
+                *range(first + 1, begun),
+                *range(begun + len(numbers), begun + len(numbers) + len(stream.rest)),
+            )
+            for at, words in zip(others, (*stream.lead, *stream.rest), strict=True):
                 for letter, value in words.items():
                     raw[at, _COLUMN[letter]] = value
-                at += 1
         start = np.nan_to_num(rapids.start[index])
         displacement = rapids.target[index] - rapids.start[index]
         displacement = np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0)
@@ -190,6 +218,7 @@ class Reader:
             speed=rapids.speed[index],
             step=np.where(rapids.inch[index, np.newaxis], self.inch_step, self.step),
             lone=rapids.lone[index],
+            lead=np.array([len(s.lead) for s in streams], dtype=np.int64),
         )
 
 

@@ -59,9 +59,7 @@ class Excess:
         return self.stream.tolist(), self.left.tolist(), self.allowed.tolist()
 
 
-def leaves_more(
-    paths: Paths, machine: Machine, moment: Index, limits: Array, *, straight: bool
-) -> Excess:
+def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) -> Excess:
     """Find the streams that leave more vibration than the controller's own rapid.
 
     Parameters
@@ -74,10 +72,8 @@ def leaves_more(
         When each point is reached, since the start of its stream. [intervals]
     limits : ndarray, shape (3, streams, 9)
         Of the controller's own rapid, over the displacement of each axis. [1/s], [1/s^2], [1/s^3]
-    straight : bool
-        The control moves in straight lines between the points.
     """
-    straight = straight and machine.design.profile not in UNJUDGED
+    straight = machine.design.profile not in UNJUDGED
     streams = _Streams(paths, machine, moment, limits, straight)
     modes = Oscillators.of(machine)
     none = Excess(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))

@@ -1,0 +1,116 @@
+"""The controller's own rapids as verification judges them: their limits, and how long they take.
+
+Rule: times are whole intervals, the designs' and the own ones alike; who takes longer than the
+machine file allows is refused elsewhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gcodejerk.axes import AXES
+from gcodejerk.machine import BELL, LINUXCNC, LONE_SHARE, Machine
+from gcodejerk.verification.physics.conventional import rapid_time
+from gcodejerk.verification.physics.oscillators import Oscillators
+from gcodejerk.verification.physics.points import LINEAR, Array, Index, Paths
+
+ON_GRID = 1e-6
+"""A time this little off a whole number of intervals is that number. [intervals]"""
+
+
+def rapid_limits(paths: Paths, machine: Machine) -> Array:
+    """Limits of the controller's own rapid over the displacement, shape (3, moves, 9)."""
+    rapid = np.full((3, len(AXES)), np.inf)
+    for axis in machine.axes:
+        own = axis.conventional(lone=False)
+        rapid[:, AXES.index(axis.name)] = own.velocity, own.acceleration, own.jerk
+    with np.errstate(divide="ignore"):
+        out: Array = rapid[:, np.newaxis, :] / np.abs(paths.displacement)
+        if machine.planner == LINUXCNC:
+            out[1] *= np.where(paths.lone, LONE_SHARE, 1.0)[:, np.newaxis]
+        # A rapid that runs at F does so along its path, in which all axes share.
+        length = np.sqrt((paths.displacement[:, LINEAR] ** 2).sum(axis=1))
+        out[0] = np.fmin(out[0], (paths.speed / length)[:, np.newaxis])
+    return out
+
+
+def limits_of(machine: Machine) -> Array:
+    """Velocity, acceleration and jerk that a design may use, shape (3, 9); infinite without axis.
+
+    An axis without a jerk limit stands any jerk; from one interval to the next its acceleration can
+    then go from one limit to the other.
+    """
+    out = np.full((3, len(AXES)), np.inf)
+    for axis in machine.axes:
+        limit = axis.limit
+        jerk = (
+            limit.jerk if np.isfinite(limit.jerk) else 2.0 * limit.acceleration / machine.interval
+        )
+        out[:, AXES.index(axis.name)] = limit.velocity, limit.acceleration, jerk
+    return out
+
+
+def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
+    """Whole intervals that rapids take conventionally, and those that they may take at most."""
+    displacement = paths.displacement
+    total = _move_time(rapid_limits(paths, machine), displacement, machine, machine.planner == BELL)
+    usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
+    longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
+    if machine.design.profile == "shortest":
+        longest = _longest(total, displacement, machine)
+    most = np.maximum(usual, longest)
+    return usual.astype(np.int64), most.astype(np.int64)
+
+
+def _move_time(limits: Array, displacement: Array, machine: Machine, bell: bool = False) -> Array:
+    """Duration [s] of the fastest symmetric moves within limits, shape (3, moves, 9)."""
+    if machine.positioning == "linear":
+        return rapid_time(*limits.min(axis=2), bell=bell)
+    total: Array = _axis_times(limits, displacement, bell).max(axis=1, initial=0.0)
+    return total
+
+
+def _axis_times(limits: Array, displacement: Array, bell: bool = False) -> Array:
+    """The same for each axis by itself, shape (moves, 9)."""
+    moving = displacement != 0.0
+    each = np.zeros(displacement.shape)
+    each[moving] = rapid_time(*limits[:, moving], bell=bell)
+    return each
+
+
+def own_times(paths: Paths, machine: Machine) -> tuple[Array, Array]:
+    """What each axis takes by itself [s], shape (moves, 9): conventionally, and at most."""
+    dt, displacement = machine.interval, paths.displacement
+    each = _axis_times(rapid_limits(paths, machine), displacement, machine.planner == BELL)
+    usual = np.ceil(each / dt - ON_GRID)
+    if machine.design.profile == "shortest":
+        alone = _axis_times(_own_limits(displacement, machine), displacement)
+        longest = np.ceil((np.maximum(each, alone) + 2.0 * _periods(machine)) / dt)
+    else:
+        longest = np.floor(each * (1.0 + machine.design.max_extension) / dt + ON_GRID)
+    return usual * dt, np.maximum(usual, longest) * dt
+
+
+def _own_limits(displacement: Array, machine: Machine) -> Array:
+    """Limits of designs over the displacement, shape (3, moves, 9)."""
+    with np.errstate(divide="ignore"):
+        V, A, J = limits_of(machine)[:, np.newaxis, :] / np.abs(displacement)
+    # A design's acceleration rises for an interval at least.
+    return np.stack([V, A, np.minimum(J, A / machine.interval)])
+
+
+def _periods(machine: Machine) -> float:
+    """One period of every mode, one behind the other, in s."""
+    return float((2.0 * np.pi / Oscillators.of(machine).poles.imag).sum())
+
+
+def _longest(total: Array, displacement: Array, machine: Machine) -> Array:
+    """Intervals after which a rapid of the profile `shortest` is settled in any case.
+
+    Two periods of every mode are enough to leave it at rest, whatever it does before; the time
+    itself is that of the controller, or the least that the limits allow where that is longer.
+    """
+    fastest = _move_time(_own_limits(displacement, machine), displacement, machine)
+    time = np.maximum(total, fastest) + 2.0 * _periods(machine)
+    longest: Array = np.ceil(time / machine.interval)
+    return longest
