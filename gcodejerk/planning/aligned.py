@@ -69,11 +69,9 @@ MOST_MODES = 24
 """Oscillators whose responses are fitted: of a spectrum the strongest."""
 ROUNDS = 6
 """Of an iteration whose steps shrink by the rounding of a position."""
-SLOW = 20.0
-"""Speeds below this are kept from dips that rounding would make. [mm/s]"""
-EARLIEST = 2e-6
-"""A block may end so much before its period: until then the control runs the next one at full
-acceleration, which changes its speed by some 0.01 mm/s. [s]"""
+EARLIEST, SLOW = 2e-6, 1.0
+"""A block that is faster than this may end so much before its period: until then the control runs
+the next one at full acceleration, which changes its speed by some 0.01 mm/s. [s], [mm/s]"""
 TOLERANCE = 0.01
 """How far a stream may be played from its profile. [mm]"""
 LINEAR = "XYZ"
@@ -325,7 +323,7 @@ def _knots(moves: _Moves, stride: int) -> tuple[Counts, NDArray[np.bool_]]:
         at = np.take_along_axis(
             speed[left], speed.shape[1] - 1 - moves.count[left, np.newaxis] + part, axis=1
         )
-        kick = full[left] * early_ends(part * interval, at, np.zeros(at.shape), full[left])
+        kick = full[left] * early_ends(part, at, full[left], interval)
         calm = kick < KICK
         # Longer blocks make a slow start less delicate: taken until they no longer need to be.
         taken = left[(far & calm) | ~enough[left]]
@@ -338,38 +336,41 @@ def _knots(moves: _Moves, stride: int) -> tuple[Counts, NDArray[np.bool_]]:
     return knots, enough
 
 
-def early_ends(time: Array, speed: Array, early: Array, acceleration: Array) -> Array:
-    """By how much blocks end before their periods at most, in front of which others did.
+def early_ends(knots: Counts, speed: Array, acceleration: Array, interval: float) -> Array:
+    """By how much blocks end before their periods at most, all but the last ones.
 
     The rest of a period is run in the next block at full acceleration A, before its ramp begins:
-    what a block ended too early by, the next one does by 1 + h (A - a)/(v_k + v_(k+1)) as much.
+    what a block ended too early by, the next one does by 1 + h (A - a)/(v_k + v_(k+1)) as much,
+    so that `HAIR` grows.
 
     Parameters
     ----------
-    time, speed : ndarray, shape (b, k)
-        Of the knots. [s], [mm/s]
-    early : ndarray, shape (b, k)
-        By how much each ends too early by itself, besides `HAIR`. [s]
+    knots : ndarray of int, shape (b, k)
+        [intervals]
+    speed : ndarray, shape (b, k)
+        [mm/s]
     acceleration : ndarray, shape (b,)
         [mm/s^2]
+    interval : float
+        [s]
 
     Returns
     -------
     ndarray, shape (b,)
         [s]
     """
-    h, both = np.diff(time, axis=1), speed[:, 1:] + speed[:, :-1]
+    h, both = np.diff(knots, axis=1) * interval, speed[:, 1:] + speed[:, :-1]
     rise = np.diff(speed, axis=1)
     growth = 1.0 + (acceleration[:, np.newaxis] * h - rise) / np.maximum(both, CREEP)
     # No faster than F, which the speed at the end of the block is.
     bound = np.maximum(np.abs(rise), CREEP) / acceleration[:, np.newaxis]
-    now = np.zeros(len(time))
-    most = np.zeros(len(time))
+    now = np.zeros(len(knots))
+    most = np.zeros(len(knots))
     # In the last blocks hardly any speed is left that could change.
     for k in range(h.shape[1] - LAST):
         begun = h[:, k] > 0.0
         now = np.where(begun, np.minimum(now, bound[:, k]) * growth[:, k], now)
-        now += np.where(begun, HAIR + early[:, k + 1], 0.0)
+        now += np.where(begun, HAIR, 0.0)
         most = np.maximum(most, now)
     return most
 
@@ -500,7 +501,7 @@ class _Written:
     speed : ndarray, shape (b, k)
         Along the path; that of the last column is the tail's. [mm/s]
     early : ndarray, shape (b,)
-        By how much a block ends before its period, at most, besides `HAIR`. [s]
+        By how much a block that is not slow ends before its period, besides `HAIR`. [s]
     """
 
     moves: _Moves
@@ -559,15 +560,6 @@ class _Written:
             here = np.where(runs[:, np.newaxis], whole_of(begin + to), whole[:, k - 1])
             there = np.where(moving, here * size, 0.0)
             before, length = length, np.sqrt(((there - position) ** 2).sum(axis=1))
-            # Slow blocks go on getting faster, or slower, at the cost of a step.
-            change = 2.0 * (length / whole_h - speed[:, k - 1])
-            wanted = np.sign(speeds[:, k] - speeds[:, k - 1])
-            slow = runs & ~first & (change * wanted < 0.0) & (speeds[:, k] < SLOW)
-            if slow.any():
-                at = np.flatnonzero(slow)
-                here[at, leading[at]] += (wanted[at] * sign[at]).astype(np.int64)
-                there = np.where(moving, here * size, 0.0)
-                length = np.where(slow, np.sqrt(((there - position) ** 2).sum(axis=1)), length)
             way[:, k] = way[:, k - 1] + np.where(runs, length, 0.0)
             speed[:, k] = np.where(runs, 2.0 * length / whole_h - speed[:, k - 1], 0.0)
             dip = runs & ~first & (speed[:, k - 1] < speed[:, k - 2])
@@ -580,7 +572,7 @@ class _Written:
                 )
                 speed[at, k - 1], speed[at, k], early[at] = ends
                 early[at] = lasts[at] - early[at]
-                most = np.maximum(most, early)
+                most = np.maximum(most, np.where(speed[:, k - 1] > SLOW, early, 0.0))
             lasts = whole_h + early
             whole[:, k] = here
             position = np.where(runs[:, np.newaxis], there, position)

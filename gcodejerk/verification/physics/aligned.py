@@ -36,8 +36,11 @@ Rows = NDArray[np.bool_]
 Reported = Mapping[int, Array]
 """Line of a rapid to rows of duration [s] and jerk [mm/s^3] of its profile."""
 
-EARLY = (1e-12, 2.1e-6)
-"""By how much a block has to end in front of a period, at least and at most. [s]"""
+LEAST_EARLY, EARLY, SLOWLY = 1e-12, 2.1e-6, 1e-4
+"""By how much a block has to end in front of a period: at least, at most, and where it is slower
+than `SLOW`, since the rest of the period is run at most at the speed of the next one. [s]"""
+SLOW = 1.0
+"""[mm/s]"""
 SHORTEST, ENDS = 2, 3
 """Periods of a block, and of the first and the last one, at least."""
 LONGEST = 0.01
@@ -140,7 +143,8 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
     inner = point & ~tail
     count = np.rint(motion.time / interval)
     early = count * interval - motion.time
-    off = inner & ((early < EARLY[0]) | (early > EARLY[1]))
+    most_early = np.where(motion.after < SLOW, SLOWLY, EARLY)
+    off = inner & ((early < LEAST_EARLY) | (early > most_early))
     lasts = np.where(first, count, count - np.roll(count, 1))
     last = np.roll(tail, -1)
     short = inner & (lasts < np.where(first | last, ENDS, SHORTEST))
