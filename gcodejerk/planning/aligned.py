@@ -47,6 +47,8 @@ TAIL, CREEP = 2e-5, 0.01
 """Way at the end that is crept, and its speed, which is the least of all speeds. [mm], [mm/s]"""
 HEADROOM, USED = 1.05, 0.99
 """MAX_ACCELERATION over what profiles use at least, and the share of it that speeds may use."""
+SLACK = 2e-5
+"""Share of the velocity limit that is left to rounding."""
 FULLEST = 1.5
 """The same at most, where the machine file does not say it."""
 FEEDBACK = 0.2
@@ -126,7 +128,9 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         conventional_residual=sampler.conventional_residual(),
         worst_in_band=worst,
         profiles=sampler.profiles,
-        unplayable=~(moves.possible & enough) | (off > TOLERANCE) | (written.early > EARLIEST),
+        unplayable=~(moves.possible & enough & _within(moves, knots, written.speed[:, :-1]))
+        | (off > TOLERANCE)
+        | (written.early > EARLIEST),
         path_speed=written.speed,
     )
 
@@ -391,9 +395,22 @@ def _followed(moves: _Moves, knots: Counts) -> Array:
         h = np.diff(knots[left], axis=1) * moves.sampler.interval
         way = np.cumsum(0.5 * h * (speeds[:, 1:] + speeds[:, :-1]), axis=1)
         off = np.abs(way - exact[left, 1:]).max(axis=1, initial=0.0)
-        left = left[off > NEAR * TOLERANCE]
+        keeps = _within(moves.take(left), knots[left], speeds)
+        left = left[(off > NEAR * TOLERANCE) | ~keeps]
         if not len(left):
             break
+    return out
+
+
+def _within(moves: _Moves, knots: Counts, speeds: Array) -> NDArray[np.bool_]:
+    """Whether speeds at knots keep the limits, up to what rounding adds."""
+    h = np.diff(knots, axis=1) * moves.sampler.interval
+    runs = h > 0.0
+    rise = np.abs(np.diff(speeds, axis=1)) / np.where(runs, h, 1.0)
+    most = (moves.most / USED)[:, np.newaxis] * (1.0 + 1e-6)
+    rounding = 2.0 * moves.step[:, np.newaxis] / np.where(runs, h, 1.0) ** 2
+    fast = (speeds > moves.velocity[:, np.newaxis] * (1.0 + 1e-6)).any(axis=1)
+    out: NDArray[np.bool_] = ~((rise > most + rounding) & runs).any(axis=1) & ~fast
     return out
 
 
@@ -425,7 +442,7 @@ def _fitted(moves: _Moves, knots: Counts, emphasis: float) -> Array:
         end_speed=CREEP * share,
         acceleration=moves.most * interval * share,
         least=CREEP * share,
-        most=moves.velocity * share,
+        most=(1.0 - SLACK) * moves.velocity * share,
         kind=block_kinds(speed),
         poles=poles,
         response=response,
