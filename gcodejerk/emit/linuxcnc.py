@@ -34,10 +34,10 @@ from gcodejerk.emit.gcode import line_ends_of
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.machine import LINUXCNC, Machine
 from gcodejerk.nc import Dialect, Rapids, parse_block
-from gcodejerk.planning.aligned import HEADROOM
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.straight import HEADROOM
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002

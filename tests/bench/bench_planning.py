@@ -14,9 +14,9 @@ from timing import best_of
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
+from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.designs import _remembered
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.stream import make_streams
 
 

@@ -12,8 +12,8 @@ import pytest
 from gcodejerk import Machine, plan_move, process
 from gcodejerk.axes import AXES
 from gcodejerk.emit.feeds import end_feeds, mean_feeds
-from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.batch import NumberFormat
+from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.stream import make_streams
 from gcodejerk.verification import Kind, verify, verify_files
 

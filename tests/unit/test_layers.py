@@ -49,7 +49,7 @@ ROOMS = {
     profiles
  <- residual
  <- amplitudes sampling shapers
- <- maps rounding | search
+ <- maps rounding | search | servo
 """),
     "machine": order("""
     parts problems reading

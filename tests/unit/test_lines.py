@@ -7,10 +7,10 @@ from scipy.linalg import expm
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion import Grid
+from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.lines import Play, block_times, missing_times, played_positions
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.stream import make_streams
 
 MACHINE = Machine.loads(

@@ -9,9 +9,9 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion import polyline_response, sample_profiles
 from gcodejerk.planning import stream
+from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.stream import FINE_DECIMALS, make_streams
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.sampling import Counts
-from gcodejerk.motion.spline_filter import filter_gain
+from gcodejerk.motion.servo.spline_filter import filter_gain
 
 PENALTY = 1e7
 """Stiffness of a limit, against 1 of the speed of an interval."""
