@@ -113,7 +113,7 @@ class LinuxcncController(Controller):
         if plans.machine.positioning != "linear":
             notes.append(
                 "LinuxCNC itself moves G0 in a straight line, but the machine file says "
-                "positioning: independent; rapids of several axes are written as its dogleg"
+                "positioning: independent; rapids of several axes are left alone"
             )
         notes += _too_slow(plans)
         open_mode = plans.planned & (rapids.path == 0)

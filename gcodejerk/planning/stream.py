@@ -87,7 +87,7 @@ def _make_batch(
     moves: NDArray[np.int64],
     number_format: NumberFormat,
     stride: int,
-    play: Play,
+    play: Play = Play.TABLE,
 ) -> Batch:
     """One batch, without moves that would be worse or played otherwise; these are ruled out."""
     sampler = Sampler(plans, moves, number_format.take(moves))

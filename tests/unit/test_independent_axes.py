@@ -82,7 +82,8 @@ def test_every_report_says_so():
     assert set(row["arrival"]) == set(row["conventional_arrival"]) == {"X", "Y"}
     assert row["path_deviation"] > 0.05
     assert "independent" in record["notes"][0]
-    result = process(b"G21 G90\nG0 X200. Y60.\nM2\n", DOGLEG)
+    program = b"G21 G90\nG0 X200. Y60.\nM2\n"
+    result = process(program, DOGLEG, controller="mach", dialect="linuxcnc")
     assert result.deviation[0] == pytest.approx(row["path_deviation"], rel=0.05)
     assert any("each axis moves and arrives on its own" in note for note in result.notes)
     assert not any("independent" in note for note in process(b"G0 X200.\nM2\n", STRAIGHT).notes)
@@ -102,7 +103,7 @@ def test_axes_that_are_quiet_enough_alone_may_be_too_loud_together():
     blocks = "G91 G0 X-0.62 Z0.82\nX-0.58 Z0.29\nX0.89 Z0.78\nX0.3 Z0.5\nZ0.4\n"
     program = f"G21 G94 F10\n{blocks}M2\n".encode()
     # What is written is proved: no mode keeps more than the tolerance, or than today's rapid.
-    made = process(program, machine, profile="shortest", controller="linuxcnc")
+    made = process(program, machine, profile="shortest", controller="mach", dialect="linuxcnc")
     left = {rapid.reason for rapid in made.rapids if not rapid.rewritten}
     assert left == {"no profile within the limits is better"}
     assert made.planned > 0

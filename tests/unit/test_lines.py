@@ -101,20 +101,6 @@ def test_blocks_without_length_are_skipped_at_the_ends_and_made_up_for_in_the_mi
     assert played_positions(q, times, grid)[1].tolist() == q[1].tolist()
 
 
-def test_a_mode_near_half_the_sampling_rate_is_judged_by_the_stream():
-    """Blocks of 2 ms excite 240 Hz, of which the profile between them knows nothing."""
-    rows = np.zeros((20, 2))
-    rows[:, 0] = np.linspace(3.0, 60.0, 20)
-    left = {}
-    for play in (Play.HELD, Play.PROFILE):
-        for batch in batches(rows, play):
-            for row, move in enumerate(batch.moves):
-                left.setdefault(int(move), {})[play] = float(batch.residual[row, 1])
-    both = [each for each in left.values() if len(each) == 2]
-    assert len(both) > 5
-    assert any(each[Play.HELD] > 2.0 * each[Play.PROFILE] for each in both)
-
-
 def test_a_plan_is_judged_in_the_form_of_its_control_and_has_a_point_for_every_interval():
     move = {"X": 37.3, "Z": -20.0}
     table = plan_move(move, MACHINE)

@@ -323,8 +323,8 @@ _CONTROLLER_OPTIONS = Section(
             "LinuxCNC 2.10: [TRAJ] PLANNER_TYPE, 0 trapezoidal, 1 S-curves, which stop in every "
             "block of a stream.", example="0"),
         Key("servo_period", Number("s", above=0.0, smallest=1e-6, at_most=1.0),
-            "LinuxCNC: what `halcmd show thread` says of the servo thread; interval has to be the "
-            "same. (With a BASE_PERIOD of 30000 ns, 1 ms becomes 0.99 ms.)", example="0.001"),
+            "LinuxCNC: what `halcmd show thread` says of the servo thread (with a BASE_PERIOD of "
+            "30000 ns, 1 ms becomes 0.99 ms); interval has to be the same.", example="0.001"),
         Key("optimization_depth", Number("-", at_least=20.0, at_most=100000.0),
             "LinuxCNC: [TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH, the blocks that it looks ahead.",
             default=50.0, example="50"),
@@ -334,7 +334,7 @@ _CONTROLLER_OPTIONS = Section(
             "profiles use. Left out: 1.05 times limit.acceleration.", example="{X: 5040, Z: 6300}"),
         Key("override_guard", Flag(),
             "LinuxCNC: run a stream at 100 % rapid and feed override and without single step only, "
-            "else the original block (needs the HAL lines of `gcodejerk install linuxcnc`).",
+            "else the original block; needs the HAL lines of `gcodejerk install linuxcnc`.",
             default=False),
     )
 )  # fmt: skip

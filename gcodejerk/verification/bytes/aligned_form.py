@@ -11,13 +11,12 @@ import re
 from decimal import Decimal
 
 from gcodejerk.axes import AXES
-from gcodejerk.verification.bytes.allowed import point_pattern
 from gcodejerk.verification.bytes.form import Stream, StreamReader, run_of
 from gcodejerk.verification.bytes.modes import read_words
 from gcodejerk.verification.findings import Kind
 
-DECIMALS = 3
-"""Decimals of points, with those that `point_pattern` adds where a control computes in doubles."""
+DECIMALS, FEED_DECIMALS = 7, 12
+"""Of positions and of F, at most."""
 Words = list[tuple[str, Decimal]]
 
 
@@ -65,9 +64,12 @@ class AlignedReader(StreamReader):
 
     def _run(self, letters: str) -> re.Pattern[bytes]:
         """Points with these axes, as many decimals as this form has."""
-        inch = bool(self.rapids.inch[self.i])
-        decimals = dict.fromkeys(letters, DECIMALS)
-        return run_of(point_pattern(letters, decimals, self.dialect, inch), self.line_end)
+        # LinuxCNC computes in doubles, in whatever dialect the program was written.
+        words = b"".join(
+            rb" %c-?(?:0|[1-9][0-9]{0,8})\.[0-9]{1,%d}" % (ord(a), DECIMALS) for a in letters
+        )
+        feed = rb" F(?:0|[1-9][0-9]{0,8})\.[0-9]{1,%d}" % FEED_DECIMALS
+        return run_of(b"G1" + words + feed, self.line_end)
 
     def _one_axis(self, code: int) -> dict[str, Decimal] | None:
         """The words of a line that moves one axis; None where it is none."""

@@ -27,7 +27,7 @@ INCH_FINER = 2
 MOST_DECIMALS = 12
 STANDSTILL = 1e-9
 """An axis that moves less does not move. [mm] or [deg]"""
-FEED_DIGITS, FEED_DECIMALS = 9, 12
+FEED_DIGITS, FEED_DECIMALS = 9, 8
 Words = list[tuple[str, Decimal]]
 
 
