@@ -99,7 +99,7 @@ class GcodeController(Controller):
         points = self._points(batch, rapids, line_ends, feeds, writing_of(dialect).doubles)
         out = []
         for row, move in enumerate(moves):
-            frame = _Frame(rapids, int(move), parsed[row], blocks[row], dialect)
+            frame = Frame(rapids, int(move), parsed[row], blocks[row], dialect)
             last = frame.last_point(points[row].before_end, feeds.of_end(row))
             follows = _follows_stream(batch.plans, rapids, int(move))
             lines = [
@@ -199,7 +199,7 @@ class _Points:
     before_end: dict[int, Decimal]
 
 
-class _Frame:
+class Frame:
     """The lines around a move's points: what its block says besides, and what it relies on."""
 
     def __init__(
@@ -263,6 +263,11 @@ class _Frame:
         words = [self._last_word(word, before_end) for word in self.axis_words]
         words.append(b"F" + _plain(feed))
         return b" ".join([b"G1", *self._ending(), *words])
+
+    def rapid_end(self, before_end: dict[int, Decimal]) -> bytes:
+        """The block's own axis words as a rapid, or what is left of its increments."""
+        words = [self._last_word(word, before_end) for word in self.axis_words]
+        return b" ".join([b"G0", *self._ending(), *words])
 
     def _ending(self) -> list[bytes]:
         """What lets the last point end in a standstill where the rapid did."""

@@ -38,6 +38,7 @@ from gcodejerk.planning.lines import (
     block_times,
     missing_times,
     played_positions,
+    smoothed,
     undecayed,
     worst_of_lines,
 )
@@ -337,6 +338,8 @@ class _Maker:
             response[:, felt] += found * participation[felt]
         residual = residual_displacement(response, self.modes.poles)
         residual *= undecayed(early, self.modes.poles * self.interval)
+        if self.play is Play.SCALED:
+            residual *= smoothed(self.modes.poles * self.interval)
         worst = self.plans.worst_in_band[self.moves]
         if np.isfinite(worst).any():
             band = self.plans.machine.design.band

@@ -45,6 +45,7 @@ class Kind(enum.StrEnum):
     TIME = "duration"
     RESIDUAL = "residual"
     TABLE = "table"
+    SAMPLES = "samples"
     CYCLE = "moves of a cycle"
     READING = "second reading"
     SERIES = "cycle that had to be left to the controller"
