@@ -40,6 +40,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
 from gcodejerk.emit.gcode import LINE_ENDS, Frame, GcodeController
 from gcodejerk.emit.linuxcnc import LinuxcncController
+from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
@@ -56,9 +57,13 @@ TINY = 1e-6
 """Length of the blocks around a rapid [mm]."""
 TINY_FEED = 0.6
 """Their F [mm/min]."""
+REST = 5
+"""Periods after which the filter behind the planner is at rest; it has three."""
 DECIMALS = 10
 """Of the points in between; LinuxCNC computes in doubles."""
 FEED_DECIMALS = 8
+SAMPLE_DECIMALS = 12
+"""Of a share: of a way of 1 m, half of 1e-9 mm."""
 FINEST = 1e-9
 """Steps in which the samples are counted, which are written finer than that [mm]."""
 
@@ -125,23 +130,20 @@ class LinuxcncHalController(GcodeController):
         """What has to be installed, and how the form behaves at the machine."""
         if not plans.planned.any():
             return []
-        form = "" if self.form == ADAPTIVE else " --form position"
-        notes = [
-            f"the program needs its file {self.beside} beside it, and HAL files of `gcodejerk "
-            f"install linuxcnc INI{form}`: see docs/linuxcnc-hal.md"
-        ]
+        notes = []
         if self.form == ADAPTIVE:
             notes += LinuxcncController().notes(rapids, plans)
             notes.append(
                 "run it from its start: behind run-from-line the machine stands still at the first "
-                "stream; after a feed hold or at another feed override the rest of a rapid is "
-                "LinuxCNC's own trapezoid"
+                "stream; streams are feed moves, rapid override does nothing to them; behind a "
+                "feed hold, and at another feed override than 100 %, LinuxCNC's own trapezoid ends "
+                "them"
             )
         else:
             notes.append(
                 "run it from its start: behind run-from-line the machine stands still at the first "
                 "stream; feed hold stops at the end of a rapid, abort in it, and then the machine "
-                "has to be switched on again"
+                "has to be switched on again; overrides do nothing to a stream"
             )
         return notes
 
@@ -169,12 +171,13 @@ class LinuxcncHalController(GcodeController):
                 if way[AXES.index(axis.name)]
             )
             move = int(batch.moves[row])
+            ways = " ".join(_number(value) for value in way[:3].tolist())
             head = (
-                f"rapid {move + 1} {int(rapids.line[move])} {len(samples)} "
-                f"{float(way[0])!r} {float(way[1])!r} {float(way[2])!r} {float(braking)!r}"
+                f"rapid {move + 1} {int(rapids.line[move])} {len(samples)} {ways} {braking:.12g}\n"
             )
-            lines = [head, *(repr(value) for value in samples.tolist())]
-            out.append("".join(line + "\n" for line in lines).encode())
+            numbers = np.rint(samples * 10.0**SAMPLE_DECIMALS).astype(np.int64)
+            text, _ = format_lines([Column(b"", numbers, SAMPLE_DECIMALS)], b"\n")
+            out.append(head.encode() + text)
         return out
 
     def render(
@@ -192,9 +195,8 @@ class LinuxcncHalController(GcodeController):
             line_end = newline if last_end in (b"", b"\r") else last_end
             block = parse_block(blocks[row], options.dialect)
             frame = Frame(rapids, move, block, blocks[row], options.dialect)
-            middle = (
-                self._adaptive(frame, batch, row) if self.form == ADAPTIVE else _position(frame)
-            )
+            adaptive = self.form == ADAPTIVE
+            middle = self._adaptive(frame, batch, row) if adaptive else _position(frame, batch)
             lines = [*frame.head(options.comments), *middle]
             out.append(line_end.join(line for line in lines if line) + last_end)
         return out
@@ -216,15 +218,20 @@ class LinuxcncHalController(GcodeController):
         ]
 
 
-def _position(frame: Frame) -> list[bytes]:
+def _position(frame: Frame, batch: Batch) -> list[bytes]:
     """LinuxCNC's own rapid, between asking and waiting."""
     return [
-        b"G4 P0.005",
+        b"G4 P%g" % (REST * batch.grid.interval),
         b"M68 E3 Q%d" % (frame.move + 1),
         frame.rapid_end({}),
         b"M66 P3 L3 Q3600",
         *frame.tail()[1:],
     ]
+
+
+def _number(value: float) -> str:
+    """A length as it was meant."""
+    return repr(round(value, 12) + 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

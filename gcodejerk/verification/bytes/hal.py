@@ -24,6 +24,8 @@ CONTROLLER = "linuxcnc-hal"
 ADAPTIVE, POSITION = "adaptive-feed", "position"
 FORMS = (ADAPTIVE, POSITION)
 PIECE = 1 << 20
+REST = 5
+"""Periods for which LinuxCNC's filter is given to come to rest."""
 _HEAD = re.compile(rb"gcodejerk streams 1 ([a-z-]{1,20}) ([0-9.e-]{1,25})\n")
 _TINY = (0, 1, None, 0, 1, 0)
 """Motion codes of the lines of the form `adaptive-feed`; None: the line that asks."""
@@ -90,6 +92,7 @@ class HalAlignment(Alignment):
     def _reader(self, i: int, text: bytes) -> StreamReader:
         reader = HalReader(*self._of_reader(i, text))
         reader.adaptive = self.beside.form == ADAPTIVE
+        reader.interval = self.beside.interval
         return reader
 
 
@@ -97,6 +100,7 @@ class HalReader(StreamReader):
     """Reads the lines in the place of one rapid."""
 
     adaptive = True
+    interval = 0.001
 
     def read(self) -> Stream | None:
         """Read all of it; None where that is not possible."""
@@ -176,7 +180,8 @@ class HalReader(StreamReader):
 
     def _position(self) -> list[dict[str, Decimal]] | None:
         """LinuxCNC's own rapid, between asking and waiting."""
-        if not self._exactly(b"G4 P0.005") or not self._exactly(b"M68 E3 Q%d" % (self.i + 1)):
+        rest = b"G4 P%g" % (REST * self.interval)
+        if not self._exactly(rest) or not self._exactly(b"M68 E3 Q%d" % (self.i + 1)):
             return None
         numbers = self._motion(0)
         if numbers is None:
