@@ -10,7 +10,7 @@ PAGE = "docs/at-the-machine.md"
 MEASURED = f"G1, rapid override does nothing, measured: {PAGE}"
 UNTESTED = f"G1, rapid override does nothing, untested: {PAGE}"
 HAL_PAGE = "docs/linuxcnc-hal.md"
-PLAYED = f"rapids are played from the file .streams, measured: {HAL_PAGE}"
+PLAYED = f"played from the file .streams, measured: {HAL_PAGE}"
 STAMP_NOTES = (MEASURED, UNTESTED, PLAYED)
 """The comment below the stamp: at most 67 characters, without a parenthesis."""
 _FEED_MOVES = "streams are feed moves (G1): rapid override does nothing to them"
