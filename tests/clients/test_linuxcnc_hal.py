@@ -244,6 +244,25 @@ def test_feed_hold_and_override_keep_the_limits_and_the_ends(form):
     assert 100.0 < held[0] < 300.0
 
 
+def test_a_hold_in_front_of_a_stream_and_no_rapid_override_keep_it_waiting():
+    """The drives stay where they are as long as LinuxCNC's own G0 may not begin."""
+    events = [
+        {"do": "rapid", "to": 0.0, "after": 0.0},
+        {"do": "wait", "after": 1.5},
+        {"do": "pause", "after": 0.0},
+        {"do": "rapid", "to": 1.0, "after": 0.1},
+        {"do": "wait", "after": 0.4},
+        {"do": "resume", "after": 0.0},
+        {"do": "wait", "idle": True},
+    ]
+    _, run = play(LONG, POSITION, events=events)
+    assert_within_limits(run)
+    q = positions(run)[:, 0]
+    stood = np.flatnonzero(np.abs(q - 1.0) < 1e-6)
+    assert stood[-1] - stood[0] > 1500
+    assert run.position == pytest.approx((10.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize(
     ("form", "damage", "says"),
     [

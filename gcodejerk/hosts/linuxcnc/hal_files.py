@@ -46,7 +46,7 @@ net gcodejerk-way-{n} streamer.0.pin.{pin} => gcodejerk-part-{n}.in1 gcodejerk-g
 net gcodejerk-moved-{n} gcodejerk-part-{n}.out => gcodejerk-played-{n}.in1
 net gcodejerk-to-{n} gcodejerk-goal-{n}.out => gcodejerk-there-{n}.in2
 net gcodejerk-at-{n} gcodejerk-played-{n}.out => gcodejerk-drive-{n}.in1 gcodejerk-same-{n}.in2
-net gcodejerk-played => gcodejerk-drive-{n}.sel
+net gcodejerk-keep => gcodejerk-drive-{n}.sel
 net {command} gcodejerk-drive-{n}.out => gcodejerk-off-{n}.in1
 net {feedback} => gcodejerk-seen-{n}.in0 gcodejerk-honest-{n}.in0
 net gcodejerk-offset-{n} gcodejerk-off-{n}.out => gcodejerk-seen-{n}.in1
@@ -57,9 +57,9 @@ net gcodejerk-same-{n} gcodejerk-same-{n}.out => gcodejerk-equal.in-{k}
 net gcodejerk-there-{n} gcodejerk-there-{n}.out => gcodejerk-arrived.in-{k}
 """
 _ORDER = """
-next done depth full type on start play advance streamer.0 blocked finished idle left late stopped
-brake hold @start-N @goal-N @there-N arrived way speed clear share rest @part-N @played-N @same-N
-equal release fault lost good @drive-N @off-N @seen-N @honest-N
+next done depth full type on runs start play advance streamer.0 blocked finished idle left late
+stopped brake hold @start-N @goal-N @there-N arrived way speed clear share rest
+@part-N @played-N @same-N equal release fault lost good @drive-N @off-N @seen-N @honest-N
 """
 
 
