@@ -196,7 +196,7 @@ def smoothed(poles: Complex) -> Array:
     At 90 Hz and 1 ms:
 
     >>> smoothed(np.array([2j * np.pi * 0.09])).round(3)
-    array([0.922])
+    array([0.923])
     """
     half = 0.5 * poles
     out: Array = np.abs((4.0 + 2.0 * np.cosh(poles)) / 6.0 * half / np.tanh(half))
