@@ -9,7 +9,9 @@ from __future__ import annotations
 PAGE = "docs/at-the-machine.md"
 MEASURED = f"G1, rapid override does nothing, measured: {PAGE}"
 UNTESTED = f"G1, rapid override does nothing, untested: {PAGE}"
-STAMP_NOTES = (MEASURED, UNTESTED)
+HAL_PAGE = "docs/linuxcnc-hal.md"
+PLAYED = f"played from the file .streams, measured: {HAL_PAGE}"
+STAMP_NOTES = (MEASURED, UNTESTED, PLAYED)
 """The comment below the stamp: at most 67 characters, without a parenthesis."""
 _FEED_MOVES = "streams are feed moves (G1): rapid override does nothing to them"
 _FEED = "feed override does, keep it at 100 %"
@@ -26,6 +28,8 @@ NO_MODES = (
 
 def stamp_note(controller: str) -> str:
     """The comment below the stamp of a program written for a controller."""
+    if controller == "linuxcnc-hal":
+        return PLAYED
     return MEASURED if controller == "linuxcnc" else UNTESTED
 
 
@@ -42,6 +46,11 @@ def at_the_machine(controller: str) -> str:
     str
         One note, for every program in which streams stand.
     """
+    if controller == "linuxcnc-hal":
+        return (
+            "keep the file .streams beside the program, and install the HAL files that play it "
+            f"(gcodejerk install linuxcnc INI): {HAL_PAGE}"
+        )
     if controller == "linuxcnc":
         return (
             f"{_FEED_MOVES} (measured: at 0 % X60 ran at 100 mm/s), {_FEED}; feed hold brakes at "

@@ -251,9 +251,10 @@ def same_file(one: str, other: str) -> bool:
 
 
 def is_ours(path: str) -> bool:
-    """Whether a file carries gcodejerk's stamp, or is one of its tables."""
+    """Whether a file carries gcodejerk's stamp, or is one of its tables or files of samples."""
     head = _head(path)
-    return head.startswith(b"block,t,") or _STAMP.search(head) is not None
+    tables = (b"block,t,", b"gcodejerk streams ")
+    return head.startswith(tables) or _STAMP.search(head) is not None
 
 
 def is_report(path: str) -> bool:

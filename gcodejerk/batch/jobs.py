@@ -56,6 +56,8 @@ class Job:
     strict: bool
     new_folders: tuple[str, ...] = ()
     """Are made where they are missing."""
+    beside: str | None = None
+    """What belongs to the output, for controllers that write such a file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +174,13 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             target: BinaryIO = stack.enter_context(new_file(job.output, like=job.input))
         else:
             target = stack.enter_context(tempfile.TemporaryFile())
-        result = process_file(source, target, machine, settings, job.input, progress)
+        beside: BinaryIO | None = None
+        if job.beside is not None and job.mode == "write":
+            # It is in its place before the program, which names it by its sum.
+            beside = stack.enter_context(new_file(job.beside, like=job.input))
+        elif job.beside is not None:
+            beside = stack.enter_context(tempfile.TemporaryFile())
+        result = process_file(source, target, machine, settings, job.input, progress, beside)
         summary = summary_line(job.input, summary_of(result))
         if job.strict and (result.left or result.read_once):
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
@@ -181,11 +189,13 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             report.flush()  # a full disk shows here, and not when the output is in its place
         if job.mode == "write" and not (job.in_place or settings.force):
             _refuse_foreign(job, source, target)
+        if job.mode == "write" and not settings.force:
+            _refuse_foreign_beside(job)
         diff = difference(source, target, result) if job.mode == "diff" else b""
         if job.in_place and version(job.input) != before:
             raise changed_error(job.input)  # an edit of the user's would be lost
     if job.mode == "write" and job.output != STANDARD:
-        summary += f" -> {job.output}"
+        summary += f" -> {job.output}" + (f" and {job.beside}" if job.beside else "")
     whole = whole_line(summary_of(result))
     written = 0 if result.expansion is None else result.expansion.written
     return Done(job.input, result.planned, result.left, written, summary, result.notes, diff, whole)
@@ -235,7 +245,7 @@ def record_of(
 
 def _refuse_overwriting(job: Job, machine: Machine) -> None:
     """An output or report that is the input or the machine file, under whatever name."""
-    for name in (None if job.in_place else job.output, job.report):
+    for name in (None if job.in_place else job.output, job.report, job.beside):
         if name is None or job.mode != "write":
             continue
         if same_file(job.input, name):
@@ -245,6 +255,16 @@ def _refuse_overwriting(job: Job, machine: Machine) -> None:
             )
         if same_file(machine.source, name):
             raise EmitError(f"{name} is the machine file", "choose another name")
+
+
+def _refuse_foreign_beside(job: Job) -> None:
+    """A file in the place of the samples that gcodejerk has not written."""
+    name = job.beside
+    if name is not None and os.path.isfile(name) and not is_ours(name):
+        raise EmitError(
+            f"{name} exists and was not written by gcodejerk",
+            "choose another name for the output, or remove the file",
+        )
 
 
 def _refuse_foreign(job: Job, source: BinaryIO, target: BinaryIO) -> None:

@@ -17,6 +17,7 @@ import typer
 
 from gcodejerk._version import __version__
 from gcodejerk.batch.signals import exit_on
+from gcodejerk.cli.hosts import install
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.programs import inspect, process, verify
@@ -40,6 +41,7 @@ app.command("plan")(plan)
 app.command("map")(map_amplitudes)
 app.command("compare")(compare)
 app.command("controllers")(controllers)
+app.command("install")(install)
 machine_app.command("check")(machine_check)
 machine_app.command("schema")(machine_schema)
 

@@ -59,12 +59,18 @@ class Outputs:
         self, found: list[Input], machine: Machine, settings: Settings, *, mode: str, strict: bool
     ) -> list[Job]:
         """One job for each program; two outputs of one name are wrong usage."""
-        suffix = load_controller(settings.controller or machine.controller).suffix
+        emitter = load_controller(settings.controller or machine.controller)
+        suffix, beside = emitter.suffix, emitter.beside
         if suffix and self.in_place:
             raise typer.BadParameter(
                 "--in-place: this controller's streams are a file of their own"
             )
         outputs = [self._output(program, suffix) for program in found]
+        if beside and mode == "write" and "-" in outputs:
+            raise typer.BadParameter(
+                f"controller {emitter.name} writes two files, the program and its {beside}: "
+                "standard output holds one; name a file with -o"
+            )
         try:
             check_names([program.path for program in found], outputs)
         except NameClashError as error:
@@ -78,6 +84,7 @@ class Outputs:
                 mode=mode,
                 in_place=self.in_place,
                 strict=strict,
+                beside=output + beside if beside else None,
                 new_folders=(
                     *_folder(output, self.output_dir),
                     *_folder(report, self.report_dir),

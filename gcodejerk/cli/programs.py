@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,7 +39,7 @@ def process(
     controller: Annotated[
         str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
     ] = None,
-    form: Annotated[str, typer.Option("--as", help="stream, pvt or parameters")] = "stream",
+    form: Annotated[str, typer.Option("--as", help="one of the controller's forms")] = "stream",
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
     expand_cycles: Annotated[
@@ -212,7 +212,9 @@ def verify(
     from gcodejerk.batch.files import open_input
     from gcodejerk.rewrite.expanded import verify_expanded
     from gcodejerk.verification import verify_files
+    from gcodejerk.verification.bytes.hal import CONTROLLER
     from gcodejerk.verification.bytes.stamp import read_stamp
+    from gcodejerk.verification.proof import beside_of
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
@@ -221,7 +223,8 @@ def verify(
     if table and expand_cycles:
         raise typer.BadParameter("--expand-cycles: a table of streams has no cycles written out")
     written = 0
-    with open_input(original) as one, open_input(processed) as other:
+    with ExitStack() as files:
+        one, other = (files.enter_context(open_input(name)) for name in (original, processed))
         names = (original, processed)
         # What the user does not say again, the stamp says.
         stamp = read_stamp(other, described)
@@ -237,16 +240,19 @@ def verify(
             controller = controller or stamp.controller
         if controller is not None:
             described = replace(described, controller=controller)
+        samples = beside_of(processed) if described.controller == CONTROLLER else None
+        beside = files.enter_context(open_input(samples)) if samples is not None else None
         if profile is not None:
             described = replace(described, design=replace(described.design, profile=profile))
         if expand_cycles:
             found, written = verify_expanded(
-                one, other, described, names=names, dialect=dialect, most=most
+                one, other, described, names=names, dialect=dialect, most=most, beside=beside
             )
         else:
             found = verify_files(
-                one, other, described, names=names, dialect=dialect, most=most, table=table
-            )
+                one, other, described, names=names, dialect=dialect, most=most, table=table,
+                beside=beside,
+            )  # fmt: skip
     for violation in found.violations:
         file, line = (
             (processed, violation.line) if violation.line else (original, violation.original_line)

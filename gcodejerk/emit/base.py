@@ -77,6 +77,40 @@ class Controller(ABC):
     takes every controller but `linuxcnc` for one that moves in straight lines between them."""
     forms: tuple[Form, ...] = ()
     """What it can write; at least one."""
+    form: str = "stream"
+    """The one that it writes."""
+    beside: str = ""
+    """What is added to the output's name for a file of samples that belongs to it; empty: none."""
+    longest: int | None = None
+    """Samples of the longest move that it can write."""
+
+    def in_form(self, form: str) -> Controller:
+        """The emitter for one of its forms.
+
+        Raises
+        ------
+        EmitError
+            It does not have that form.
+        """
+        names = [f.name for f in self.forms]
+        if form not in names:
+            raise EmitError(
+                f"controller {self.name} cannot write --as {form} in this version",
+                f"it can write: {', '.join(names)}",
+            )
+        return self
+
+    def opening(self, newline: bytes, sums: tuple[int, int] = (0, 0)) -> bytes:
+        """Lines below the stamp, of a length that the sums of the file beside do not change."""
+        return b""
+
+    def beside_header(self, machine: Machine) -> bytes:
+        """First lines of the file beside."""
+        return b""
+
+    def render_beside(self, batch: Batch, rapids: Rapids) -> list[bytes]:
+        """What the file beside holds of each move of a batch."""
+        return [b""] * len(batch)
 
     def stride(self, interval: float) -> int:
         """Intervals from one written point to the next."""

@@ -47,6 +47,7 @@ class Play(Enum):
     ALIGNED = "speeds that are straight lines between points on servo periods, filtered"
     TABLE = "straight lines between points, each at its own time"
     HELD = "straight lines between points, each at the F of its block"
+    SCALED = "speeds at the points, added up by LinuxCNC's planner and smoothed by its filter"
 
 
 def block_times(moved: NDArray[np.bool_], grid: Grid) -> Counts:
@@ -225,6 +226,35 @@ def worst_of_lines(
         displacement *= undecayed(early, around.poles * grid.interval)
     worst: Array = grouped(displacement, around.group).max(axis=1, initial=0.0)
     return worst
+
+
+def smoothed(poles: Complex) -> Array:
+    """What LinuxCNC leaves of the residual of straight lines where it is given speeds.
+
+    In each period its planner goes on by the mean of the speeds at the two ends, which is
+    cosh(x) instead of sinh(x)/x, with x half a period times the pole; the positions are then
+    filtered, (x[i-1] + 4 x[i] + x[i+1])/6. Played at 30 to 90 Hz, both together are right within
+    1 %.
+
+    Parameters
+    ----------
+    poles : ndarray of complex, shape (m,)
+        Times the period. [-]
+
+    Returns
+    -------
+    ndarray, shape (m,)
+
+    Examples
+    --------
+    At 90 Hz and 1 ms:
+
+    >>> smoothed(np.array([2j * np.pi * 0.09])).round(3)
+    array([0.923])
+    """
+    half = 0.5 * poles
+    out: Array = np.abs((4.0 + 2.0 * np.cosh(poles)) / 6.0 * half / np.tanh(half))
+    return out
 
 
 def undecayed(early: Counts, poles: Complex) -> Array:

@@ -27,6 +27,7 @@ from gcodejerk.planning.lines import (
     left_by_lines,
     missing_times,
     played_positions,
+    smoothed,
 )
 from gcodejerk.planning.plans import Plans
 from gcodejerk.reasons import REASONS, Reason
@@ -194,7 +195,10 @@ class _Maker:
         if self.play is Play.HELD:
             early = missing_times(times, self.grid)
             written = {a: played_positions(q, times, self.grid) for a, q in written.items()}
-        return left_by_lines(self.plans, self.moves, written, self.grid, early)
+        residual, worst = left_by_lines(self.plans, self.moves, written, self.grid, early)
+        if self.play is Play.SCALED:
+            residual *= smoothed(self.modes.poles * self.interval)
+        return residual, worst
 
 
 class Residuals:

@@ -144,6 +144,7 @@ def verify_expanded(
     names: tuple[str, str] = ("<original>", "<processed>"),
     dialect: str | None = None,
     most: int = 100,
+    beside: BinaryIO | None = None,
 ) -> tuple[Verification, int]:
     """Prove that a program is another one with its cycles written out and its rapids re-timed.
 
@@ -162,6 +163,8 @@ def verify_expanded(
         The machine's by default.
     most : int, optional
         Violations after which it stops.
+    beside : BinaryIO, optional
+        The file of samples beside the processed program.
 
     Returns
     -------
@@ -179,7 +182,9 @@ def verify_expanded(
             first = prove_expansion(
                 original, between, machine, names=names, dialect=dialect, most=most
             ).violations
-        found = verify_files(between, processed, machine, names=names, dialect=dialect, most=most)
+        found = verify_files(
+            between, processed, machine, names=names, dialect=dialect, most=most, beside=beside
+        )
     later = (_in_original(violation, expansion.map) for violation in found.violations)
     violations = (*first, *later)[:most]
     return replace(found, violations=violations), expansion.written

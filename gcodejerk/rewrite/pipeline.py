@@ -30,6 +30,7 @@ from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
+from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.rewrite.expanded import (
     hunks,
     in_original,
@@ -68,6 +69,7 @@ def process(
     machine: Machine,
     *,
     controller: str | None = None,
+    form: str = "stream",
     profile: str | None = None,
     dialect: str | None = None,
     comments: bool = True,
@@ -86,6 +88,8 @@ def process(
         What it runs on.
     controller, profile, dialect : str, optional
         In place of the machine file's.
+    form : str
+        One that the controller has; `stream` is its first.
     comments : bool
         Name each original block in a comment in front of its stream.
     verify : bool
@@ -100,7 +104,8 @@ def process(
     Returns
     -------
     Result
-        The output is in `output`.
+        The output is in `output`; what belongs beside it, for controllers that write such a file,
+        is in `beside`.
 
     Raises
     ------
@@ -119,12 +124,10 @@ def process(
     >>> result.planned, result.left
     (1, 1)
     """
-    settings = Settings(
-        controller, "stream", profile, dialect, comments, verify, force, expand_cycles
-    )
-    target = io.BytesIO()
-    result = process_file(io.BytesIO(data), target, machine, settings, name)
-    return replace(result, output=target.getvalue())
+    settings = Settings(controller, form, profile, dialect, comments, verify, force, expand_cycles)
+    target, beside = io.BytesIO(), io.BytesIO()
+    result = process_file(io.BytesIO(data), target, machine, settings, name, beside=beside)
+    return replace(result, output=target.getvalue(), beside=beside.getvalue() or None)
 
 
 def process_file(
@@ -134,6 +137,7 @@ def process_file(
     settings: Settings,
     name: str,
     progress: Progress | None = None,
+    beside: BinaryIO | None = None,
 ) -> Result:
     """The same with open files, in bounded memory.
 
@@ -151,16 +155,25 @@ def process_file(
         What messages call the program.
     progress : callable, optional
         See `Progress`.
+    beside : binary file, optional
+        Empty, seekable, readable: takes what the controller writes beside the program
+        (`Controller.beside`). Such a controller needs it where there is a target.
 
     Returns
     -------
     Result
-        Without `output`.
+        Without `output` and `beside`.
     """
-    emitter = load_controller(settings.controller or machine.controller)
-    _check_form(emitter, settings.form)
+    emitter = load_controller(settings.controller or machine.controller).in_form(settings.form)
+    if emitter.beside and target is not None and beside is None:
+        raise EmitError(
+            f"controller {emitter.name} writes two files: the program and its {emitter.beside}",
+            "give it a file for each",
+        )
     if not settings.expand_cycles:
-        return _process(source, target, machine, settings, name, emitter, progress or silent, None)
+        return _process(
+            source, target, machine, settings, name, emitter, progress or silent, None, beside
+        )
     if target is not None and not emitter.in_place:
         raise EmitError(
             f"--expand-cycles needs streams within the program, those of controller {emitter.name} "
@@ -176,7 +189,7 @@ def process_file(
         prove=target is not None and settings.verify,
     ) as (used, expansion):
         return _process(
-            used, target, machine, settings, name, emitter, progress or silent, expansion
+            used, target, machine, settings, name, emitter, progress or silent, expansion, beside
         )
 
 
@@ -189,6 +202,7 @@ def _process(
     emitter: Controller,
     report: Progress,
     expansion: Expansion | None,
+    beside: BinaryIO | None,
 ) -> Result:
     """Process a program; the source is that with its cycles written out, if they are."""
     lines = None if expansion is None else expansion.map
@@ -198,12 +212,15 @@ def _process(
         source, target, program, emitter,
         Options(settings.comments, find_dialect(program.dialect)),
         stamp_text(machine, _chosen(machine, settings, emitter)),
+        beside,
     )  # fmt: skip
     collected, deviation = _write(writer, plans, machine, report)
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
-        verification = _verified(source, target, machine, settings, program, plans, emitter, lines)
+        verification = _verified(
+            source, target, machine, settings, program, plans, emitter, lines, beside
+        )
         report("verifying", 1, 1)
     edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
     differences = hunks(edits, program.rapids, program.insert_at, lines)
@@ -213,7 +230,7 @@ def _process(
         plans=plans,
         controller=emitter.name,
         profile=settings.profile or machine.design.profile,
-        form=settings.form,
+        form=emitter.form,
         residual=collected.residual,
         conventional_residual=collected.conventional,
         deviation=deviation,
@@ -277,7 +294,7 @@ def _plan(
     if emitter.in_place:
         dialect = find_dialect(program.dialect)
         rapids = replace(rapids, reason=reasons_to_leave(program, source, machine, dialect))
-    return plan_rapids(
+    plans = plan_rapids(
         rapids,
         machine,
         settings.profile,
@@ -285,11 +302,15 @@ def _plan(
         emitter.unblended if emitter.in_place else "",
         only_gains=True,
     )
+    if emitter.longest is not None:
+        too_long = plans.planned & (plans.counts > emitter.longest)
+        plans.reason[too_long] = REASONS.index(Reason.TOO_LONG)
+    return plans
 
 
 def _chosen(machine: Machine, settings: Settings, emitter: Controller) -> list[str]:
     """The user's choices that shape the output, for the stamp."""
-    chosen = [emitter.name, settings.form, settings.profile or machine.design.profile]
+    chosen = [emitter.name, emitter.form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
     return chosen + ([f"dialect {settings.dialect}"] if settings.dialect is not None else [])
 
@@ -328,6 +349,7 @@ def _verified(
     plans: Plans,
     emitter: Controller,
     lines: LineMap | None,
+    beside: BinaryIO | None,
 ) -> Verification:
     """Read an output back; whatever is wrong with it is raised, in lines of the original."""
     source.seek(0)
@@ -342,6 +364,7 @@ def _verified(
             dialect=program.dialect,
             table=not emitter.in_place,
             reported=_reported(program, plans) if emitter.play is Play.ALIGNED else None,
+            beside=beside if emitter.beside else None,
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):
@@ -366,13 +389,3 @@ def _reported(program: Program, plans: Plans) -> dict[int, Array]:
 
 def silent(step: str, done: int, total: int) -> None:
     """Progress that nobody watches."""
-
-
-def _check_form(emitter: Controller, form: str) -> None:
-    """Refuse a form that the emitter does not have."""
-    names = [f.name for f in emitter.forms]
-    if form not in names:
-        raise EmitError(
-            f"controller {emitter.name} cannot write --as {form} in this version",
-            f"it can write: {', '.join(names)}",
-        )

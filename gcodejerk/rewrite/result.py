@@ -119,6 +119,8 @@ class Result:
         What the user has to know: of the program, and of the controller.
     output : bytes or None
         The output, where it was asked for in memory.
+    beside : bytes or None
+        The file that belongs beside it, for controllers that write one.
     """
 
     program: Program
@@ -136,6 +138,7 @@ class Result:
     expansion: Expansion | None
     notes: tuple[str, ...]
     output: bytes | None = field(default=None, repr=False)
+    beside: bytes | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return f"<Result {self.program.name}: {self.planned} of {len(self.plans)} rapids rewritten>"

@@ -51,6 +51,7 @@ class Rewriter:
         emitter: Controller,
         options: Options,
         stamp: bytes,
+        beside: BinaryIO | None = None,
     ) -> None:
         """Begin.
 
@@ -68,8 +69,13 @@ class Rewriter:
             The user's choices, and the program's dialect.
         stamp : bytes
             Text of the stamp, of `stamp_text`.
+        beside : binary file, optional
+            Takes what the emitter writes beside the program.
         """
         self.source, self.target, self.program = source, target, program
+        self.beside = beside if emitter.beside else None
+        self.sums = hashlib.blake2b(digest_size=6)
+        self.opening_at: int | None = None
         self.emitter, self.options = emitter, options
         self.stamp = b""
         if emitter.in_place and options.dialect.writing is not None:
@@ -87,6 +93,7 @@ class Rewriter:
         """Write the first lines of a file of its own."""
         if self.target is not None:
             self.target.write(self.emitter.header(machine))
+        self._put_beside(self.emitter.beside_header(machine))
 
     def write(self, window: list[Batch]) -> None:
         """Write the streams of a window; windows come in the order of the file."""
@@ -96,16 +103,27 @@ class Rewriter:
             self._copy(self.program.insert_at)
             self._put_stamp()
         texts: dict[int, bytes] = {}
+        aside: dict[int, bytes] = {}
         rapids = self.program.rapids
         for batch in window:
             blocks = [self._block(move) for move in batch.moves]
             new = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
             texts.update(zip(batch.moves.tolist(), new, strict=True))
+            if self.beside is not None:
+                samples = self.emitter.render_beside(batch, rapids)
+                aside.update(zip(batch.moves.tolist(), samples, strict=True))
         self.source.seek(self.at)
         for move in sorted(texts):
             self._copy(int(rapids.begin[move]))
             self._read(int(rapids.end[move] + TERMINATOR_LENGTH[rapids.terminator[move]]))
             self._put(texts[move], move)
+            self._put_beside(aside.get(move, b""))
+
+    def _put_beside(self, text: bytes) -> None:
+        """Write to the file beside the output."""
+        if self.beside is not None:
+            self.beside.write(text)
+            self.sums.update(text)
 
     def _block(self, move: int) -> bytes:
         """The block of a rapid."""
@@ -129,9 +147,9 @@ class Rewriter:
         if at < SUM_WITHIN:
             found = self.stamp.find(SUM_UNKNOWN)
             self.sum_at = None if found < 0 else at + found + len(SUM_MARK)
-        self._put(
-            self.stamp if self.sum_at is not None else self.stamp.replace(SUM_UNKNOWN, b""), -1
-        )
+        stamp = self.stamp if self.sum_at is not None else self.stamp.replace(SUM_UNKNOWN, b"")
+        self.opening_at = at + len(stamp)
+        self._put(stamp + self.emitter.opening(self.program.newline), -1)
 
     def finish(self) -> None:
         """Copy what follows the last stream, and see that the source is still what was planned."""
@@ -140,11 +158,27 @@ class Rewriter:
         self._copy(self.program.size)
         if self.source.read(1) or self.digest.digest() != self.program.digest:
             raise changed_error(self.program.name)
+        if self.beside is not None and self.opening_at is not None:
+            self._name_beside(self.opening_at)
         if self.sum_at is not None:
             self.target.seek(self.sum_at)
             self.target.write(self.written.hexdigest().encode())
             self.target.seek(0, io.SEEK_END)
         self.target.flush()
+
+    def _name_beside(self, at: int) -> None:
+        """Write the sum of the file beside into the program, and sum that up anew."""
+        assert self.target is not None
+        assert self.beside is not None
+        self.beside.flush()
+        digest = self.sums.digest()
+        sums = (int.from_bytes(digest[:3], "big"), int.from_bytes(digest[3:], "big"))
+        self.target.seek(at)
+        self.target.write(self.emitter.opening(self.program.newline, sums))
+        self.target.seek(0)
+        self.written = hashlib.blake2b(digest_size=SUM_DIGITS // 2)
+        while data := self.target.read(COPY_SIZE):
+            self.written.update(data)
 
     def _read(self, end: int) -> bytes:
         """The source's next bytes, up to an offset."""

@@ -46,6 +46,7 @@ class Kind(enum.StrEnum):
     RESIDUAL = "residual"
     PROFILE = "off the reported profile"
     TABLE = "table"
+    SAMPLES = "samples"
     CYCLE = "moves of a cycle"
     READING = "second reading"
     SERIES = "cycle that had to be left to the controller"

@@ -18,12 +18,14 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
 from gcodejerk.verification.bytes.alignment import Alignment
 from gcodejerk.verification.bytes.form import Stream
+from gcodejerk.verification.bytes.hal import CONTROLLER, Beside, HalAlignment
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
-from gcodejerk.verification.findings import Findings, Verification
+from gcodejerk.verification.findings import Findings, Kind, Verification
 from gcodejerk.verification.physics.aligned import Reported, check_aligned
 from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
+from gcodejerk.verification.samples import SampleReader
 from gcodejerk.verification.second_reading.agreement import confirm
 from gcodejerk.verification.table import TableReader
 
@@ -31,7 +33,11 @@ MOST = 100
 """Violations that are collected, unless asked otherwise."""
 BATCH_BYTES = 1 << 20
 """Text of streams that is judged at a time."""
+HAL_BYTES = 1 << 18
+"""The same where the points stand in another file: some hundred rapids."""
 NAMES = ("<original>", "<processed>")
+BESIDE = ".streams"
+"""Added to a program's name: its file of samples."""
 
 
 def verify(
@@ -41,6 +47,7 @@ def verify(
     *,
     dialect: str | Dialect | None = None,
     controller: str | None = None,
+    beside: bytes | str | Path | None = None,
     most: int = MOST,
 ) -> Verification:
     r"""Compare a processed program with its original.
@@ -56,6 +63,9 @@ def verify(
         How the original is written; the stamp's by default, or the machine's.
     controller : str, optional
         What the streams are for; the stamp's by default, or the machine's.
+    beside : bytes, str or Path, optional
+        The file of samples of a program for `linuxcnc-hal`; the one that stands beside it by
+        default.
     most : int, optional
         Violations after which it stops.
 
@@ -90,7 +100,19 @@ def verify(
             machine = replace(machine, design=design)
             dialect, controller = dialect or stamp.dialect, controller or stamp.controller
         machine = replace(machine, controller=controller or machine.controller)
-        return verify_files(one, other, machine, names=names, dialect=dialect, most=most)
+        samples = None
+        if machine.controller == CONTROLLER:
+            beside = beside_of(processed) if beside is None else beside
+            samples = None if beside is None else stack.enter_context(_opened(beside))
+        return verify_files(
+            one, other, machine, names=names, dialect=dialect, most=most, beside=samples
+        )
+
+
+def beside_of(processed: bytes | str | Path) -> str | None:
+    """Name of the file of samples that stands beside a program; None where there is none."""
+    name = "" if isinstance(processed, bytes) else f"{processed}{BESIDE}"
+    return name if name and Path(name).is_file() else None
 
 
 def _name(given: bytes | str | Path, instead: str) -> str:
@@ -121,6 +143,7 @@ def verify_files(
     most: int = MOST,
     table: bool = False,
     reported: Reported | None = None,
+    beside: BinaryIO | None = None,
 ) -> Verification:
     """Compare open files; see `verify`.
 
@@ -144,6 +167,8 @@ def verify_files(
     reported : mapping of int to array, optional
         Of the line of each rapid: the profile that was reported, as rows of duration [s] and jerk
         along the path [mm/s^3]; streams for LinuxCNC are held to it.
+    beside : BinaryIO, optional
+        The file of samples that stands beside the processed program (controller `linuxcnc-hal`).
 
     Returns
     -------
@@ -161,6 +186,8 @@ def verify_files(
     found = Findings(most)
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
+    elif machine.controller == CONTROLLER:
+        replaced, kept = _judge_pair(original, processed, beside, program, machine, found)
     else:
         files = (original, processed)
         replaced, kept = _judge_program(*files, program, machine, found, reported or {})
@@ -189,6 +216,44 @@ def _judge_program(
             check_aligned(paths, machine, found, reported)
         elif _moves(paths):
             check_dynamics(paths, machine, stride, found)
+    alignment.check_sum()
+    return alignment.replaced, alignment.kept
+
+
+def _judge_pair(
+    original: BinaryIO,
+    processed: BinaryIO,
+    beside: BinaryIO | None,
+    program: Program,
+    machine: Machine,
+    found: Findings,
+) -> tuple[list[int], int]:
+    """Compare a program and its file of samples; which rapids were replaced, and lines kept."""
+    if beside is None:
+        found.add(
+            Kind.SAMPLES, None, None, "there is no file of samples beside the program",
+            "keep both files together: part.nc and part.nc.streams",
+        )  # fmt: skip
+        return [], 0
+    about = Beside.of(beside)
+    if about is None or abs(about.interval - machine.interval) > 1e-9 * machine.interval:
+        said = "no such file" if about is None else f"for an interval of {about.interval:g} s"
+        found.add(Kind.SAMPLES, None, None, f"the file of samples is {said}")
+        return [], 0
+    alignment = HalAlignment(Window(original), Window(processed), program, machine, found)
+    alignment.beside = about
+    reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
+    samples = SampleReader(beside, about, program.rapids, machine, found)
+    for streams in _batches(_checked(alignment, reader), HAL_BYTES):
+        written = reader.paths(streams)
+        check_line(written, machine, found)
+        played = samples.paths(streams, written)
+        if played is not None:
+            _check_lines(played, program, machine, found)
+            if _moves(played):
+                check_dynamics(played, machine, 1, found)
+    samples.finish()
+    alignment.check_opening()
     alignment.check_sum()
     return alignment.replaced, alignment.kept
 
@@ -230,14 +295,14 @@ def _checked(alignment: Alignment, reader: Reader) -> Iterator[Stream]:
             yield stream
 
 
-def _batches(streams: Iterator[Stream]) -> Iterator[list[Stream]]:
+def _batches(streams: Iterator[Stream], most: int = BATCH_BYTES) -> Iterator[list[Stream]]:
     """Streams in lists, each of some MB of text."""
     batch: list[Stream] = []
     size = 0
     for stream in streams:
         batch.append(stream)
         size += len(stream.text) + 64 * len(stream.rest)
-        if size > BATCH_BYTES:
+        if size > most:
             yield batch
             batch, size = [], 0
     if batch:

@@ -1,8 +1,9 @@
 """Whole programs with their whole output, compared as bytes.
 
 A case is a folder with `in.ngc`, `machine.yaml` and `out.ngc` (`out.csv` where the machine's
-controller is `csv`); a new folder is a new test, and one whose name begins with `cycles_` writes
-drilling cycles out. `pytest --update-golden` writes the outputs anew.
+controller is `csv`; and `out.ngc.streams` where it writes a file beside); a new folder is a new
+test, one whose name begins with `cycles_` writes drilling cycles out. `pytest --update-golden`
+writes the outputs anew.
 The intervals are long, so that a move is a dozen points that a reader can follow by eye.
 """
 
@@ -24,7 +25,13 @@ def made(case):
     return (
         machine,
         program,
-        process(program, machine, name=f"{case}/in.ngc", expand_cycles=case.startswith("cycles_")),
+        process(
+            program,
+            machine,
+            form="position" if case == "hal_position" else "stream",
+            name=f"{case}/in.ngc",
+            expand_cycles=case.startswith("cycles_"),
+        ),
     )
 
 
@@ -37,6 +44,11 @@ def test_output_is_the_golden_one(case, request):
     assert golden.exists(), f"{case} has no {golden.name} yet: run pytest --update-golden"
     assert result.output == golden.read_bytes()
     assert result.verification.ok
+    if result.beside is not None:
+        beside = HERE / case / "out.ngc.streams"
+        if request.config.getoption("--update-golden"):
+            beside.write_bytes(result.beside)
+        assert result.beside == beside.read_bytes()
 
 
 # A case whose rapids are all left alone has no stamp, and a table is no program.

@@ -43,6 +43,7 @@ ROOMS = {
  <- rewrite
  <- report
  <- batch
+ <- hosts
  <- cli
 """),
     "motion": order("""
@@ -69,7 +70,7 @@ ROOMS = {
     findings
  <- bytes
  <- physics | second_reading
- <- cycles | table
+ <- cycles | table samples
  <- proof
 """),
 }

@@ -16,6 +16,7 @@ from gcodejerk.machine.parts import BELL, JERK_LIMITED, LINUXCNC, TRAPEZOIDAL
 
 WITHOUT_JERK = {
     "linuxcnc": (LINUXCNC, "LinuxCNC 2.9"),
+    "linuxcnc-hal": (LINUXCNC, "LinuxCNC 2.9"),
     "grbl": (TRAPEZOIDAL, "grbl"),
 }
 """Controls whose G0 has no jerk limit: their profile, and what messages call them."""

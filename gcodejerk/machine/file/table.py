@@ -27,6 +27,7 @@ PROFILES = (
 DIALECT_OF_CONTROLLER = {
     "csv": "linuxcnc",
     "linuxcnc": "linuxcnc",
+    "linuxcnc-hal": "linuxcnc",
     "fanuc": "fanuc",
     "haas": "haas",
     "siemens": "siemens",

@@ -13,7 +13,7 @@ import numpy as np
 
 from gcodejerk.advice import STAMP_NOTES
 from gcodejerk.machine import Machine
-from gcodejerk.nc import CERTAIN, REASONS, Program, find_dialect
+from gcodejerk.nc import CERTAIN, REASONS, Dialect, Program, Rapids, find_dialect
 from gcodejerk.verification.bytes.aligned_form import AlignedReader
 from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
 from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
@@ -21,7 +21,7 @@ from gcodejerk.verification.bytes.source import Window, skip_common
 from gcodejerk.verification.findings import Findings, Kind
 
 _STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
-_TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400")
+_TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400", b"M6")
 """How a stream may begin."""
 ALIGNED = ("linuxcnc",)
 """Controllers whose streams have blocks that end on servo periods."""
@@ -72,18 +72,7 @@ class Alignment:
                 self.kept += 1
             else:
                 text = block[: end - begin]
-                form = AlignedReader if self.aligned else StreamReader
-                reader = form(
-                    self.processed,
-                    rapids,
-                    i,
-                    text,
-                    self.program.newline,
-                    self.found,
-                    self.dialect,
-                    self.decimals,
-                    self._follows(i),
-                )
+                reader = self._reader(i, text)
                 if not self._is_stream(reader, block, i):
                     return
                 stream = reader.read()
@@ -96,6 +85,27 @@ class Alignment:
             self.at += len(block)
         if self._same(None):
             self._end()
+
+    def _reader(self, i: int, text: bytes) -> StreamReader:
+        """What reads the stream of a rapid."""
+        form = AlignedReader if self.aligned else StreamReader
+        return form(*self._of_reader(i, text))
+
+    def _of_reader(
+        self, i: int, text: bytes
+    ) -> tuple[Window, Rapids, int, bytes, bytes, Findings, Dialect, dict[str, int], bool]:
+        """What it needs to know."""
+        return (
+            self.processed,
+            self.program.rapids,
+            i,
+            text,
+            self.program.newline,
+            self.found,
+            self.dialect,
+            self.decimals,
+            self._follows(i),
+        )
 
     def _follows(self, i: int) -> bool:
         """Whether the line in front of a rapid is one that has a stream: the machine then rests."""

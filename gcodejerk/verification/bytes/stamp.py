@@ -24,6 +24,8 @@ from gcodejerk.nc import DIALECTS
 WITHIN = 1 << 17
 """A stamp that stands farther from the top is not looked for. [bytes]"""
 FORM = "stream"
+FORMS = {"linuxcnc-hal": ("adaptive-feed", "position")}
+"""Of controllers that have others than FORM."""
 EXPANDED = "expand-cycles"
 _STAMP = re.compile(rb"^[(;] ?gcodejerk stamp [ -~]{1,20}? ([0-9a-f]{8})(?![0-9a-f])", re.MULTILINE)
 
@@ -44,10 +46,15 @@ class Stamp:
 
 
 def choices_hash(
-    settings_hash: str, controller: str, profile: str, expand_cycles: bool, dialect: str | None
+    settings_hash: str,
+    controller: str,
+    profile: str,
+    expand_cycles: bool,
+    dialect: str | None,
+    form: str = FORM,
 ) -> str:
     """Eight hex digits of the hash of a machine file's settings and a user's choices."""
-    chosen = [controller, FORM, profile, *([EXPANDED] if expand_cycles else [])]
+    chosen = [controller, form, profile, *([EXPANDED] if expand_cycles else [])]
     chosen += [] if dialect is None else [f"dialect {dialect}"]
     text = " ".join((settings_hash, *chosen)).encode()
     return hashlib.blake2b(text, digest_size=4).hexdigest()
@@ -95,6 +102,7 @@ def _choices(
     for dialect, expand, name, profile in product(
         (None, *DIALECTS, "auto"), (False, True), names, profiles
     ):
-        found = choices_hash(settings_hash, name, profile, expand, dialect)
-        out.setdefault(found, (name, profile, dialect, expand))
+        for form in FORMS.get(name, (FORM,)):
+            found = choices_hash(settings_hash, name, profile, expand, dialect, form)
+            out.setdefault(found, (name, profile, dialect, expand))
     return out

@@ -1,0 +1,387 @@
+"""Install what `linuxcnc-hal` needs into a LinuxCNC configuration, and take it out again.
+
+Three things: `gcodejerk.hal` beside the INI, the M code M152 where the INI has its M codes, and
+marked lines in the INI: the HAL file behind the last one, and a path for M codes where none is.
+
+Rule: everything is looked at before anything is written, and whatever does not fit is refused. The
+user's own HAL files are never changed; what is taken out leaves the INI byte for byte.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from gcodejerk.batch.files import new_file
+from gcodejerk.errors import EmitError, Place
+from gcodejerk.hosts.linuxcnc import hal_files
+from gcodejerk.hosts.linuxcnc.hal_commands import Hal, read_hal
+from gcodejerk.hosts.linuxcnc.ini import (
+    Ini,
+    is_writable,
+    marked,
+    parse_ini,
+    read_ini,
+    without_lines,
+)
+
+HAL_FILE = "gcodejerk.hal"
+BACKUP = ".before-gcodejerk"
+MEASURED = "2.9"
+"""The version of LinuxCNC in which all this was played."""
+_OWN = re.compile(rb"# gcodejerk install ([a-z-]+) sum:([0-9a-f]{16})\n")
+_LEAST_IO = 4
+"""Inputs and outputs that motmod has unless told otherwise; number 3 is used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What an installation would write."""
+
+    ini: bytes
+    hal: bytes
+    script: bytes
+    script_path: Path
+
+
+def install(path: str, form: str, version: str | None = None) -> list[str]:
+    """Install a form.
+
+    Parameters
+    ----------
+    path : str
+        The INI.
+    form : str
+        One of `hal_files.FORMS`.
+    version : str, optional
+        Of LinuxCNC; that of the one on this machine by default.
+
+    Returns
+    -------
+    list of str
+        What was done, for the user.
+
+    Raises
+    ------
+    EmitError
+        The configuration does not fit; nothing was changed.
+    """
+    ini = read_ini(path)
+    own = ini.folder / HAL_FILE
+    before = _installed(ini)
+    _check_version(version)
+    clean = parse_ini(ini.path, without_lines(ini.data))
+    change = _change(clean, form)
+    if before is not None:
+        return [_again(ini, own, change, before, form)]
+    for place in (ini.path, ini.folder):
+        if not is_writable(place):
+            raise EmitError(
+                f"{place} cannot be written to",
+                "copy the configuration to a folder of yours, and name the .ini file there",
+            )
+    for file, content in ((own, change.hal), (change.script_path, change.script)):
+        if file.exists() and file.read_bytes() != content:
+            raise EmitError(
+                f"{file} exists and is not what would be written", "rename or remove it first"
+            )
+    backup = Path(f"{ini.path}{BACKUP}")
+    _write(own, change.hal)
+    _write(change.script_path, change.script, mode=0o755)
+    _write(backup, ini.data)
+    _write(ini.path, change.ini)
+    return [
+        f"{own}: written, the HAL of the form {form}",
+        f"{change.script_path}: written, the M code M152",
+        f"{ini.path}: {len(marked(change.ini))} marked block(s) of lines added; it was kept as "
+        f"{backup.name}",
+        f"process programs with --controller linuxcnc-hal --as {form}; `gcodejerk install linuxcnc "
+        f"{path} --remove` takes all of it out again",
+    ]
+
+
+def remove(path: str) -> list[str]:
+    """Take out what was installed.
+
+    Returns
+    -------
+    list of str
+        What was done.
+
+    Raises
+    ------
+    EmitError
+        Somebody has edited what was installed; nothing was changed.
+    """
+    ini = read_ini(path)
+    own = ini.folder / HAL_FILE
+    form = _installed(ini)
+    if form is None and not own.exists():
+        return [f"{ini.path}: nothing of gcodejerk is installed"]
+    clean = without_lines(ini.data)
+    # A HAL file that goes along with no INI any more was installed once, and is not loaded.
+    _check_untouched(own)
+    for block in marked(ini.data):
+        lines = block.splitlines()
+        keys = [line.partition("=")[0].strip() for line in lines]
+        if keys not in (["HALFILE"], ["USER_M_PATH"]):
+            raise EmitError(
+                f"the lines between the marks of gcodejerk were edited: {lines}",
+                f"put them back as they were, or take them out by hand (backup: *{BACKUP})",
+                ini.place(),
+            )
+    for place in (ini.path, ini.folder):
+        if not is_writable(place):
+            raise EmitError(f"{place} cannot be written to", "change its permissions")
+    script = _script_path(parse_ini(ini.path, clean))
+    _write(ini.path, clean)
+    done = [f"{ini.path}: the marked lines were taken out"]
+    others = [other for other in sorted(ini.folder.glob("*.ini")) if _names_ours(other)]
+    if others:
+        return [*done, f"{own}, {script}: kept, {others[0].name} uses them, too"]
+    own.unlink(missing_ok=True)
+    done.append(f"{own}: removed")
+    if script.is_file() and script.read_bytes() == _script():
+        script.unlink()
+        done.append(f"{script}: removed")
+    backup = Path(f"{ini.path}{BACKUP}")
+    if backup.is_file() and backup.read_bytes() == clean:
+        backup.unlink()
+        done.append(f"{backup}: removed, the INI is that again byte for byte")
+    elif backup.is_file():
+        done.append(f"{backup}: kept, the INI was edited since")
+    return done
+
+
+def _names_ours(path: Path) -> bool:
+    """Whether an INI loads our HAL file."""
+    return re.search(rb"(?m)^\s*HALFILE\s*=\s*gcodejerk\.hal", path.read_bytes()) is not None
+
+
+def _installed(ini: Ini) -> str | None:
+    """The form that is installed, None where none is."""
+    if not any(e.value == HAL_FILE for e in ini.all("HAL", "HALFILE")):
+        return None
+    own = ini.folder / HAL_FILE
+    match = _OWN.match(own.read_bytes()) if own.is_file() else None
+    if match is None:
+        raise EmitError(
+            f"the INI names {HAL_FILE}, which is not there or not of gcodejerk",
+            "take that HALFILE out of the INI, or take back the backup",
+            ini.place(),
+        )
+    return match[1].decode()
+
+
+def _again(ini: Ini, own: Path, change: Change, before: str, form: str) -> str:
+    """What to say where something is installed already."""
+    if before != form:
+        raise EmitError(
+            f"the form {before} is installed already",
+            f"run `gcodejerk install linuxcnc {ini.path} --remove` first",
+            ini.place(),
+        )
+    _check_untouched(own)
+    same = own.read_bytes() == change.hal and change.ini == ini.data
+    same = same and change.script_path.is_file() and change.script_path.read_bytes() == _script()
+    if not same:
+        raise EmitError(
+            "another version of this is installed, or the configuration was changed since",
+            f"run `gcodejerk install linuxcnc {ini.path} --remove`, then install again",
+            ini.place(),
+        )
+    return f"{ini.path}: the form {form} is installed already; nothing was changed"
+
+
+def _check_untouched(own: Path) -> None:
+    """Refuse where somebody has edited the HAL file."""
+    if not own.is_file():
+        return
+    data = own.read_bytes()
+    match = _OWN.match(data)
+    if match is None or _sum(data[match.end() :]) != match[2]:
+        raise EmitError(
+            f"{own} was edited after it was installed",
+            "put what was added into a HAL file of your own, and put this one back or remove it",
+        )
+
+
+def _check_version(version: str | None) -> None:
+    """Refuse a LinuxCNC in which this was not played, or of which the version cannot be told."""
+    if version is None:
+        tool = shutil.which("linuxcnc_var")
+        if tool is not None:
+            answer = subprocess.run(
+                [tool, "LINUXCNCVERSION"], capture_output=True, text=True, check=False
+            )
+            version = answer.stdout.strip() or None
+    if version is None:
+        raise EmitError(
+            "the version of LinuxCNC cannot be told: linuxcnc_var is not on this machine",
+            "run this on the machine that runs LinuxCNC, or say --linuxcnc-version 2.9",
+        )
+    if not re.match(r"2\.9(\D|$)", version):
+        raise EmitError(
+            f"this is LinuxCNC {version}; the HAL was played with {MEASURED} only",
+            f"use --controller linuxcnc, or say --linuxcnc-version {MEASURED} to try it",
+        )
+
+
+def _change(ini: Ini, form: str) -> Change:
+    """What would be written into a configuration without ours."""
+    if ini.value("EMCMOT", "EMCMOT") != "motmod":
+        raise EmitError("[EMCMOT] EMCMOT is not motmod", "only motmod was played", ini.place())
+    hal = read_hal(ini, HAL_FILE)
+    _check_hal(ini, hal, form)
+    script_path = _script_path(ini)
+    quoted = str(script_path.resolve() if script_path.is_absolute() else script_path.absolute())
+    if any(c in quoted for c in " \t'\"#$[]"):
+        raise EmitError(f"HAL cannot take the name {quoted}", "use a folder without blanks")
+    if form == "adaptive-feed":
+        text = hal_files.adaptive_feed(quoted)
+    else:
+        behind, joints = _joints(ini, hal)
+        text = hal_files.position(quoted, joints, _period(ini), behind)
+    body = text.encode()
+    head = f"# gcodejerk install {form} sum:{_sum(body).decode()}\n".encode()
+    last = ini.all("HAL", "HALFILE")[-1]
+    places = [(last.line, f"HALFILE = {HAL_FILE}")]
+    if ini.value("RS274NGC", "USER_M_PATH") is None:
+        sections = dict(ini.sections)
+        if "RS274NGC" not in sections:
+            raise EmitError("there is no section [RS274NGC]", "add it", ini.place())
+        places.append((sections["RS274NGC"], f"USER_M_PATH = {script_path.parent.absolute()}"))
+    data = ini.data
+    for line, entry in sorted(places, reverse=True):
+        data = Ini(ini.path, data, (), ()).with_lines(line, entry)
+    return Change(data, head + body, _script(), script_path)
+
+
+def _check_hal(ini: Ini, hal: Hal, form: str) -> None:
+    """Refuse HAL files that use what we need."""
+    for component in dict.fromkeys(hal_files.components(form)):
+        if component in hal.loaded:
+            what = "it has one FIFO" if component == "streamer" else "HAL loads it once"
+            raise EmitError(
+                f"the component {component} is loaded here, and {HAL_FILE} loads it, too: {what}",
+                "use another component here (logic or lut5, mux8 ...), or the other --form",
+                hal.loaded[component],
+            )
+    for pin in (*hal_files.TAKEN, *hal_files.ALSO_TAKEN[form]):
+        if pin in hal.signal:
+            signal, place = hal.signal[pin]
+            raise EmitError(
+                f"{pin} is linked to the signal {signal} here, and {HAL_FILE} needs it",
+                "take it off here; what both have to do with it can be joined by hand",
+                place,
+            )
+    if "motmod" not in hal.loaded:
+        raise EmitError("no HAL file loads motmod", "see LinuxCNC's manual", ini.place())
+    for name in ("num_dio", "num_aio"):
+        match = re.search(rf"{name}=(\S+)", hal.arguments["motmod"])
+        if match is not None and not (match[1].isdigit() and int(match[1]) >= _LEAST_IO):
+            raise EmitError(
+                f"motmod is loaded with {name}={match[1]}, and number 3 of them is needed",
+                f"say {name}={_LEAST_IO} or more, or leave it out",
+                hal.loaded["motmod"],
+            )
+    if "motion-controller" not in hal.functions.get("servo-thread", []):
+        raise EmitError(
+            "motion-controller is in no thread servo-thread of these HAL files",
+            "see LinuxCNC's manual",
+            ini.place(),
+        )
+
+
+def _joints(ini: Ini, hal: Hal) -> tuple[int, list[hal_files.Joint]]:
+    """Place of motion-controller in the thread, and the joints of X, Y and Z."""
+    if hal.unclear is not None:
+        raise EmitError(
+            "a function is put in a place of the thread that depends on others",
+            "give addf no place, or one counted from the front",
+            hal.unclear,
+        )
+    kinematics = (ini.value("KINS", "KINEMATICS") or "").split()
+    if not kinematics or kinematics[0] != "trivkins":
+        raise EmitError(
+            f"KINEMATICS is {' '.join(kinematics) or 'missing'}: the drives get positions of axes, "
+            "so each axis has to have a joint of its own (trivkins)",
+            "use --form adaptive-feed",
+            ini.place(),
+        )
+    named = [word[12:] for word in kinematics[1:] if word.lower().startswith("coordinates=")]
+    letters = (named or [ini.value("TRAJ", "COORDINATES") or ""])[0].upper().replace(" ", "")
+    out = []
+    for letter in "XYZ":
+        if letters.count(letter) > 1:
+            raise EmitError(
+                f"axis {letter} has two joints ({letters}), which are moved alike and homed apart",
+                "use --form adaptive-feed",
+                ini.place(),
+            )
+        if letter not in letters:
+            continue
+        joint = letters.index(letter)
+        signals = []
+        for pin in (f"joint.{joint}.motor-pos-cmd", f"joint.{joint}.motor-pos-fb"):
+            if pin not in hal.signal:
+                raise EmitError(
+                    f"{pin} is linked to no signal in these HAL files",
+                    f"link it: net {letter.lower()}-pos {pin} => ...",
+                    ini.place(),
+                )
+            signals.append(hal.signal[pin][0])
+        out.append(hal_files.Joint(joint, letter, *signals))
+    if len(out) < 2:
+        raise EmitError(f"there are no axes X, Y or Z in {letters!r}", None, ini.place())
+    return hal.functions["servo-thread"].index("motion-controller") + 1, out
+
+
+def _period(ini: Ini) -> float:
+    """Of the servo thread [s]."""
+    text = ini.value("EMCMOT", "SERVO_PERIOD") or ""
+    if not text.isdigit() or not 50_000 <= int(text) <= 10_000_000:
+        raise EmitError(
+            f"[EMCMOT] SERVO_PERIOD is {text or 'missing'}", "say it in ns: 1000000", ini.place()
+        )
+    base = ini.value("EMCMOT", "BASE_PERIOD") or "0"
+    if base.isdigit() and int(base) and int(text) % int(base):
+        raise EmitError(
+            f"SERVO_PERIOD {text} is no multiple of BASE_PERIOD {base}: the servo thread then runs "
+            f"every {int(text) // int(base) * int(base)} ns",
+            "make it a multiple, and set interval of the machine file alike",
+            Place(str(ini.path)),
+        )
+    return int(text) * 1e-9
+
+
+def _script() -> bytes:
+    return (hal_files.HERE / hal_files.SCRIPT).read_bytes()
+
+
+def _script_path(ini: Ini) -> Path:
+    """Where the M code goes: the first folder of M codes, or beside the INI."""
+    named = (ini.value("RS274NGC", "USER_M_PATH") or "").split(":")[0].strip()
+    folder = (ini.folder / Path(named).expanduser()) if named else ini.folder
+    if not folder.is_dir():
+        raise EmitError(
+            f"[RS274NGC] USER_M_PATH names {named}, which is no folder", "correct it", ini.place()
+        )
+    return folder / hal_files.SCRIPT
+
+
+def _sum(data: bytes) -> bytes:
+    return hashlib.blake2b(data, digest_size=8).hexdigest().encode()
+
+
+def _write(path: Path, data: bytes, mode: int | None = None) -> None:
+    """Write a file in one move."""
+    with new_file(str(path), like=str(path) if path.exists() else None) as file:
+        file.write(data)
+    if mode is not None:
+        os.chmod(path, mode)

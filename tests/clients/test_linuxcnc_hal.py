@@ -1,0 +1,324 @@
+"""LinuxCNC plays the streams of `linuxcnc-hal`, installed by `gcodejerk install linuxcnc`.
+
+What the drives get is recorded in every servo period: it has to be the plan, and whatever happens
+on the way (abort, hold, machine off, a missing or a wrong file, a feeder that dies), the machine
+stops, and no step from one period to the next is larger than the limits allow.
+"""
+
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcodejerk.hosts.linuxcnc.install import install
+from gcodejerk.machine import Machine
+from gcodejerk.motion import sample_profiles
+from gcodejerk.rewrite.pipeline import process
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "linuxcnc"))
+import lcnc  # noqa: E402
+
+pytestmark = [
+    pytest.mark.linuxcnc,
+    pytest.mark.playback,
+    pytest.mark.skipif(
+        shutil.which("linuxcnc") is None, reason="LinuxCNC (linuxcnc-uspace) is absent"
+    ),
+]
+
+DT = 0.001
+VELOCITY, ACCELERATION = 500.0, 5250.0
+"""LinuxCNC's limits of each axis; the machine file has 5000 mm/s^2."""
+ADAPTIVE, POSITION = "adaptive-feed", "position"
+AXIS = """  {axis}:
+    resolution: 1.0e-4
+    rapid: {{velocity: 500, acceleration: 5250}}
+    limit: {{velocity: 500, acceleration: 5000, jerk: 5.0e+6}}
+    modes:
+{modes}"""
+MODE = "      - {{name: m{0}, frequency: {0}, damping: 0.02, participation: 1.0}}\n"
+MACHINE = Machine.loads(
+    "schema: 1\nname: played mill\ncontroller: linuxcnc-hal\nunits: mm\ninterval: 0.001\n"
+    "positioning: linear\naxes:\n"
+    + "".join(
+        AXIS.format(axis=axis, modes="".join(MODE.format(f) for f in frequencies))
+        for axis, frequencies in (("X", (30,)), ("Y", (50,)), ("Z", (30, 90)))
+    ),
+    "played.yaml",
+)
+MIXED = b"""G21 G90 G17 G40 G94 G64
+G0 X0 Y0 Z0
+G4 P0.1
+G1 X2 F600
+G0 Z1
+G1 X4 F600
+G0 X30 Y20
+G0 X12 Y30 Z-9
+G1 X13 F600
+G91
+G0 X-10 Z5
+G0 Y-15
+G90
+G20
+G1 X0.15 F20
+G0 X0.5 Y0.2 Z0.3
+G21
+G1 X14 F600
+M3 S100
+G0 X100 Z0
+G4 P0.05
+G0 Z12.5
+G4 P0.1
+M2
+"""
+LONG = b"""G21 G90 G17 G40 G94 G64
+G0 X0 Y0 Z0
+G1 X1 F600
+G0 X300 Y100 Z-20
+G1 X299 F600
+G0 X10 Y0 Z0
+M2
+"""
+BETWEEN = {"axis": "X", "beyond": 100.0}
+"""An event when LinuxCNC itself is at X100 of the first rapid of LONG."""
+
+
+def play(data, form, *, events=None, change=None, timeout=30):
+    """Process a program, install the form, and play it."""
+    result = process(data, MACHINE, form=form)
+    output, samples = result.output, result.beside
+
+    def prepare(home):
+        install(str(home / "sim.ini"), form)
+        (home / "program.ngc.streams").write_bytes(samples)
+        if change is not None:
+            change(home)
+
+    handle, path = tempfile.mkstemp(suffix=".ngc")
+    with open(handle, "wb") as file:
+        file.write(output)
+    try:
+        run = lcnc.run(
+            path,
+            acceleration=ACCELERATION,
+            velocity=VELOCITY,
+            settings={"TRAJ": {"MAX_LINEAR_VELOCITY": 1000}},
+            timeout=timeout,
+            events=events,
+            prepare=prepare,
+        )
+    except lcnc.Unavailable as reason:
+        pytest.skip(f"LinuxCNC cannot run here: {reason}")
+    finally:
+        os.unlink(path)
+    return result, run
+
+
+def positions(run):
+    return np.array([row[1:4] for row in run.rows])
+
+
+def judge(result, run):
+    """For each rapid: how far it is off its plan [mm], how long it took besides, its residuals."""
+    plans, q, at, out = result.plans, positions(run), 0, []
+    for row in np.flatnonzero(plans.planned).tolist():
+        way = plans.displacement[row, :3]
+        start, length = result.program.rapids.start[row, :3], np.linalg.norm(way)
+        arrived = np.flatnonzero(np.linalg.norm(q[at:] - start - way, axis=1) < 1e-5)
+        assert len(arrived), f"rapid {row} never arrives"
+        end = at + arrived[0]
+        begin = np.flatnonzero(np.linalg.norm(q[at:end] - start, axis=1) < 1e-5)[-1] + at
+        progress = (q[begin : end + 1] - start) @ way / length
+        aside = np.linalg.norm(
+            q[begin : end + 1] - start - np.outer(progress / length, way), axis=1
+        ).max()
+        count = int(plans.counts[row])
+        of_move = plans.profiles_of(row)
+        profile = plans.profiles.take(slice(of_move.start, of_move.start + 1))
+        plan = sample_profiles(profile, np.arange(count + 1)[np.newaxis], DT)[0][0] * length
+        off = np.inf
+        for shift in range(-4, 6):
+            k = np.arange(len(progress)) - shift
+            inside = (k >= 0) & (k <= count)
+            wanted = np.interp(k, np.arange(count + 1), plan)
+            off = min(off, np.abs(progress - wanted)[inside].max())
+        kicks = np.diff(np.diff(np.clip(progress, 0.0, length), prepend=0.0, append=length)) / DT
+        left = np.arange(len(kicks))[::-1] * DT
+        poles = plans.modes.poles
+        response = np.abs((kicks[:, np.newaxis] * np.exp(poles * left[:, np.newaxis])).sum(axis=0))
+        felt = np.abs(plans.modes.participation[:, :3] @ way) / length
+        out.append((off, aside, end - begin - count, response / poles.imag * felt))
+        at = end
+    return out
+
+
+def steps(run):
+    """The largest velocity and acceleration of any axis that the drives get."""
+    velocity = np.diff(positions(run), axis=0) / DT
+    return np.abs(velocity).max(), np.abs(np.diff(velocity, axis=0) / DT).max()
+
+
+def assert_within_limits(run, *, braked=True):
+    velocity, acceleration = steps(run)
+    assert velocity <= VELOCITY * 1.001
+    # LinuxCNC itself freezes the command when the machine is switched off: no jump, but no ramp.
+    assert not braked or acceleration <= ACCELERATION * 1.01
+
+
+@pytest.mark.parametrize(("form", "most"), [(ADAPTIVE, 2e-3), (POSITION, 1e-9)])
+def test_what_is_played_is_the_plan(form, most):
+    result, run = play(MIXED, form)
+    assert result.planned >= 8
+    plans = result.plans
+    tolerance = np.maximum(0.10 * result.residual, 0.03 * result.conventional_residual)
+    rows = np.flatnonzero(plans.planned)
+    for row, (off, aside, late, residual) in zip(rows, judge(result, run), strict=True):
+        assert off <= most, (row, off)
+        assert aside <= 1e-6
+        assert abs(late) <= 5, (row, late)
+        # The last sample that counts may be some periods behind the arrival.
+        error = np.abs(residual - result.residual[row])
+        assert (error <= tolerance[row] + 1e-9).all(), (row, residual, result.residual[row])
+    assert_within_limits(run)
+    assert run.position == pytest.approx((100.0, result.program.rapids.target[-1, 1], 12.5))
+
+
+@pytest.mark.parametrize(("form", "way"), [(ADAPTIVE, 60.0), (POSITION, 110.0)])
+def test_abort_in_a_stream_stops_on_the_line_within_the_limits(form, way):
+    _, run = play(LONG, form, events=[{"do": "abort", **BETWEEN}])
+    assert_within_limits(run)
+    end = positions(run)[-1]
+    assert 100.0 < end[0] < 100.0 + way
+    assert end[1:] - np.array([100.0, -20.0]) * (end[0] - 1.0) / 299.0 == pytest.approx(0, abs=1e-5)
+    assert run.position == pytest.approx(tuple(end), abs=1e-6)
+    # With samples of its own the machine is switched off, so that LinuxCNC takes its place.
+    assert run.enabled == (form == ADAPTIVE)
+
+
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_behind_an_abort_the_program_runs_from_its_start(form):
+    events = [
+        {"do": "abort", **BETWEEN},
+        {"do": "on", "after": 0.5},
+        {"do": "run", "after": 0.2},
+        {"do": "wait", "after": 0.5},
+        {"do": "wait", "idle": True},
+    ]
+    _, run = play(LONG, form, events=events)
+    assert_within_limits(run)
+    assert run.position == pytest.approx((10.0, 0.0, 0.0))
+    assert positions(run)[:, 0].max() == pytest.approx(300.0)
+
+
+@pytest.mark.parametrize(
+    ("form", "off"), [(ADAPTIVE, "off"), (POSITION, "off"), (POSITION, "estop")]
+)
+def test_a_machine_that_is_switched_off_in_a_stream_stays_where_it_stops(form, off):
+    events = [{"do": off, **BETWEEN}, {"do": "reset", "after": 0.4}, {"do": "on", "after": 0.2}]
+    events += [{"do": "wait", "after": 0.3}]
+    _, run = play(LONG, form, events=events if off == "estop" else [events[0], *events[2:]])
+    assert_within_limits(run, braked=form == POSITION)
+    end = positions(run)[-1]
+    assert 100.0 < end[0] < 220.0
+    assert run.position == pytest.approx(tuple(end), abs=1e-6)
+    assert run.enabled
+
+
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_feed_hold_and_override_keep_the_limits_and_the_ends(form):
+    events = [
+        {"do": "pause", **BETWEEN},
+        {"do": "feed", "to": 0.5, "after": 0.5},
+        {"do": "resume", "after": 0.1},
+        {"do": "wait", "idle": True},
+    ]
+    _, run = play(LONG, form, events=events)
+    assert_within_limits(run)
+    assert run.position == pytest.approx((10.0, 0.0, 0.0))
+    held = run.told[1]["position"]
+    assert 100.0 < held[0] < 300.0
+
+
+def test_a_hold_in_front_of_a_stream_and_no_rapid_override_keep_it_waiting():
+    """The drives stay where they are as long as LinuxCNC's own G0 may not begin."""
+    events = [
+        {"do": "rapid", "to": 0.0, "after": 0.0},
+        {"do": "wait", "after": 1.5},
+        {"do": "pause", "after": 0.0},
+        {"do": "rapid", "to": 1.0, "after": 0.1},
+        {"do": "wait", "after": 0.4},
+        {"do": "resume", "after": 0.0},
+        {"do": "wait", "idle": True},
+    ]
+    _, run = play(LONG, POSITION, events=events)
+    assert_within_limits(run)
+    q = positions(run)[:, 0]
+    stood = np.flatnonzero(np.abs(q - 1.0) < 1e-6)
+    assert stood[-1] - stood[0] > 1500
+    assert run.position == pytest.approx((10.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("form", "damage", "says"),
+    [
+        (ADAPTIVE, None, "cannot read"),
+        (POSITION, None, "cannot read"),
+        (ADAPTIVE, b"\n0.0", "is not the file that was written"),
+    ],
+)
+def test_without_its_file_of_samples_nothing_moves(form, damage, says):
+    def change(home):
+        path = home / "program.ngc.streams"
+        data = path.read_bytes()
+        path.unlink()
+        if damage is not None:
+            path.write_bytes(data.replace(b"\n0.", damage, 1))
+
+    events = [{"do": "wait", "after": 0.4}, {"do": "wait", "idle": True}]
+    _, run = play(LONG, form, events=events, change=change)
+    assert np.abs(positions(run)).max() == 0.0
+    assert any(says in message for message in run.messages), run.messages
+
+
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_a_feeder_that_dies_stops_the_machine_in_front_of_the_next_rapid(form):
+    def shallow(home):
+        path = home / "gcodejerk.hal"
+        path.write_text(path.read_text().replace("depth=60000", "depth=800"))
+
+    events = [
+        {"do": "kill", **BETWEEN},
+        {"do": "wait", "after": 1.5},
+        {"do": "abort", "after": 0.0},
+        {"do": "mdi", "text": "M152", "after": 0.1},
+        {"do": "mdi", "text": "G0 X280", "after": 0.8},
+        {"do": "wait", "after": 0.5},
+    ]
+    _, run = play(LONG, form, events=events, change=shallow)
+    assert_within_limits(run)
+    assert run.told[1]["position"] == pytest.approx([299.0, 100.0, -20.0], abs=1e-4)
+    assert run.position == pytest.approx((280.0, 100.0, -20.0), abs=1e-4)
+
+
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_behind_run_from_line_the_machine_stands_at_the_first_stream(form):
+    lines = process(LONG, MACHINE, form=form).output.splitlines()
+    line = lines.index(b"G1 X299 F600") + 2
+    events = [
+        {"do": "abort", "after": 0.0},
+        {"do": "run", "line": line, "after": 0.4},
+        {"do": "wait", "after": 1.5},
+        {"do": "abort", "after": 0.0},
+        {"do": "mdi", "text": "G0 X-5", "after": 0.3},
+        {"do": "wait", "after": 0.4},
+    ]
+    _, run = play(LONG, form, events=events)
+    assert_within_limits(run)
+    assert any("does not come next" in message for message in run.messages), run.messages
+    assert run.told[2]["position"] == pytest.approx(run.told[3]["position"], abs=1e-9)
+    assert run.position[0] == pytest.approx(-5.0)

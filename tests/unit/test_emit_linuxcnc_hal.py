@@ -1,0 +1,205 @@
+"""Controller `linuxcnc-hal`: two files that belong together, and what `verify` makes of damage."""
+
+import hashlib
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcodejerk import EmitError, Machine, process, verify
+from gcodejerk.cli import main
+from gcodejerk.emit import load_controller
+from gcodejerk.verification import verify_files
+
+ROOT = Path(__file__).parents[1]
+TEXT = (ROOT / "golden" / "hal_position" / "machine.yaml").read_text().replace("0.005", "0.001")
+MACHINE = Machine.loads(TEXT)
+PROGRAM = (
+    b"G21 G90 G17 G40 G94 G64\nG0 X0 Z0\nG1 X1 F600\nG0 X11 Z-5\nG91\nG0 Z2\nG0 X-3\nG90\n"
+    b"G1 X5 F300\nG0 X100\nM2\n"
+)
+FORMS = ("adaptive-feed", "position")
+
+
+def pair(form, program=PROGRAM, **options):
+    result = process(program, MACHINE, form=form, **options)
+    return result.output, result.beside
+
+
+def judged(output, beside, program=PROGRAM):
+    return verify(program, output, MACHINE, controller="linuxcnc-hal", beside=beside)
+
+
+def samples(beside):
+    """Numbers of each rapid, by its number."""
+    out = {}
+    for line in beside.decode().splitlines()[1:]:
+        if line.startswith("rapid"):
+            rows = out.setdefault(int(line.split()[1]), [])
+        else:
+            rows.append(float(line))
+    return {number: np.array(rows) for number, rows in out.items()}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_program_asks_for_the_rapids_that_stand_beside_it(form):
+    output, beside = pair(form)
+    asked = [int(n) for n in re.findall(rb"^M6[78] E3 Q([1-9][0-9]*)$", output, re.MULTILINE)]
+    assert asked == list(samples(beside)) == [2, 3, 4, 5]
+    assert judged(output, beside).ok
+
+
+def test_stream_means_adaptive_feed():
+    assert pair("stream") == pair("adaptive-feed")
+    assert load_controller("linuxcnc-hal").in_form("stream").form == "adaptive-feed"
+    with pytest.raises(EmitError, match="cannot write --as pvt"):
+        process(PROGRAM, MACHINE, form="pvt")
+
+
+def test_shares_of_the_way_end_at_the_end():
+    for rows in samples(pair("position")[1]).values():
+        assert rows[-1] == 1.0
+        assert (np.diff(rows) >= 0.0).all()
+
+
+def test_speeds_add_up_to_the_way():
+    output, beside = pair("adaptive-feed")
+    feeds = [float(f) for f in re.findall(rb"F([0-9.]+)\nG0 [XZ][^\n]*\nG0 F", output)]
+    lengths = [np.hypot(10, 5), 2.0, 3.0, 95.0]
+    for rows, feed, length in zip(samples(beside).values(), feeds, lengths, strict=True):
+        assert rows[-1] == 0.0
+        assert rows.max() == 1.0
+        moved = np.sum(0.5 * (rows + np.append(0.0, rows[:-1]))) * 1e-3 * feed / 60.0
+        assert moved == pytest.approx(length, abs=1e-5)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+def test_other_lines_are_kept_whatever_their_ends(form, end):
+    program = PROGRAM.replace(b"\n", end)
+    output, beside = pair(form, program)
+    assert output.count(end) == output.count(b"\n")
+    assert judged(output, beside, program).ok
+
+
+DAMAGES = {
+    "a sample": lambda o, b: (o, b.replace(b"\n0.1", b"\n0.2", 1)),
+    "a rapid is missing": lambda o, b: (o, b[: b.index(b"rapid 3")] + b[b.index(b"rapid 4") :]),
+    "a rapid too many": lambda o, b: (o, b + b[b.index(b"rapid 5") :]),
+    "the order of rapids": lambda o, b: (o, b.replace(b"rapid 3 ", b"rapid 4 ", 1)),
+    "the displacement": lambda o, b: (o, b.replace(b"rapid 2 4", b"rapid 2 5", 1)),
+    "the number asked for": lambda o, b: (re.sub(rb"E3 Q3\n", b"E3 Q4\n", o), b),
+    "the sum": lambda o, b: (re.sub(rb"M152 P[0-9]", b"M152 P9", o), b),
+    "no M152": lambda o, b: (re.sub(rb"M152 [^\n]*\n", b"", o), b),
+    "the end": lambda o, b: (o.replace(b"G0 X11 Z-5\n", b"G0 X11.001 Z-5\n"), b),
+    "another form": lambda o, b: (
+        o,
+        b.replace(b"adaptive-feed", b"POSITION")
+        .replace(b"position", b"adaptive-feed")
+        .replace(b"POSITION", b"position"),
+    ),
+    "another interval": lambda o, b: (o, b.replace(b" 0.001\n", b" 0.002\n", 1)),
+    "no samples": lambda o, b: (o, None),
+    "no file of samples": lambda o, b: (o, b"block,t,X\n"),
+    "text in the samples": lambda o, b: (o, b.replace(b"\n0.1", b"\nx.1", 1)),
+    "a backward sample": lambda o, b: (o, b.replace(b"\n0.5", b"\n0.0", 1)),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_verify_finds(form, damage):
+    output, beside = DAMAGES[damage](*pair(form))
+    found = judged(output, beside)
+    assert not found.ok
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_samples_that_were_changed_together_with_their_sum_are_judged_by_what_they_play(form):
+    """Who writes the sum anew still has to keep the limits and the ends."""
+    output, beside = pair(form)
+    rows = beside.splitlines(keepends=True)
+    middle = len(rows) - len(samples(beside)[5]) // 2
+    rows[middle] = b"%.12f\n" % (float(rows[middle]) * 0.98)
+    changed = b"".join(rows)
+    digest = hashlib.blake2b(changed, digest_size=6).digest()
+    sums = (int.from_bytes(digest[:3], "big"), int.from_bytes(digest[3:], "big"))
+    output = re.sub(rb"M152 [^\n]*", b"M152 P%08d Q%08d" % sums, output)
+    kinds = {str(v.kind) for v in judged(output, changed).violations}
+    assert kinds & {"acceleration limit", "jerk limit", "backwards or past the end"}
+
+
+def test_a_program_without_its_samples_is_refused_by_name():
+    output, _ = pair("position")
+    machine = MACHINE
+    found = verify_files(io.BytesIO(PROGRAM), io.BytesIO(output), machine)
+    assert "no file of samples beside" in found.violations[0].problem
+
+
+def test_machines_and_programs_that_it_cannot_serve_are_refused():
+    with pytest.raises(EmitError, match="positioning: independent"):
+        process(PROGRAM, Machine.loads(TEXT.replace("linear", "independent")))
+    with pytest.raises(EmitError, match="read as fanuc"):
+        process(PROGRAM, MACHINE, dialect="fanuc")
+
+
+def run(capsys, monkeypatch, *arguments):
+    monkeypatch.setattr("sys.argv", ["gcodejerk", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "part.ngc").write_bytes(PROGRAM)
+    (tmp_path / "m.yaml").write_text(TEXT)
+    return tmp_path
+
+
+def test_both_files_appear_together_and_are_verified(folder, capsys, monkeypatch):
+    part, machine = folder / "part.ngc", folder / "m.yaml"
+    for form in FORMS:
+        code, out, _ = run(capsys, monkeypatch, "process", part, "-m", machine, "--as", form)
+        assert code == 0
+        assert "part.jerk.ngc.streams" in out
+        written = [folder / name for name in ("part.jerk.ngc", "part.jerk.ngc.streams")]
+        assert tuple(path.read_bytes() for path in written) == pair(form)
+        done = folder / "part.jerk.ngc"
+        code, out, _ = run(capsys, monkeypatch, "verify", part, done, "-m", machine)
+        assert (code, "nothing else changed" in out) == (0, True)
+    (folder / "part.jerk.ngc.streams").unlink()
+    code, out, _ = run(capsys, monkeypatch, "verify", part, done, "-m", machine)
+    assert (code, "no file of samples" in out) == (1, True)
+
+
+def test_standard_output_cannot_hold_two_files(folder, capsys, monkeypatch):
+    part, machine = folder / "part.ngc", folder / "m.yaml"
+    code, out, err = run(capsys, monkeypatch, "process", part, "-m", machine, "-o", "-")
+    assert (code, out) == (2, "")
+    assert "writes two files" in err
+    code, _, _ = run(capsys, monkeypatch, "process", part, "-m", machine, "--check")
+    assert code == 1
+    assert sorted(p.name for p in folder.iterdir()) == ["m.yaml", "part.ngc"]
+
+
+def test_in_place_and_folders_keep_the_samples_beside_the_program(folder, capsys, monkeypatch):
+    part, machine = folder / "part.ngc", folder / "m.yaml"
+    out = folder / "out"
+    assert run(capsys, monkeypatch, "process", part, "-m", machine, "--output-dir", out)[0] == 0
+    assert sorted(p.name for p in out.iterdir()) == ["part.ngc", "part.ngc.streams"]
+    assert run(capsys, monkeypatch, "process", part, "-m", machine, "--in-place")[0] == 0
+    assert part.read_bytes() == (out / "part.ngc").read_bytes()
+    assert (folder / "part.ngc.streams").read_bytes() == (out / "part.ngc.streams").read_bytes()
+
+
+def test_a_file_of_somebody_elses_is_not_replaced(folder, capsys, monkeypatch):
+    (folder / "part.jerk.ngc.streams").write_text("mine")
+    part, machine = folder / "part.ngc", folder / "m.yaml"
+    code, _, err = run(capsys, monkeypatch, "process", part, "-m", machine)
+    assert (code, "was not written by gcodejerk" in err) == (1, True)
+    assert not (folder / "part.jerk.ngc").exists()
+    assert (folder / "part.jerk.ngc.streams").read_text() == "mine"

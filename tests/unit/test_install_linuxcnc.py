@@ -1,0 +1,239 @@
+"""`install linuxcnc`: in, out again byte for byte, and refused where it cannot be."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from gcodejerk.cli import main
+from gcodejerk.errors import EmitError
+from gcodejerk.hosts.linuxcnc import hal_files
+from gcodejerk.hosts.linuxcnc.install import install, remove
+
+KIT = Path(__file__).parents[1] / "clients" / "linuxcnc"
+FORMS = hal_files.FORMS
+
+
+@pytest.fixture
+def config(tmp_path):
+    """A configuration of LinuxCNC's: its INI."""
+    for name in ("sim.ini", "sim.hal", "sim.tbl"):
+        shutil.copy(KIT / name, tmp_path / name)
+    return tmp_path / "sim.ini"
+
+
+def add(config, form="adaptive-feed", version="2.9.4"):
+    return install(str(config), form, version)
+
+
+def everything(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_is_installed_is_taken_out_again_byte_for_byte(config, form):
+    before = everything(config.parent)
+    add(config, form)
+    after = everything(config.parent)
+    assert set(after) - set(before) == {"gcodejerk.hal", "M152", "sim.ini.before-gcodejerk"}
+    assert after["sim.ini.before-gcodejerk"] == before["sim.ini"]
+    assert b"HALFILE = sim.hal\n# gcodejerk begin\nHALFILE = gcodejerk.hal\n" in after["sim.ini"]
+    assert (config.parent / "M152").stat().st_mode & 0o111
+    assert "nothing was changed" in add(config, form)[0]
+    assert everything(config.parent) == after
+    remove(str(config))
+    assert everything(config.parent) == before
+    assert "nothing of gcodejerk" in remove(str(config))[0]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "unended"])
+def test_line_ends_are_kept(config, end):
+    data = config.read_bytes()
+    if end == "unended":
+        hal = data.index(b"[HAL]\nHALFILE = sim.hal\n")
+        data = data[:hal] + data[hal + 24 :] + b"[HAL]\nHALFILE = sim.hal"
+    config.write_bytes(data.replace(b"\n", b"\r\n") if end == "\r\n" else data)
+    before = config.read_bytes()
+    add(config)
+    assert b"gcodejerk.hal" in config.read_bytes()
+    remove(str(config))
+    assert config.read_bytes() == before
+
+
+def test_a_path_of_m_codes_is_added_where_there_is_none(config):
+    edit(config, "USER_M_PATH = .\n", "")
+    before = config.read_bytes()
+    add(config)
+    assert f"USER_M_PATH = {config.parent}\n".encode() in config.read_bytes()
+    remove(str(config))
+    assert config.read_bytes() == before
+
+
+def test_what_the_user_edits_elsewhere_stays(config):
+    add(config)
+    edit(config, "MACHINE = gcodejerk-sim", "MACHINE = mine")
+    done = remove(str(config))
+    assert "MACHINE = mine" in config.read_text()
+    assert "gcodejerk.hal" not in config.read_text()
+    assert any("kept, the INI was edited since" in line for line in done)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "says"),
+    [
+        ("sim.ini", "HALFILE = gcodejerk.hal\n", "HALFILE = gcodejerk.hal\nX = 1\n", "were edited"),
+        ("sim.ini", "# gcodejerk end\n", "", "not in pairs"),
+        ("gcodejerk.hal", "setp", "# setp", "was edited after it was installed"),
+    ],
+)
+def test_what_the_user_edits_in_between_is_not_taken_out(config, name, old, new, says):
+    add(config)
+    edit(config.parent / name, old, new)
+    before = everything(config.parent)
+    with pytest.raises(EmitError, match=says):
+        remove(str(config))
+    assert everything(config.parent) == before
+
+
+def test_the_other_form_is_installed_behind_a_removal_only(config):
+    add(config)
+    before = everything(config.parent)
+    with pytest.raises(EmitError, match="adaptive-feed is installed already"):
+        add(config, "position")
+    assert everything(config.parent) == before
+
+
+def test_files_that_another_configuration_uses_stay(config):
+    other = config.with_name("other.ini")
+    shutil.copy(config, other)
+    add(config)
+    add(other)
+    remove(str(other))
+    assert (config.parent / "gcodejerk.hal").exists()
+    remove(str(config))
+    assert not (config.parent / "gcodejerk.hal").exists()
+
+
+REFUSED = [
+    ("sim.ini", "[EMCMOT]", "[MOTION]", "no LinuxCNC configuration"),
+    ("sim.ini", "HALFILE = sim.hal", "HALFILE = gone.hal", "gone.hal does not exist"),
+    ("sim.ini", "HALFILE = sim.hal", "HALFILE = sim.tcl", "is a Tcl script"),
+    ("sim.ini", "HALFILE = sim.hal\n", "", "no HALFILE"),
+    ("sim.ini", "EMCMOT = motmod", "EMCMOT = other", "not motmod"),
+    ("sim.ini", "USER_M_PATH = .", "USER_M_PATH = gone", "no folder"),
+    ("sim.hal", "loadrt scale", "loadrt streamer depth=9 cfg=f\nloadrt scale", "one FIFO"),
+    ("sim.hal", "loadrt scale", "loadrt near\nloadrt scale", "component near is loaded here"),
+    (
+        "sim.hal",
+        "net line",
+        "net load load.out => motion.adaptive-feed\nnet line",
+        "motion.adaptive-feed is linked to the signal load",
+    ),
+    ("sim.hal", "net line", "net probe motion.digital-in-03\nnet line", "digital-in-03 is linked"),
+    ("sim.hal", "num_joints=", "num_dio=2 num_joints=", "num_dio=2"),
+    ("sim.hal", "addf motion-controller servo-thread", "", "in no thread servo-thread"),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "says"), REFUSED)
+def test_a_configuration_that_does_not_fit_is_refused_and_left_alone(config, name, old, new, says):
+    edit(config.parent / name, old, new)
+    before = everything(config.parent)
+    with pytest.raises(EmitError, match=says) as refused:
+        add(config)
+    assert refused.value.remedy
+    assert everything(config.parent) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "says"),
+    [
+        ("sim.ini", "KINEMATICS = trivkins", "KINEMATICS = maxkins", "KINEMATICS is maxkins"),
+        ("sim.ini", "COORDINATES = X Y Z", "COORDINATES = X Y Y Z", "axis Y has two joints"),
+        ("sim.hal", "net z-command joint.2.motor-pos-cmd", "net z-command", "linked to no signal"),
+        ("sim.hal", "addf sampler.0 servo-thread", "addf sampler.0 servo-thread -2", "depends on"),
+        ("sim.hal", "net line", "net on motion.enable\nnet line", "motion.enable is linked"),
+        ("sim.ini", "BASE_PERIOD = 0", "BASE_PERIOD = 30000", "no multiple of BASE_PERIOD"),
+    ],
+)
+def test_the_form_position_needs_more(config, name, old, new, says):
+    edit(config.parent / name, old, new)
+    before = everything(config.parent)
+    with pytest.raises(EmitError, match=says):
+        add(config, "position")
+    assert everything(config.parent) == before
+
+
+def test_read_only_configurations_and_unknown_versions_are_refused(config, monkeypatch):
+    before = everything(config.parent)
+    config.chmod(0o444)
+    with pytest.raises(EmitError, match="cannot be written to"):
+        add(config)
+    config.chmod(0o644)
+    with pytest.raises(EmitError, match=r"LinuxCNC 2\.10"):
+        add(config, version="2.10.0")
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(EmitError, match="version of LinuxCNC cannot be told"):
+        install(str(config), "adaptive-feed")
+    (config.parent / "M152").write_text("mine")
+    with pytest.raises(EmitError, match="is not what would be written"):
+        add(config)
+    (config.parent / "M152").unlink()
+    assert everything(config.parent) == before
+
+
+def test_the_drives_take_their_place_behind_motion_controller(config):
+    """Functions stand in the thread behind LinuxCNC's own, in front of what drives the motors."""
+    add(config, "position")
+    text = (config.parent / "gcodejerk.hal").read_text()
+    places = [line.split() for line in text.splitlines() if line.startswith("addf")]
+    assert [int(words[3]) for words in places] == list(range(3, 3 + len(places)))
+    for axis, joint in zip("xyz", range(3), strict=True):
+        assert f"net {axis}-command gcodejerk-drive-{joint}.out" in text
+    loaded = {
+        name
+        for line in text.splitlines()
+        if line.startswith("loadrt") and "names=" in line
+        for name in line.split("names=")[1].split(",")
+    }
+    assert {words[1] for words in places} == loaded | {"streamer.0"}
+
+
+def test_every_component_of_the_adaptive_feed_form_runs(config):
+    add(config)
+    text = (config.parent / "gcodejerk.hal").read_text()
+    run = {line.split()[1] for line in text.splitlines() if line.startswith("addf")}
+    loaded = {
+        name
+        for line in text.splitlines()
+        if line.startswith("loadrt") and "names=" in line
+        for name in line.split("names=")[1].split(",")
+    }
+    assert run == loaded | {"streamer.0"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["linuxcnc", "INI", "--linuxcnc-version", "2.9"], 0),
+        (["linuxcnc", "INI", "--form", "pvt"], 2),
+        (["linuxcnc", "INI", "--form", "position", "--remove"], 2),
+        (["machine", "INI"], 2),
+        (["linuxcnc", "gone.ini"], 1),
+    ],
+)
+def test_exit_status(config, arguments, code, capsys, monkeypatch):
+    named = [str(config) if word == "INI" else word for word in arguments]
+    monkeypatch.setattr("sys.argv", ["gcodejerk", "install", *named])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == code
+    out, err = capsys.readouterr()
+    assert bool(err) == (code > 0)
+    assert bool(out) == (code == 0)
