@@ -49,7 +49,7 @@ OVER = 1.05
 """MAX_ACCELERATION over limit.acceleration."""
 LEAD = 1e-5
 """How far what leads in may move. [mm]"""
-CREEP = 0.012
+CREEP = 0.02
 """Speed at the last period, at most. [mm/s]"""
 TOLERANCE = 0.01
 """[mm]"""
