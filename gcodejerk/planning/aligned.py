@@ -28,7 +28,7 @@ from gcodejerk.motion.servo.knots import (
     LONGEST,
     aligned_knots,
     block_kinds,
-    early_ends,
+    early_shift,
 )
 from gcodejerk.motion.servo.speed_fit import Wanted, fit_speeds
 from gcodejerk.motion.servo.spline_filter import unfiltered
@@ -47,8 +47,8 @@ WEIGHTS = np.array([1e6, 1e6, 1e6])
 """Of the responses at the modes, and at the ends of the band, against 1 of an interval's speed."""
 EMPHASES = (1.0, 0.03, 1e-3, 1e-5, 1e-8)
 """By which these are multiplied, one after the other, until a stream is near its profile."""
-KICK = 0.1
-"""What the end of a block in front of its period may do to the speed, about. [mm/s]"""
+SHIFT = 1e-3
+"""By which blocks that end before their periods may shift a stream, about. [mm]"""
 NEAR = 0.8
 """Share of `TOLERANCE`."""
 MOST_MODES = 24
@@ -75,8 +75,7 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         as planned.
     """
     moves = StraightMoves.of(sampler)
-    knots, enough = _knots(moves, stride)
-    speeds = _followed(moves, knots)
+    knots, speeds, enough = _followed(moves, stride)
     written = Written.of(moves, knots, speeds)
     played, grid = written.played()
     positions = {
@@ -112,8 +111,11 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
     )
 
 
-def _knots(moves: StraightMoves, stride: int) -> tuple[Counts, NDArray[np.bool_]]:
-    """Knots of all moves, and whether the planner looks far enough ahead for each."""
+def _knots(moves: StraightMoves, stride: int, *, calm: bool) -> tuple[Counts, NDArray[np.bool_]]:
+    """Knots of all moves, and whether the planner looks far enough ahead for each.
+
+    With `calm` blocks are longer where a slow start is delicate.
+    """
     interval, machine = moves.sampler.interval, moves.sampler.plans.machine
     every = Grid.every(moves.count, 1, interval)
     unit, speed = sample_profiles(moves.profiles, every.knots, interval)
@@ -123,9 +125,9 @@ def _knots(moves: StraightMoves, stride: int) -> tuple[Counts, NDArray[np.bool_]
     rows = np.arange(len(moves.count))
     knots = np.zeros((len(rows), 1), dtype=np.int64)
     enough = np.zeros(len(rows), dtype=np.bool_)
-    steady = np.zeros(len(rows), dtype=np.bool_)
+    worst = np.full(len(rows), np.inf)
     for periods in range(stride, max(stride, int(LONGEST / interval)) + 1):
-        left = np.flatnonzero(~(enough & steady))
+        left = np.flatnonzero(~enough | (worst > 0.0))
         if not len(left):
             break
         part, far = aligned_knots(
@@ -134,21 +136,48 @@ def _knots(moves: StraightMoves, stride: int) -> tuple[Counts, NDArray[np.bool_]
         at = np.take_along_axis(
             speed[left], speed.shape[1] - 1 - moves.count[left, np.newaxis] + part, axis=1
         )
-        kick = full[left] * early_ends(part, at, full[left], interval)
-        calm = kick < KICK
-        # Longer blocks make a slow start less delicate: taken until they no longer need to be.
-        taken = left[(far & calm) | ~enough[left]]
+        # Longer blocks make a slow start less delicate: calm with all that the control may be set
+        # to, or with what it has to be, or as calm as may be.
+        shift, least = (early_shift(part, at, a[left], interval) for a in (full, brake))
+        bad = (
+            np.zeros(len(left))
+            if not calm
+            else np.where(shift < SHIFT, 0.0, np.where(least < SHIFT, 1.0, 2.0 + least))
+        )
+        taken = left[(far & (bad < worst[left])) | ~enough[left]]
         chosen = np.isin(left, taken)
         width = max(knots.shape[1], part.shape[1])
         knots = np.pad(knots, ((0, 0), (width - knots.shape[1], 0)))
         knots[taken] = 0
         knots[taken, width - part.shape[1] :] = part[chosen]
-        enough[taken], steady[taken] = far[chosen], calm[chosen]
+        enough[taken], worst[taken] = far[chosen], bad[chosen]
     return knots, enough
 
 
-def _followed(moves: StraightMoves, knots: Counts) -> Array:
-    """Speeds at the knots that stay near the profile, shape (b, k) [mm/s].
+def _followed(moves: StraightMoves, stride: int) -> tuple[Counts, Array, NDArray[np.bool_]]:
+    """Knots, speeds at them [mm/s], and whether the planner looks far enough ahead for each move.
+
+    Longer blocks for the sake of a slow start are given up where they lead away from the profile.
+    """
+    knots, enough = _knots(moves, stride, calm=True)
+    speeds, near = _speeds(moves, knots)
+    rows = np.flatnonzero(~near)
+    if len(rows):
+        part, far = _knots(moves.take(rows), stride, calm=False)
+        other, better = _speeds(moves.take(rows), part)
+        better &= far
+        taken = rows[better]
+        width = max(knots.shape[1], part.shape[1])
+        knots, speeds = (np.pad(a, ((0, 0), (width - a.shape[1], 0))) for a in (knots, speeds))
+        knots[taken], speeds[taken] = 0, 0.0
+        knots[taken, width - part.shape[1] :] = part[better]
+        speeds[taken, width - part.shape[1] :] = other[better]
+        enough[taken] = True
+    return knots, speeds, enough
+
+
+def _speeds(moves: StraightMoves, knots: Counts) -> tuple[Array, NDArray[np.bool_]]:
+    """Speeds at the knots that stay near the profile, shape (b, k) [mm/s]; and which of them do.
 
     Where limits are near, no speeds leave just what the profile does: then they follow it, and what
     they leave is said as it is.
@@ -167,7 +196,9 @@ def _followed(moves: StraightMoves, knots: Counts) -> Array:
         left = left[(off > NEAR * TOLERANCE) | ~keeps]
         if not len(left):
             break
-    return out
+    near = np.ones(len(knots), dtype=np.bool_)
+    near[left] = False
+    return out, near
 
 
 def _within(moves: StraightMoves, knots: Counts, speeds: Array) -> NDArray[np.bool_]:

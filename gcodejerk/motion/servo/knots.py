@@ -23,8 +23,6 @@ END_PERIODS = 3
 """Of the first and the last block, at least. [intervals]"""
 HAIR = 4e-12
 """By how much blocks end before a period: more than what LinuxCNC takes for nothing (1e-12). [s]"""
-LAST = 3
-"""Blocks at the end of which no early end matters."""
 DIP = 0.005
 """A speed that falls and rises by less than this share of the peak goes on rising or falling."""
 
@@ -104,12 +102,12 @@ def aligned_knots(
     return knots, enough
 
 
-def early_ends(knots: Counts, speed: Array, acceleration: Array, interval: float) -> Array:
-    """By how much blocks end before their periods at most, all but the last ones.
+def early_shift(knots: Counts, speed: Array, acceleration: Array, interval: float) -> Array:
+    """How far blocks that end before their periods shift a motion, about.
 
     The rest of a period is run in the next block at full acceleration A, before its ramp begins:
     what a block ended too early by, the next one does by 1 + h (A - a)/(v_k + v_(k+1)) as much,
-    so that `HAIR` grows.
+    so that `HAIR` grows where a motion is slow.
 
     Parameters
     ----------
@@ -125,21 +123,21 @@ def early_ends(knots: Counts, speed: Array, acceleration: Array, interval: float
     Returns
     -------
     ndarray, shape (b,)
-        [s]
+        The largest: by the time at the speed, and at the speed that A gives in a period. [mm]
     """
     h, both = np.diff(knots, axis=1) * interval, speed[:, 1:] + speed[:, :-1]
     rise = np.diff(speed, axis=1)
     growth = 1.0 + (acceleration[:, np.newaxis] * h - rise) / np.maximum(both, CREEP)
     # No faster than F, which the speed at the end of the block is.
     bound = np.maximum(np.abs(rise), CREEP) / acceleration[:, np.newaxis]
+    per_time = speed + acceleration[:, np.newaxis] * interval
     now = np.zeros(len(knots))
     most = np.zeros(len(knots))
-    # In the last blocks hardly any speed is left that could change.
-    for k in range(h.shape[1] - LAST):
+    for k in range(h.shape[1]):
         begun = h[:, k] > 0.0
-        now = np.where(begun, np.minimum(now, bound[:, k]) * growth[:, k], now)
-        now += np.where(begun, HAIR, 0.0)
-        most = np.maximum(most, now)
+        now = np.where(begun, np.minimum(now, bound[:, k]) * growth[:, k] + HAIR, now)
+        now = np.minimum(now, interval)
+        most = np.maximum(most, now * per_time[:, k])
     return most
 
 
