@@ -168,7 +168,8 @@ def _followed(moves: StraightMoves, stride: int) -> tuple[Counts, Array, NDArray
         better &= far
         taken = rows[better]
         width = max(knots.shape[1], part.shape[1])
-        knots, speeds = (np.pad(a, ((0, 0), (width - a.shape[1], 0))) for a in (knots, speeds))
+        front = ((0, 0), (width - knots.shape[1], 0))
+        knots, speeds = np.pad(knots, front), np.pad(speeds, front)
         knots[taken], speeds[taken] = 0, 0.0
         knots[taken, width - part.shape[1] :] = part[better]
         speeds[taken, width - part.shape[1] :] = other[better]

@@ -95,7 +95,7 @@ def aligned_knots(
         rest = count - left
         # The first block has three periods at least, too.
         size = np.where(rest < size + END_PERIODS, rest, size)
-        size = np.where(size > longest + 1, rest - END_PERIODS, size)
+        size = np.where((size > longest + 1) & (size > END_PERIODS + 1), rest - END_PERIODS, size)
         left = left + size
         columns.append(left)
     knots: Counts = count[:, np.newaxis] - np.stack(columns[::-1], axis=1)

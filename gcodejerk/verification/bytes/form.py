@@ -50,10 +50,10 @@ class Stream:
     """Axes of the points in `text`, in the order written."""
     text: bytes
     """The points that are written alike."""
-    lead: list[dict[str, Decimal]] = field(default_factory=list)
-    """What stands in front of them and moves an axis a little, by letter."""
     rest: list[dict[str, Decimal]] = field(default_factory=list)
     """The points after these, by letter, F included."""
+    lead: list[dict[str, Decimal]] = field(default_factory=list)
+    """What stands in front of the points and moves an axis a little, by letter."""
 
     @property
     def ends(self) -> dict[str, Decimal]:

@@ -43,8 +43,8 @@ SLOW = 1.0
 """[mm/s]"""
 SHORTEST, ENDS = 2, 3
 """Periods of a block, and of the first and the last one, at least."""
-LONGEST = 0.01
-"""A block of so long is no longer blended as the others. [s]"""
+LONGEST, FEWEST = 0.01, 5
+"""A longer block is no longer blended as the others: in seconds, or in periods if that is more."""
 OVER = 1.05
 """MAX_ACCELERATION over limit.acceleration."""
 LEAD = 1e-5
@@ -148,7 +148,8 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
     lasts = np.where(first, count, count - np.roll(count, 1))
     last = np.roll(tail, -1)
     short = inner & (lasts < np.where(first | last, ENDS, SHORTEST))
-    long = inner & (lasts * interval > LONGEST * (1.0 + RELATIVE))
+    most_long = max(LONGEST, FEWEST * interval)
+    long = inner & (lasts * interval > most_long * (1.0 + RELATIVE))
     equal = point & ~first & (motion.feed == np.roll(motion.feed, 1))
     lead = paths.position[np.where(first, np.arange(len(first)) - 1, 0)] - paths.start[paths.owner]
     far = first & (np.abs(lead).max(axis=1) > LEAD)
