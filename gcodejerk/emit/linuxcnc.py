@@ -32,6 +32,7 @@ from gcodejerk.emit.base import Controller, Form, Options
 from gcodejerk.emit.frame import Frame
 from gcodejerk.emit.gcode import line_ends_of
 from gcodejerk.emit.number_format import Column, format_lines
+from gcodejerk.errors import EmitError
 from gcodejerk.machine import LINUXCNC, Machine
 from gcodejerk.nc import Dialect, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
@@ -73,6 +74,7 @@ class LinuxcncController(Controller):
 
     def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """Steps of the last decimal, in mm; increments are counted from the start."""
+        _check_settings(machine)
         inch = MM_PER_INCH * 10.0**-INCH_DECIMALS
         step = np.where(rapids.inch[:, np.newaxis], inch, 10.0**-DECIMALS)
         step = np.broadcast_to(step, rapids.start.shape)
@@ -116,6 +118,12 @@ class LinuxcncController(Controller):
                 "positioning: independent; rapids of several axes are left alone"
             )
         notes += _too_slow(plans)
+        options = plans.machine.controller_options
+        if options.version == "2.10" and options.planner_type is None:
+            notes.append(
+                "LinuxCNC 2.10 plays streams as planned with [TRAJ] PLANNER_TYPE = 0, its default, "
+                "only; nobody has played them on that version"
+            )
         open_mode = plans.planned & (rapids.path == 0)
         if open_mode.any():
             line = int(rapids.line[np.argmax(open_mode)])
@@ -142,6 +150,30 @@ def _too_slow(plans: Plans) -> list[str]:
         "limit.acceleration), or LinuxCNC plays the streams slower; rapids that were left alone "
         "then use it, too"
     ]
+
+
+def _check_settings(machine: Machine) -> None:
+    """Refuse settings of the control under which streams are not played as planned.
+
+    Raises
+    ------
+    EmitError
+        The planner stops in every block, or the motion runs at another interval.
+    """
+    options = machine.controller_options
+    if options.planner_type == 1:
+        raise EmitError(
+            "controller_options.planner_type is 1, expected 0: LinuxCNC's S-curve planner ends "
+            "every block of a stream at acceleration 0, up to a second late",
+            "set [TRAJ] PLANNER_TYPE = 0 in the INI file while streams run",
+        )
+    period = options.servo_period
+    if period is not None and abs(period - machine.interval) > 1e-6 * machine.interval:
+        raise EmitError(
+            f"interval is {machine.interval:g} s, but controller_options.servo_period is "
+            f"{period:g}: blocks have to end on the servo periods",
+            f"say interval: {period:g}",
+        )
 
 
 def _feeds(batch: Batch, rapids: Rapids) -> NDArray[np.int64]:

@@ -113,9 +113,7 @@ class Written:
             early = np.zeros(len(step))
             if dip.any():
                 at = np.flatnonzero(dip)
-                ends = passed(
-                    speed[at, k - 2], before[at], length[at], lasts[at] + whole_h[at], speed[at, k]
-                )
+                ends = passed(speed[at, k - 2], before[at], length[at], lasts[at] + whole_h[at])
                 speed[at, k - 1], speed[at, k], early[at] = ends
                 early[at] = lasts[at] - early[at]
                 most = np.maximum(most, np.where(speed[:, k - 1] > SLOW, early, 0.0))

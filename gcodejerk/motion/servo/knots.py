@@ -15,8 +15,6 @@ from gcodejerk.motion.servo.speed_fit import EVEN, FASTER, SLOWER
 
 CREEP = 0.01
 """The least of all speeds. [mm/s]"""
-ROUNDS = 6
-"""Of an iteration whose steps shrink by the rounding of a position."""
 LONGEST = 0.0085
 """Of a block, and a period more: from 10 ms on the planner no longer blends it. [s]"""
 END_PERIODS = 3
@@ -188,9 +186,7 @@ def block_kinds(speed: Array) -> NDArray[np.int64]:
     return kinds
 
 
-def passed(
-    before: Array, first: Array, second: Array, both: Array, after: Array
-) -> tuple[Array, Array, Array]:
+def passed(before: Array, first: Array, second: Array, both: Array) -> tuple[Array, Array, Array]:
     """Speeds at the knot between two blocks, and behind them, where the knot would be a minimum.
 
     The control passes it at the smaller of the speeds around it, so that one of the blocks is even.
@@ -203,8 +199,6 @@ def passed(
         Their lengths. [mm]
     both : ndarray, shape (n,)
         How long they last together. [s]
-    after : ndarray, shape (n,)
-        Speed behind them, about. [mm/s]
 
     Returns
     -------
@@ -215,9 +209,9 @@ def passed(
     """
     even = first / before
     behind = 2.0 * second / (both - even) - before
-    slow = np.array(after)
-    for _ in range(ROUNDS):
-        slow = second / (both - 2.0 * first / (before + slow))
+    # The second block even: s with 2 L_1/(b + s) + L_2/s = T.
+    b = both * before - 2.0 * first - second
+    slow = (np.sqrt(b * b + 4.0 * both * second * before) - b) / (2.0 * both)
     faster = behind >= before
     between = np.where(faster, before, slow)
     lasts = np.where(faster, even, 2.0 * first / (before + slow))
