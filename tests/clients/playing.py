@@ -44,6 +44,10 @@ class Played:
     """From the first motion to the last, more than T_SUM."""
     deviation: float
     residual: np.ndarray
+    way: np.ndarray
+    """Along the line, in every period of the recording. [mm]"""
+    begin: float
+    """Where in it the plan begins. [periods]"""
 
 
 MODES = (30, 50, 90, 110)
@@ -193,7 +197,8 @@ def judged(result, row, recorded, first, last, period, plain=False):
     response = (kicks[:, np.newaxis] * np.exp(modes.poles * left[:, np.newaxis])).sum(axis=0)
     share = np.abs(modes.participation[:, :3] @ moved) / length
     taken = int(here[-1] - here[0]) + 1 - count
-    return Played(row, taken, late, deviation, np.abs(response) / modes.poles.imag * share)
+    residual = np.abs(response) / modes.poles.imag * share
+    return Played(row, taken, late, deviation, residual, way, arrival - count)
 
 
 def _off(way, shift, moments, planned):
