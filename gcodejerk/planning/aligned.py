@@ -43,10 +43,10 @@ SLACK = 2e-5
 """Share of the velocity limit that is left to rounding."""
 SEEN = 0.8
 """Modes up to this share of half the rate of knots are fitted; no speeds have higher ones."""
-WEIGHTS = np.array([1e6, 1e6, 1e6])
+WEIGHTS = np.array([1e5, 1e4, 1e4])
 """Of the responses at the modes, and at the ends of the band, against 1 of an interval's speed."""
-EMPHASES = (1.0, 0.03, 1e-3, 1e-5, 1e-8)
-"""By which these are multiplied, one after the other, until a stream is near its profile."""
+EMPHASES = ((1.0, 25.0), (1.0, 1.0), (10.0, 0.0), (0.1, 0.0), (1e-2, 0.0), (1e-4, 0.0), (1e-7, 0.0))
+"""By which these are multiplied, and the stiffness, until a stream is near its profile."""
 SHIFT = 1e-3
 """By which blocks that end before their periods may shift a stream, about. [mm]"""
 NEAR = 0.8
@@ -187,8 +187,8 @@ def _speeds(moves: StraightMoves, knots: Counts) -> tuple[Array, NDArray[np.bool
     left = np.arange(len(knots))
     unit, _ = sample_profiles(moves.profiles, knots, moves.sampler.interval)
     exact = unit * moves.length[:, np.newaxis]
-    for emphasis in EMPHASES:
-        speeds = _fitted(moves.take(left), knots[left], emphasis)
+    for emphasis, stiffness in EMPHASES:
+        speeds = _fitted(moves.take(left), knots[left], emphasis, stiffness)
         out[left] = speeds
         h = np.diff(knots[left], axis=1) * moves.sampler.interval
         way = np.cumsum(0.5 * h * (speeds[:, 1:] + speeds[:, :-1]), axis=1)
@@ -214,7 +214,7 @@ def _within(moves: StraightMoves, knots: Counts, speeds: Array) -> NDArray[np.bo
     return out
 
 
-def _fitted(moves: StraightMoves, knots: Counts, emphasis: float) -> Array:
+def _fitted(moves: StraightMoves, knots: Counts, emphasis: float, stiffness: float) -> Array:
     """Speeds at the knots, shape (b, k) [mm/s]; `emphasis` is that of the responses."""
     sampler, interval = moves.sampler, moves.sampler.interval
     every = Grid.every(moves.count, 1, interval)
@@ -238,6 +238,7 @@ def _fitted(moves: StraightMoves, knots: Counts, emphasis: float) -> Array:
     wanted = Wanted(
         knots=knots,
         speeds=unfiltered(np.diff(unit, axis=1) * total[:, np.newaxis]),
+        rise=np.diff(speed, axis=1) * total[:, np.newaxis] * interval,
         length=1.0 - (TAIL + 2.0 * moves.step) / moves.length,
         end_speed=CREEP * share,
         acceleration=moves.most * interval * share,
@@ -247,6 +248,7 @@ def _fitted(moves: StraightMoves, knots: Counts, emphasis: float) -> Array:
         poles=poles,
         response=response,
         weight=felt * weight,
+        stiffness=stiffness,
         interval=interval,
     )
     return fit_speeds(wanted) / share[:, np.newaxis]

@@ -130,6 +130,8 @@ def fit_of(seed):
         poles=poles,
         response=(response_rows(knots, poles, DT)[0].T @ near)[np.newaxis],
         weight=np.array([[1e6]]),
+        rise=np.zeros((1, 7)),
+        stiffness=0.0,
         interval=DT,
     )
     return wanted, fit_speeds(wanted)[0]

@@ -54,6 +54,8 @@ class Wanted:
         Since each move's start; zeros in front of it. [intervals]
     speeds : ndarray, shape (n, longest)
         Mean speed of each interval, aligned at the end. [of the mean]
+    rise : ndarray, shape (n, k - 1)
+        Change of speed over each block. [of the mean]
     length : ndarray, shape (n,)
         [of the mean speed times the duration]
     end_speed : ndarray, shape (n,)
@@ -70,12 +72,16 @@ class Wanted:
         Displacement that each is to keep behind the control's filter, of a move of length 1. [-]
     weight : ndarray, shape (n, m)
         Of each response; 0 where it may be anything. [-]
+    stiffness : float
+        Of a change of speed over a block, against 1 of the speed of an interval: so that responses
+        are met by a slow correction, and not by one that goes to and fro from knot to knot. [-]
     interval : float
         [s]
     """
 
     knots: Counts
     speeds: Array
+    rise: Array
     length: Array
     end_speed: Array
     acceleration: Array
@@ -85,11 +91,12 @@ class Wanted:
     poles: Complex
     response: Complex
     weight: Array
+    stiffness: float
     interval: float
 
     def take(self, rows: slice) -> Wanted:
         """Some of the moves."""
-        whole = ("poles", "interval")
+        whole = ("poles", "stiffness", "interval")
         columns = (field.name for field in fields(self) if field.name not in whole)
         return replace(self, **{name: getattr(self, name)[rows] for name in columns})
 
@@ -145,6 +152,13 @@ class _Fit:
         self.vector = np.zeros(self.fixed.shape)
         self.vector[:, 1:] += late
         self.vector[:, :-1] += early
+        # The changes of speed are to be those of the profile: no wave between knots.
+        stiff = np.where(self.on, self.wanted.stiffness, 0.0)
+        self.diagonal[:, 1:] += stiff
+        self.diagonal[:, :-1] += stiff
+        self.beside -= stiff
+        self.vector[:, 1:] += stiff * self.wanted.rise
+        self.vector[:, :-1] -= stiff * self.wanted.rise
 
     def _rows(self) -> None:
         """The length, and real and imaginary part of each response, as rows."""
