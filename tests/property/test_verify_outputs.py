@@ -77,7 +77,7 @@ def test_every_output_is_accepted(controller, machine, data, known):
     assert found.kept == result.program.lines - result.planned
 
 
-@pytest.mark.parametrize("controller", [LINUXCNC, "mach"])
+@pytest.mark.parametrize("controller", [LINUXCNC])
 @pytest.mark.parametrize("planner", PLANNERS)
 @settings(parent=CALM, max_examples=3)
 @given(st.data(), st.booleans(), st.sampled_from(["condition3", "cascade", "conventional"]))
