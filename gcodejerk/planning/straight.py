@@ -75,6 +75,8 @@ class StraightMoves:
         possible &= (plans.displacement[sampler.moves][:, len(LINEAR) :] == 0.0).all(axis=1)
         possible &= count >= 2 * END_PERIODS
         length = np.where(possible, length, 1.0)
+        # Of an axis that stands still the position may be unknown; of one on its own, too.
+        way = np.where(possible[:, np.newaxis], way, np.eye(len(LINEAR))[0])
         count = np.maximum(count, 2 * END_PERIODS)
         direction = way / length[:, np.newaxis]
         first = np.searchsorted(sampler.row_of, np.arange(len(count)))

@@ -23,6 +23,8 @@ TAIL = 2e-5
 """Way at the end that is crept, so that the speed at the last period is known and low. [mm]"""
 FEEDBACK = 0.2
 """Share of the way by which rounding is behind that each block makes good."""
+BITS = 8.0
+"""Last bits of a position that the rounding of a length, in mm or inches, may be off by."""
 EARLIEST, SLOW = 2e-6, 1.0
 """A block that is faster than this may end so much before its period: until then the control runs
 the next one at full acceleration, which changes its speed by some 0.01 mm/s. [s], [mm/s]"""
@@ -94,11 +96,16 @@ class Written:
         ideal, begin = np.zeros(len(step)), step
         lasts, length = np.zeros(len(step)), np.zeros(len(step))
         most = np.zeros(len(step))
+        # A length far from zero is known to some last bits only, which a slow block feels.
+        far = np.abs(np.stack([at_rest, at_rest + moves.direction * moves.length[:, np.newaxis]]))
+        slowest = np.where(speeds > 0.0, speeds, np.inf).min(axis=1, initial=np.inf)
+        known = BITS * np.finfo(float).eps * (1.0 + far.max(axis=(0, 2)))
+        hair = HAIR + 2.0 * known / np.maximum(np.minimum(slowest, 1e3), CREEP)
         for k in range(1, count):
             whole_h = (knots[:, k] - knots[:, k - 1]) * interval
             runs = whole_h > 0.0
             first = knots[:, k - 1] == 0
-            whole_h = np.where(runs, whole_h - np.where(first, HAIR, 0.0), 1.0)
+            whole_h = np.where(runs, whole_h - np.where(first, hair, 0.0), 1.0)
             behind = ideal - way[:, k - 1]
             aim = speed[:, k - 1] + speeds[:, k]
             ideal = np.where(runs, ideal + 0.5 * whole_h * (speeds[:, k - 1] + speeds[:, k]), ideal)

@@ -67,7 +67,7 @@ from gcodejerk.verification.second_reading import reading
 for dialect in DIALECTS.values():
     for decimals in (True, False):
         reading.Text(dialect, decimals)
-form._run_of(b"G1 X-?[0-9]+", b"\\n")
+form.run_of(b"G1 X-?[0-9]+", b"\\n")
 for pattern in made:
     tree = str(re._parser.parse(pattern))
     assert "POSSESSIVE" not in tree and "ATOMIC" not in tree, pattern
@@ -101,7 +101,7 @@ ADVERSARIES = [
     b"G1 X1 Y1 F1 (" + b"a" * LARGE,
 ]
 POINT = allowed.point_pattern("XY", {"X": 4, "Y": 4}, DIALECTS["linuxcnc"], False)
-points = form._run_of(POINT, b"\n")
+points = form.run_of(POINT, b"\n")
 PATTERNS = {
     "words of a stream": lambda line: modes.read_words(line),
     "numbers without a point": lambda line: form._WHOLE.fullmatch(line),

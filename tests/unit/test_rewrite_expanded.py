@@ -83,7 +83,7 @@ def test_a_program_without_cycles_is_proven_as_any_other():
 DAMAGE = {
     "depth": (b"G1 Z-1.5\n", b"G1 Z-1.6\n", Kind.CHANGED, 10),
     "peck": (b"G1 Z-2.\n", b"", Kind.CHANGED, 15),
-    "stream": (b" X28.284 Y28.284 F", b" X28.285 Y28.284 F", Kind.END, 11),
+    "stream": (b"G0 G61 X28.284", b"G0 G61 X28.285", Kind.END, 11),
     "head": (b"N110 G98 F150", b"N110 G98 F160", Kind.CHANGED, 15),
     "kept line": (b"N150 G80\n", b"", Kind.CHANGED, 19),
 }

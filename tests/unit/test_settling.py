@@ -133,7 +133,7 @@ def test_the_summary_counts_what_stays_and_the_time_of_the_whole_program():
 @pytest.mark.parametrize("positioning", ["linear", "independent"])
 def test_what_stays_leaves_what_its_stream_would_have_replaced(positioning):
     # The same rapid, once planned and once too short to be: today's residual is the same.
-    machine = dataclasses.replace(VMC, positioning=positioning)
+    machine = dataclasses.replace(VMC, positioning=positioning, controller="mach")
     design = dataclasses.replace(VMC.design, minimum_length=100.0)
     shy = dataclasses.replace(machine, design=design)
     text = b"G21 G90 G94 G17 G64 P0.01\nG0 X0 Y0 Z0\nG0 X3 Y9 Z12.5\nG1 Z12 F200\nM2\n"

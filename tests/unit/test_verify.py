@@ -7,7 +7,6 @@ the planner nor an emitter takes part.
 from __future__ import annotations
 
 import io
-import itertools
 
 import numpy as np
 import pytest
@@ -18,6 +17,8 @@ from gcodejerk.verification import Kind, require, verify, verify_files
 from gcodejerk.verification.physics import points
 
 TEXT = """
+controller: mach
+dialect: linuxcnc
 interval: 0.001
 positioning: linear
 axes:
@@ -49,24 +50,19 @@ def profile(t, T=0.040, T1=0.001):
     return s1 + v1 * u + A * u**2 / 2 - J / R * u**3 / 6, v1 + A * u - J / R * u**2 / 2
 
 
-def stream(begin, end, line_end="\n", relative=False, decimals=4):
-    """Points of a move; begin and end are pairs of texts by axis."""
-    knots = [k * 0.002 for k in range(21)]
-    size = sum((float(end[a]) - float(begin[a])) ** 2 for a in end) ** 0.5
-    lines, at = [], dict.fromkeys(end, 0)
-    for before, t in itertools.pairwise(knots):
-        words = []
+def stream(begin, end, line_end="\n", relative=False, decimals=4, scale=1.0):
+    """Points of a move; begin and end are pairs of texts by axis, `scale` is of what F counts."""
+    lines, at = [], {axis: float(begin[axis]) for axis in end}
+    for k in range(1, 21):
+        words, moved = [], []
         for axis in end:
             way = float(end[axis]) - float(begin[axis])
-            if relative:
-                now = round(way * profile(t)[0] * 10**decimals)
-                words.append(f"{axis}{(now - at[axis]) / 10**decimals:.{decimals}f}")
-                at[axis] = now
-            elif t == knots[-1]:
-                words.append(axis + end[axis])
-            else:
-                words.append(f"{axis}{float(begin[axis]) + way * profile(t)[0]:.{decimals}f}")
-        feed = max(profile(before)[1], profile(t)[1]) * size * 60
+            now = round(float(begin[axis]) + way * profile(k * 0.002)[0], decimals)
+            moved.append(now - at[axis])
+            shown = f"{moved[-1] if relative else now:.{decimals}f}"
+            words.append(axis + (end[axis] if k == 20 and not relative else shown))
+            at[axis] = now
+        feed = sum(x**2 for x in moved) ** 0.5 / 0.002 * 60 * scale
         lines.append(f"G1 {' '.join(words)} F{feed:.4f}{line_end}")
     return "".join(lines)
 
@@ -260,7 +256,7 @@ DAMAGE = {
     "F of the first block": (*_with(0, lambda line: _feed(line, 1.01)), Kind.FEED),
     "F of the last block": (*_with(19, lambda line: _feed(line, 0.99)), Kind.FEED),
     "F in another unit": (*_with(9, lambda line: _feed(line, 1 / 60)), Kind.FEED),
-    "F beyond the limit": (*_with(9, lambda line: _feed(line, 20.0)), Kind.VELOCITY),
+    "F beyond the limit": (*_with(9, lambda line: _feed(line, 20.0)), Kind.FEED),
 }
 LIMITS = {Kind.VELOCITY, Kind.ACCELERATION, Kind.JERK}
 

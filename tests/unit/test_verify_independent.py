@@ -12,7 +12,8 @@ from gcodejerk.verification import Kind, verify
 CENTRE = Machine.load(find_machine("centre"))
 MACHINE = replace(
     CENTRE,
-    controller="linuxcnc",
+    controller="mach",
+    dialect="linuxcnc",
     positioning="independent",
     axes=tuple(replace(a, travel=None) for a in CENTRE.axes),
 )

@@ -45,7 +45,7 @@ class Stream:
     """Index into the original's rapids."""
     original_line: int
     line: int
-    """Of the first point, in the processed file."""
+    """Of the first point, or of what leads into it, in the processed file."""
     letters: str
     """Axes of the points in `text`, in the order written."""
     text: bytes

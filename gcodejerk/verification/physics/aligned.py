@@ -5,6 +5,7 @@ linearly within it: so the speeds at the points follow from F words, the times f
 lengths, and the positions in every servo period from both. What the drives get is
 :math:`(x_{i-1} + 4 x_i + x_{i+1}) / 6` of these. This module owns what follows:
 
+- F of a block is the larger of the speeds at its ends;
 - every block ends a hair in front of a servo period, and has two periods at least, the first and
   the last before the tail three: what the control makes of others is not what was planned;
 - no two successive F are equal, so that the control joins no blocks;
@@ -54,6 +55,8 @@ CREEP = 0.02
 TOLERANCE = 0.01
 """[mm]"""
 RELATIVE = 1e-6
+FEED_DIGIT = 1e-9
+"""More than the digits of F that keep successive ones apart. [units/min]"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,9 +153,13 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
     short = inner & (lasts < np.where(first | last, ENDS, SHORTEST))
     most_long = max(LONGEST, FEWEST * interval)
     long = inner & (lasts * interval > most_long * (1.0 + RELATIVE))
+    larger = np.maximum(motion.before, motion.after)
+    digit = FEED_DIGIT * paths.unit[paths.owner] / SECONDS_PER_MINUTE
+    other = inner & (np.abs(motion.feed - larger) > digit)
     equal = point & ~first & (motion.feed == np.roll(motion.feed, 1))
     lead = paths.position[np.where(first, np.arange(len(first)) - 1, 0)] - paths.start[paths.owner]
     far = first & (np.abs(lead).max(axis=1) > LEAD)
+    creeps = np.where(tail, motion.length / np.maximum(motion.feed, 1e-9), 0.0)
     usual, most = conventional_counts(paths, machine)
     lasting = np.zeros(len(first))
     lasting[last] = count[last]
@@ -161,12 +168,14 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
         wrong |= last & (lasting < usual[paths.owner])
     return [
         (Kind.FEED, point & ~(motion.feed > 0.0), "F must be above zero"),
+        (Kind.FEED, other, "F is not the larger of the speeds at the ends of its block"),
         (Kind.FEED, equal, "two successive F are equal: the control may join the blocks"),
         (Kind.FEED, last & (motion.after > CREEP), "the tail is too fast to end in one period"),
         (Kind.FORM, far, "what leads into the points moves the axis too far"),
         (Kind.FEED, off, "with these F words the block does not end on a servo period"),
         (Kind.TIME, short, "block is too short for the control"),
         (Kind.TIME, long, "block is too long to be blended"),
+        (Kind.TIME, tail & (creeps > LONGEST), "the tail takes too long"),
         (Kind.TIME, wrong, "stream does not last as long as the rapid may"),
         *_accelerations(motion, machine, lasts * interval),
     ]
@@ -178,7 +187,7 @@ def _accelerations(motion: _Motion, machine: Machine, lasts: Array) -> list[tupl
     delta = np.diff(paths.position, axis=0, prepend=paths.position[:1])
     options = machine.controller_options
     out = []
-    h = np.where(inner, lasts, 1.0)
+    h = np.where(inner & (lasts > 0.0), lasts, 1.0)
     rise = np.where(inner, (motion.after - motion.before) / h, 0.0)
     step = 2.0 * paths.unit[paths.owner] * 1e-6 / h**2
     for axis in machine.axes:

@@ -45,7 +45,7 @@ class Paths:
     """Index into the rapids, of each stream."""
     original_line: Index
     line: Index
-    """Line of each stream's first point."""
+    """Line of each stream's first point, or of what leads into it."""
     begin: Index
     end: Index
     position: Array
@@ -113,7 +113,7 @@ class Reader:
     def check_end(self, stream: Stream, block: bytes) -> bool:
         """Compare axes and end with the words of the block, exactly; whether the axes are right."""
         wanted = self._wanted(stream.rapid, block)
-        line = stream.line + stream.text.count(b"\n") + len(stream.rest) - 1
+        line = stream.line + len(stream.lead) + stream.text.count(b"\n") + len(stream.rest) - 1
         used = set(stream.letters).union(*stream.rest, *stream.lead) - {"F"}
         if not used <= set(wanted):
             axis = min(used - set(wanted))
