@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import DIALECTS, Dialect, Rapids
+from gcodejerk.nc import DIALECTS, Dialect, Program, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
@@ -119,6 +120,23 @@ class Controller(ABC):
     @abstractmethod
     def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """Steps and origins for all rapids of a program."""
+
+    def unguardable(
+        self, program: Program, source: BinaryIO, machine: Machine, dialect: Dialect
+    ) -> NDArray[np.bool_]:
+        """Rapids that are left alone, since the guard that the machine file wants cannot be there.
+
+        Raises
+        ------
+        EmitError
+            The controller has no such guard, or the program leaves no room for it.
+        """
+        if machine.controller_options.override_guard:
+            raise EmitError(
+                f"the machine file wants override_guard, which controller {self.name} cannot write",
+                "take it out of controller_options, or choose --controller linuxcnc",
+            )
+        return np.zeros(len(program.rapids), dtype=np.bool_)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What a user of these streams has to know."""

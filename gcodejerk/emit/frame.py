@@ -91,6 +91,11 @@ class Frame:
         words = [self._last_word(word, before_end) for word in self.axis_words]
         return b" ".join([code, *self._ending(), *words])
 
+    def own_motion(self) -> bytes:
+        """The rapid as its own block has it: its axis words, and G0."""
+        words = (w.letter.encode() + b"".join(w.text[1:].split()) for w in self.axis_words)
+        return b" ".join([b"G0", *words])
+
     def _ending(self) -> list[bytes]:
         """What lets the last point end in a standstill where the rapid did."""
         path, dialect = int(self.rapids.path[self.move]), self.dialect

@@ -17,12 +17,15 @@ module writes it. A replaced block becomes, each line only where it is needed::
 Rule 1: F of a block is the larger of the speeds at its ends, since LinuxCNC ends a block with the
 smaller of its own F and the next one's.
 Rule 2: no two successive F are equal: under G64 P the naive CAM detector joins such blocks.
+
+With `override_guard` all this stands in a branch of its own (`guard`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from decimal import Decimal
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +34,11 @@ from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
 from gcodejerk.emit.frame import Frame
 from gcodejerk.emit.gcode import line_ends_of
+from gcodejerk.emit.guard import guarded, in_structures
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import LINUXCNC, Machine
-from gcodejerk.nc import Dialect, Rapids, parse_block
+from gcodejerk.nc import Dialect, Program, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
@@ -92,22 +96,30 @@ class LinuxcncController(Controller):
         """Text of each move."""
         ends, last_ends = line_ends_of(rapids, batch.moves, newline)
         feed = _feeds(batch, rapids)
+        guard = batch.plans.machine.controller_options.override_guard
         out = []
         for row, move in enumerate(batch.moves.tolist()):
             block = parse_block(blocks[row], options.dialect)
             frame = Frame(rapids, move, block, blocks[row], options.dialect)
             points = _Points(batch, rapids, row, feed[row])
             lines = [
-                *frame.head(options.comments),
                 *frame.modes(),
-                *points.lead(filled=bool(rapids.queued[move])),
+                *points.lead(filled=bool(rapids.queued[move]) and not guard),
                 points.text(ends[row]),
                 frame.last_point(points.reached(), b"G0"),
                 *([b" ".join(words)] if (words := frame.restored()) else []),
-                *frame.after(),
             ]
+            if guard:
+                lines = guarded(int(rapids.line[move]), lines, frame.own_motion())
+            lines = [*frame.head(options.comments), *lines, *frame.after()]
             out.append(ends[row].join(line for line in lines if line) + last_ends[row])
         return out
+
+    def unguardable(
+        self, program: Program, source: BinaryIO, machine: Machine, dialect: Dialect
+    ) -> NDArray[np.bool_]:
+        """Rapids within O-word structures, where the machine file wants a guard (`guard`)."""
+        return in_structures(program, source, machine, dialect)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """Where the machine file contradicts how LinuxCNC moves; what the program leaves open."""

@@ -17,7 +17,8 @@ def operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[
     """What comes first: for whoever stands at the machine, then for whoever reads the figures."""
     notes = []
     if emitter.in_place and plans.planned.any():
-        notes.append(at_the_machine(emitter.name))
+        guarded = machine.controller_options.override_guard
+        notes.append(at_the_machine(emitter.name, guarded))
     if not plans.modes.modes:
         notes.append(NO_MODES)
     elif plans.planned.any():

@@ -30,7 +30,7 @@ from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
-from gcodejerk.reasons import REASONS, Reason
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.expanded import (
     hunks,
     in_original,
@@ -213,6 +213,7 @@ def _process(
         Options(settings.comments, find_dialect(program.dialect)),
         stamp_text(machine, _chosen(machine, settings, emitter)),
         beside,
+        guarded=machine.controller_options.override_guard,
     )  # fmt: skip
     collected, deviation = _write(writer, plans, machine, report)
     verification = None
@@ -293,7 +294,10 @@ def _plan(
     rapids = program.rapids
     if emitter.in_place:
         dialect = find_dialect(program.dialect)
-        rapids = replace(rapids, reason=reasons_to_leave(program, source, machine, dialect))
+        reason = reasons_to_leave(program, source, machine, dialect)
+        unguardable = emitter.unguardable(program, source, machine, dialect)
+        reason[unguardable & (reason == CERTAIN)] = REASONS.index(Reason.SUBPROGRAM)
+        rapids = replace(rapids, reason=reason)
     plans = plan_rapids(
         rapids,
         machine,

@@ -52,6 +52,7 @@ class Rewriter:
         options: Options,
         stamp: bytes,
         beside: BinaryIO | None = None,
+        guarded: bool = False,
     ) -> None:
         """Begin.
 
@@ -71,6 +72,8 @@ class Rewriter:
             Text of the stamp, of `stamp_text`.
         beside : binary file, optional
             Takes what the emitter writes beside the program.
+        guarded : bool, optional
+            Streams run at 100 % of both overrides only: the operator is told so.
         """
         self.source, self.target, self.program = source, target, program
         self.beside = beside if emitter.beside else None
@@ -80,7 +83,7 @@ class Rewriter:
         self.stamp = b""
         if emitter.in_place and options.dialect.writing is not None:
             opens, closes = options.dialect.writing.comment
-            note = stamp_note(emitter.name).encode()
+            note = stamp_note(emitter.name, guarded).encode()
             self.stamp = b"".join(opens + text + closes + program.newline for text in (stamp, note))
         self.digest = hashlib.blake2b(digest_size=16)
         self.written = hashlib.blake2b(digest_size=SUM_DIGITS // 2)

@@ -18,6 +18,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
 from gcodejerk.verification.bytes.alignment import Alignment
 from gcodejerk.verification.bytes.form import Stream
+from gcodejerk.verification.bytes.guarded_form import check_guarded
 from gcodejerk.verification.bytes.hal import CONTROLLER, Beside, HalAlignment
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
@@ -216,6 +217,9 @@ def _judge_program(
             check_aligned(paths, machine, found, reported)
         elif _moves(paths):
             check_dynamics(paths, machine, stride, found)
+    if alignment.guarded and alignment.aligned:
+        lines = program.rapids.line[alignment.replaced].tolist()
+        check_guarded(original, program.dialect, lines, found)
     alignment.check_sum()
     return alignment.replaced, alignment.kept
 

@@ -66,6 +66,62 @@ def test_line_ends_are_kept(config, end):
     assert config.read_bytes() == before
 
 
+def test_the_guard_is_installed_and_taken_out_again_byte_for_byte(config):
+    before = everything(config.parent)
+    done = add(config, "guard")
+    after = everything(config.parent)
+    assert set(after) - set(before) == {"gcodejerk.hal", "sim.ini.before-gcodejerk"}
+    lines = b"# gcodejerk begin\nHALUI = halui\nHALFILE = gcodejerk.hal\n# gcodejerk end\n"
+    assert b"HALFILE = sim.hal\n" + lines in after["sim.ini"]
+    assert b"@" not in after["gcodejerk.hal"]
+    assert "override_guard: true" in done[-1]
+    assert "nothing was changed" in add(config, "guard")[0]
+    with pytest.raises(EmitError, match="form guard is installed already"):
+        add(config)
+    assert everything(config.parent) == after
+    remove(str(config))
+    assert everything(config.parent) == before
+
+
+def test_the_guard_takes_the_halui_and_the_signals_that_are_there(config):
+    edit(config, "[HAL]\n", "[HAL]\nHALUI = halui\nPOSTGUI_HALFILE = screen.hal\n")
+    (config.parent / "screen.hal").write_text(
+        "net shown halui.feed-override.value => screen.feed\n"
+    )
+    add(config, "guard")
+    assert config.read_text().count("HALUI = ") == 1
+    hal = (config.parent / "gcodejerk.hal").read_text()
+    assert "net shown halui.feed-override.value => gcodejerk-feed.in1\n" in hal
+    assert "net gcodejerk-rapid-override halui.rapid-override.value" in hal
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "says"),
+    [
+        ("sim.ini", "[HAL]\n", "[HAL]\nHALUI = other\n", "reads the overrides from halui"),
+        (
+            "sim.hal",
+            "loadrt scale",
+            "loadrt near names=n\nloadrt scale",
+            "component near is loaded",
+        ),
+        (
+            "sim.hal",
+            "net z-command",
+            "net probe hm2.analog => motion.analog-in-03\nnet z-command",
+            "motion.analog-in-03 is linked to the signal probe",
+        ),
+        ("sim.hal", "num_joints", "num_aio=2 num_joints", "num_aio=2"),
+    ],
+)
+def test_the_guard_is_refused_where_something_is_in_its_place(config, name, old, new, says):
+    edit(config.parent / name, old, new)
+    before = everything(config.parent)
+    with pytest.raises(EmitError, match=says):
+        add(config, "guard")
+    assert everything(config.parent) == before
+
+
 def test_a_path_of_m_codes_is_added_where_there_is_none(config):
     edit(config, "USER_M_PATH = .\n", "")
     before = config.read_bytes()

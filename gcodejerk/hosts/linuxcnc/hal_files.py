@@ -3,7 +3,8 @@
 The files beside this module are HAL commands with a few places to fill: `@SCRIPT@`, the M code;
 `@DEPTH@`, of the FIFO; `@RATE@`, periods per second; `@each TEXT@`, TEXT once for each joint, its
 number in the place of N; and for the form `position` the order of the functions and the joints'
-own part, which depend on where the configuration's HAL has its drives.
+own part, which depend on where the configuration's HAL has its drives. The override guard has a
+file of its own: `@FEED@` and `@RAPID@` are the signals of the overrides.
 
 Rule: stock components only, and each once: HAL loads a component a single time.
 """
@@ -17,15 +18,19 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 SCRIPT = "M152"
 FORMS = ("adaptive-feed", "position")
+GUARD = "guard"
+"""No form of streams: what tells programs with `override_guard` where the overrides stand."""
 DEPTH = 60_000
 """Lines of the FIFO; the longest rapid has to fit."""
-TAKEN = (
-    "motion.analog-out-03",
-    "motion.digital-in-03",
-    "motion.feed-inhibit",
-)
-"""Pins that both forms need for themselves."""
-ALSO_TAKEN = {"adaptive-feed": ("motion.adaptive-feed",), "position": ("motion.enable",)}
+_BOTH = ("motion.analog-out-03", "motion.digital-in-03", "motion.feed-inhibit")
+TAKEN = {
+    "adaptive-feed": (*_BOTH, "motion.adaptive-feed"),
+    "position": (*_BOTH, "motion.enable"),
+    GUARD: ("motion.analog-in-03",),
+}
+"""Pins that each needs for itself."""
+OVERRIDES = {"@FEED@": "halui.feed-override.value", "@RAPID@": "halui.rapid-override.value"}
+"""Pins of halui that the guard reads."""
 SAME = 1e-6
 """Two positions this close are one [machine units]."""
 _EACH = re.compile(r"@each ([^@]*)@")
@@ -99,6 +104,25 @@ def adaptive_feed(script: str) -> str:
     str
     """
     return template("adaptive-feed").replace("@DEPTH@", str(DEPTH)).replace("@SCRIPT@", script)
+
+
+def guard(signals: dict[str, str]) -> str:
+    """The HAL file of the override guard.
+
+    Parameters
+    ----------
+    signals : dict
+        Pin of halui -> the signal that it is linked to already, where it is.
+
+    Returns
+    -------
+    str
+    """
+    text = template(GUARD)
+    for mark, pin in OVERRIDES.items():
+        own = f"gcodejerk-{mark.strip('@').lower()}-override"
+        text = text.replace(mark, signals.get(pin, own))
+    return text
 
 
 def position(script: str, joints: list[Joint], interval: float, behind: int) -> str:

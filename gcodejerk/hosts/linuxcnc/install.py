@@ -2,6 +2,7 @@
 
 Three things: `gcodejerk.hal` beside the INI, the M code M152 where the INI has its M codes, and
 marked lines in the INI: the HAL file behind the last one, and a path for M codes where none is.
+The override guard (form `guard`, for controller `linuxcnc`) has no M code, and needs halui.
 
 Rule: everything is looked at before anything is written, and whatever does not fit is refused. The
 user's own HAL files are never changed; what is taken out leaves the INI byte for byte.
@@ -45,7 +46,8 @@ class Change:
 
     ini: bytes
     hal: bytes
-    script: bytes
+    script: bytes | None
+    """None: the form has none."""
     script_path: Path
 
 
@@ -57,7 +59,7 @@ def install(path: str, form: str, version: str | None = None) -> list[str]:
     path : str
         The INI.
     form : str
-        One of `hal_files.FORMS`.
+        One of `hal_files.FORMS`, or `hal_files.GUARD`.
     version : str, optional
         Of LinuxCNC; that of the one on this machine by default.
 
@@ -85,23 +87,31 @@ def install(path: str, form: str, version: str | None = None) -> list[str]:
                 f"{place} cannot be written to",
                 "copy the configuration to a folder of yours, and name the .ini file there",
             )
-    for file, content in ((own, change.hal), (change.script_path, change.script)):
+    files = {own: change.hal}
+    if change.script is not None:
+        files[change.script_path] = change.script
+    for file, content in files.items():
         if file.exists() and file.read_bytes() != content:
             raise EmitError(
                 f"{file} exists and is not what would be written", "rename or remove it first"
             )
     backup = Path(f"{ini.path}{BACKUP}")
+    done = [f"{own}: written, the HAL of the form {form}"]
     _write(own, change.hal)
-    _write(change.script_path, change.script, mode=0o755)
+    if change.script is not None:
+        _write(change.script_path, change.script, mode=0o755)
+        done.append(f"{change.script_path}: written, the M code M152")
     _write(backup, ini.data)
     _write(ini.path, change.ini)
+    use = f"process programs with --controller linuxcnc-hal --as {form}"
+    if form == hal_files.GUARD:
+        use = "say controller_options: {override_guard: true} in the machine file, and process "
+        use += "programs with --controller linuxcnc"
     return [
-        f"{own}: written, the HAL of the form {form}",
-        f"{change.script_path}: written, the M code M152",
+        *done,
         f"{ini.path}: {len(marked(change.ini))} marked block(s) of lines added; it was kept as "
         f"{backup.name}",
-        f"process programs with --controller linuxcnc-hal --as {form}; `gcodejerk install linuxcnc "
-        f"{path} --remove` takes all of it out again",
+        f"{use}; `gcodejerk install linuxcnc {path} --remove` takes all of it out again",
     ]
 
 
@@ -129,7 +139,7 @@ def remove(path: str) -> list[str]:
     for block in marked(ini.data):
         lines = block.splitlines()
         keys = [line.partition("=")[0].strip() for line in lines]
-        if keys not in (["HALFILE"], ["USER_M_PATH"]):
+        if keys not in (["HALFILE"], ["HALUI", "HALFILE"], ["USER_M_PATH"]):
             raise EmitError(
                 f"the lines between the marks of gcodejerk were edited: {lines}",
                 f"put them back as they were, or take them out by hand (backup: *{BACKUP})",
@@ -188,7 +198,9 @@ def _again(ini: Ini, own: Path, change: Change, before: str, form: str) -> str:
         )
     _check_untouched(own)
     same = own.read_bytes() == change.hal and change.ini == ini.data
-    same = same and change.script_path.is_file() and change.script_path.read_bytes() == _script()
+    if change.script is not None:
+        path = change.script_path
+        same = same and path.is_file() and path.read_bytes() == change.script
     if not same:
         raise EmitError(
             "another version of this is installed, or the configuration was changed since",
@@ -239,6 +251,8 @@ def _change(ini: Ini, form: str) -> Change:
     hal = read_hal(ini, HAL_FILE)
     _check_hal(ini, hal, form)
     script_path = _script_path(ini)
+    if form == hal_files.GUARD:
+        return _guard(ini, hal, script_path)
     quoted = str(script_path.resolve() if script_path.is_absolute() else script_path.absolute())
     if any(c in quoted for c in " \t'\"#$[]"):
         raise EmitError(f"HAL cannot take the name {quoted}", "use a folder without blanks")
@@ -247,8 +261,6 @@ def _change(ini: Ini, form: str) -> Change:
     else:
         behind, joints = _joints(ini, hal)
         text = hal_files.position(quoted, joints, _period(ini), behind)
-    body = text.encode()
-    head = f"# gcodejerk install {form} sum:{_sum(body).decode()}\n".encode()
     last = ini.all("HAL", "HALFILE")[-1]
     places = [(last.line, f"HALFILE = {HAL_FILE}")]
     if ini.value("RS274NGC", "USER_M_PATH") is None:
@@ -259,7 +271,28 @@ def _change(ini: Ini, form: str) -> Change:
     data = ini.data
     for line, entry in sorted(places, reverse=True):
         data = Ini(ini.path, data, (), ()).with_lines(line, entry)
-    return Change(data, head + body, _script(), script_path)
+    return Change(data, _headed(text, form), _script(), script_path)
+
+
+def _headed(text: str, form: str) -> bytes:
+    """A HAL file with the line that says what it is, and its sum."""
+    body = text.encode()
+    return f"# gcodejerk install {form} sum:{_sum(body).decode()}\n".encode() + body
+
+
+def _guard(ini: Ini, hal: Hal, script_path: Path) -> Change:
+    """What would be written for the override guard."""
+    halui = ini.value("HAL", "HALUI")
+    if halui is not None and Path(halui.split()[0] if halui else "").name != "halui":
+        raise EmitError(
+            f"[HAL] HALUI is {halui!r}, and the guard reads the overrides from halui",
+            "say HALUI = halui",
+            ini.place(ini.all("HAL", "HALUI")[0].line),
+        )
+    text = hal_files.guard({pin: signal for pin, (signal, _) in hal.signal.items()})
+    lines = f"HALFILE = {HAL_FILE}" if halui is not None else f"HALUI = halui\nHALFILE = {HAL_FILE}"
+    data = ini.with_lines(ini.all("HAL", "HALFILE")[-1].line, lines)
+    return Change(data, _headed(text, hal_files.GUARD), None, script_path)
 
 
 def _check_hal(ini: Ini, hal: Hal, form: str) -> None:
@@ -269,10 +302,10 @@ def _check_hal(ini: Ini, hal: Hal, form: str) -> None:
             what = "it has one FIFO" if component == "streamer" else "HAL loads it once"
             raise EmitError(
                 f"the component {component} is loaded here, and {HAL_FILE} loads it, too: {what}",
-                "use another component here (logic or lut5, mux8 ...), or the other --form",
+                "use another component here (logic or lut5, mux8 ...), or another --form",
                 hal.loaded[component],
             )
-    for pin in (*hal_files.TAKEN, *hal_files.ALSO_TAKEN[form]):
+    for pin in hal_files.TAKEN[form]:
         if pin in hal.signal:
             signal, place = hal.signal[pin]
             raise EmitError(
@@ -282,7 +315,7 @@ def _check_hal(ini: Ini, hal: Hal, form: str) -> None:
             )
     if "motmod" not in hal.loaded:
         raise EmitError("no HAL file loads motmod", "see LinuxCNC's manual", ini.place())
-    for name in ("num_dio", "num_aio"):
+    for name in ("num_aio",) if form == hal_files.GUARD else ("num_dio", "num_aio"):
         match = re.search(rf"{name}=(\S+)", hal.arguments["motmod"])
         if match is not None and not (match[1].isdigit() and int(match[1]) >= _LEAST_IO):
             raise EmitError(

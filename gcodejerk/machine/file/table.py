@@ -334,8 +334,9 @@ _CONTROLLER_OPTIONS = Section(
             "LinuxCNC: MAX_ACCELERATION of axes when streams run, at least 1.05 times what "
             "profiles use. Left out: 1.05 times limit.acceleration.", example="{X: 5040, Z: 6300}"),
         Key("override_guard", Flag(),
-            "LinuxCNC: run a stream at 100 % rapid and feed override and without single step only, "
-            "else the original block; needs the HAL lines of `gcodejerk install linuxcnc`.",
+            "LinuxCNC: run a stream at 100 % rapid and feed override only, else the original block "
+            "(M66 E3, #5399, O-words: docs/linuxcnc-guard.md); needs the HAL lines of `gcodejerk "
+            "install linuxcnc INI --form guard`.",
             default=False),
     )
 )  # fmt: skip

@@ -39,8 +39,7 @@ class AlignedReader(StreamReader):
     def _points(self) -> Stream | None:
         """Read what leads in, the points, and the block's own words."""
         stream = Stream(self.i, self.original_line, self.window.line, "", b"")
-        lead = (0,) if self.rapids.queued[self.i] else (0, 1, 0)
-        for code in lead:
+        for code in self._lead():
             numbers = self._one_axis(code)
             if numbers is None:
                 self.complain(Kind.FORM, "what leads into the points is missing")
@@ -61,6 +60,10 @@ class AlignedReader(StreamReader):
             self.complain(Kind.AXES, "points name other axes than those that move")
         self._measure(max(map(len, stream.text.splitlines()), default=0))
         return stream if self._end(stream) else None
+
+    def _lead(self) -> tuple[int, ...]:
+        """Motion codes of what leads into the points."""
+        return (0,) if self.rapids.queued[self.i] else (0, 1, 0)
 
     def _run(self, letters: str) -> re.Pattern[bytes]:
         """Points with these axes, as many decimals as this form has."""

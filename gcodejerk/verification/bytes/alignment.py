@@ -17,6 +17,7 @@ from gcodejerk.nc import CERTAIN, REASONS, Dialect, Program, Rapids, find_dialec
 from gcodejerk.verification.bytes.aligned_form import AlignedReader
 from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
 from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
+from gcodejerk.verification.bytes.guarded_form import GuardedReader
 from gcodejerk.verification.bytes.source import Window, skip_common
 from gcodejerk.verification.findings import Findings, Kind
 
@@ -50,6 +51,7 @@ class Alignment:
         self.dialect = find_dialect(program.dialect)
         self.decimals = decimals_of(machine)
         self.aligned = machine.controller in ALIGNED
+        self.guarded = machine.controller_options.override_guard
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 
@@ -88,7 +90,8 @@ class Alignment:
 
     def _reader(self, i: int, text: bytes) -> StreamReader:
         """What reads the stream of a rapid."""
-        form = AlignedReader if self.aligned else StreamReader
+        aligned = GuardedReader if self.guarded else AlignedReader
+        form = aligned if self.aligned else StreamReader
         return form(*self._of_reader(i, text))
 
     def _of_reader(

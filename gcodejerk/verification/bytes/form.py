@@ -163,6 +163,16 @@ class StreamReader:
             self.complain(Kind.LINE_END, f"line end is not {self.line_end!r} as in the original")
         self.window.skip(len(line))
 
+    def exactly(self, wanted: bytes, more: bool = True) -> bool:
+        """Pass a line that can only be this one."""
+        line = self.peek()
+        if line != wanted:
+            shown = line[:60].decode("latin-1")
+            self.complain(Kind.FORM, f"expected '{wanted.decode()}', found '{shown}'")
+            return False
+        self.last(more)
+        return True
+
     def last(self, more: bool) -> None:
         """Pass the end of a line that may be the last one, whose end is the block's own."""
         if more:

@@ -115,16 +115,6 @@ class HalReader(StreamReader):
             return None
         return Stream(self.i, self.original_line, first, "", b"", points)
 
-    def _exactly(self, wanted: bytes, more: bool = True) -> bool:
-        """Pass a line that can only be this one."""
-        line = self.peek()
-        if line != wanted:
-            shown = line[:60].decode("latin-1")
-            self.complain(Kind.FORM, f"expected '{wanted.decode()}', found '{shown}'")
-            return False
-        self.last(more)
-        return True
-
     def _motion(self, code: int, more: bool = True) -> dict[str, Decimal] | None:
         """Pass a block of one motion; its numbers."""
         line = self.peek()
@@ -163,7 +153,7 @@ class HalReader(StreamReader):
         points: list[dict[str, Decimal]] = []
         for code in _TINY:
             if code is None:
-                if not self._exactly(b"M67 E3 Q%d" % (self.i + 1)):
+                if not self.exactly(b"M67 E3 Q%d" % (self.i + 1)):
                     return None
                 continue
             numbers = self._motion(code)
@@ -181,7 +171,7 @@ class HalReader(StreamReader):
     def _position(self) -> list[dict[str, Decimal]] | None:
         """LinuxCNC's own rapid, between asking and waiting."""
         rest = b"G4 P%g" % (REST * self.interval)
-        if not self._exactly(rest) or not self._exactly(b"M68 E3 Q%d" % (self.i + 1)):
+        if not self.exactly(rest) or not self.exactly(b"M68 E3 Q%d" % (self.i + 1)):
             return None
         numbers = self._motion(0)
         if numbers is None:
@@ -189,7 +179,7 @@ class HalReader(StreamReader):
         if self.ending != self.allowed.ending:
             self.complain(Kind.PATH, "the rapid has another G code beside its G0")
         stops: Sequence[tuple[str, float]] = self.allowed.behind
-        if not self._exactly(b"M66 P3 L3 Q3600", more=bool(stops)):
+        if not self.exactly(b"M66 P3 L3 Q3600", more=bool(stops)):
             return None
         if stops:
             written = read_words(self.peek()) or []
