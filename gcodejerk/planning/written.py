@@ -98,9 +98,10 @@ class Written:
         most = np.zeros(len(step))
         # A length far from zero is known to some last bits only, which a slow block feels.
         far = np.abs(np.stack([at_rest, at_rest + moves.direction * moves.length[:, np.newaxis]]))
-        slowest = np.where(speeds > 0.0, speeds, np.inf).min(axis=1, initial=np.inf)
+        both = np.where(np.diff(knots, axis=1) > 0, speeds[:, 1:] + speeds[:, :-1], np.inf)
+        slowest = np.clip(both.min(axis=1, initial=np.inf), CREEP, 1e3)
         known = BITS * np.finfo(float).eps * (1.0 + far.max(axis=(0, 2)))
-        hair = HAIR + 2.0 * known / np.maximum(np.minimum(slowest, 1e3), CREEP)
+        hair = HAIR + 2.0 * known / slowest
         for k in range(1, count):
             whole_h = (knots[:, k] - knots[:, k - 1]) * interval
             runs = whole_h > 0.0
