@@ -35,7 +35,7 @@ from gcodejerk.motion.servo.spline_filter import unfiltered
 from gcodejerk.planning.batch import Batch, Sampler
 from gcodejerk.planning.lines import left_by_lines
 from gcodejerk.planning.straight import LINEAR, USED, StraightMoves
-from gcodejerk.planning.written import EARLIEST, TAIL, Written
+from gcodejerk.planning.written import TAIL, Written
 
 LOOK_AHEAD = 0.9
 """Share of the planner's look-ahead (ARC_BLEND_OPTIMIZATION_DEPTH) that is relied on."""
@@ -106,7 +106,7 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         profiles=sampler.profiles,
         unplayable=~(moves.possible & enough & _within(moves, knots, written.speed[:, :-1]))
         | (off > TOLERANCE)
-        | (written.early > EARLIEST),
+        | ~written.punctual(),
         path_speed=written.speed,
     )
 

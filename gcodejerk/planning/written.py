@@ -23,11 +23,13 @@ TAIL = 2e-5
 """Way at the end that is crept, so that the speed at the last period is known and low. [mm]"""
 FEEDBACK = 0.2
 """Share of the way by which rounding is behind that each block makes good."""
+LONGEST_TAIL = 0.0099
+"""Of the tail. [s]"""
 BITS = 8.0
 """Last bits of a position that the rounding of a length, in mm or inches, may be off by."""
-EARLIEST, SLOW = 2e-6, 1.0
-"""A block that is faster than this may end so much before its period: until then the control runs
-the next one at full acceleration, which changes its speed by some 0.01 mm/s. [s], [mm/s]"""
+EARLIEST, SLOWLY, SLOW = 2e-6, 5e-5, 1.0
+"""A block may end so much before its period, and one slower than this so much: until then the
+control runs the next one at full acceleration, but no faster than it ends. [s], [s], [mm/s]"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +50,6 @@ class Written:
         Along the path from the beginning of the stream. [mm]
     speed : ndarray, shape (b, k)
         Along the path; that of the last column is the tail's. [mm/s]
-    early : ndarray, shape (b,)
-        By how much a block that is not slow ends before its period, besides `HAIR`. [s]
     """
 
     moves: StraightMoves
@@ -58,7 +58,6 @@ class Written:
     moved: Array
     way: Array
     speed: Array
-    early: Array
 
     @classmethod
     def of(cls, moves: StraightMoves, knots: Counts, speeds: Array) -> Written:
@@ -95,7 +94,6 @@ class Written:
         way, speed = np.zeros((len(step), count + 1)), np.zeros((len(step), count + 1))
         ideal, begin = np.zeros(len(step)), step
         lasts, length = np.zeros(len(step)), np.zeros(len(step))
-        most = np.zeros(len(step))
         # A length far from zero is known to some last bits only, which a slow block feels.
         far = np.abs(np.stack([at_rest, at_rest + moves.direction * moves.length[:, np.newaxis]]))
         both = np.where(np.diff(knots, axis=1) > 0, speeds[:, 1:] + speeds[:, :-1], np.inf)
@@ -124,7 +122,6 @@ class Written:
                 ends = passed(speed[at, k - 2], before[at], length[at], lasts[at] + whole_h[at])
                 speed[at, k - 1], speed[at, k], early[at] = ends
                 early[at] = lasts[at] - early[at]
-                most = np.maximum(most, np.where(speed[:, k - 1] > SLOW, early, 0.0))
             lasts = whole_h + early
             whole[:, k] = here
             position = np.where(runs[:, np.newaxis], there, position)
@@ -140,7 +137,27 @@ class Written:
         )
         moved = np.where(moving[:, np.newaxis], whole * step[:, np.newaxis, np.newaxis], 0.0)
         moved -= at_rest[:, np.newaxis]
-        return cls(moves, grid, whole, moved, way, speed, most)
+        return cls(moves, grid, whole, moved, way, speed)
+
+    def punctual(self) -> NDArray[np.bool_]:
+        """Whether every block ends before its period and not too early, as the control runs it."""
+        knots, interval = self.grid.knots[:, :-1], self.grid.interval
+        speed, way = self.speed[:, :-1], self.way[:, :-1]
+        runs = np.diff(knots, axis=1) > 0
+        feed = np.maximum(speed[:, 1:], speed[:, :-1])
+        ends = np.minimum(feed, np.concatenate([feed[:, 1:], self.speed[:, -1:]], axis=1))
+        begins = np.concatenate([np.zeros_like(ends[:, :1]), ends[:, :-1]], axis=1)
+        begins = np.where(knots[:, :-1] == 0, 0.0, begins)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lasts = np.where(runs, 2.0 * np.diff(way, axis=1) / (begins + ends), 0.0)
+        early = knots[:, 1:] * interval - np.cumsum(lasts, axis=1)
+        late = early < 0.5 * HAIR
+        soon = early > np.where(ends > SLOW, EARLIEST, SLOWLY)
+        tail = np.diff(self.way[:, -2:], axis=1)[:, 0]
+        crept = (tail > 0.0) & (tail < LONGEST_TAIL * self.speed[:, -1])
+        crept &= self.speed[:, -1] < 2.0 * CREEP
+        out: NDArray[np.bool_] = ~((late | soon) & runs).any(axis=1) & crept
+        return out
 
     def played(self) -> tuple[Array, Grid]:
         """Way along the path behind the filter, from one period early to one late [mm]."""

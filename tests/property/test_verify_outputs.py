@@ -56,15 +56,7 @@ def outputs(data, machine, controller):
         return None
 
 
-LINUXCNC = pytest.param(
-    "linuxcnc",
-    marks=pytest.mark.xfail(
-        strict=False, reason="on slow machines some blocks do not end on a servo period"
-    ),
-)
-
-
-@pytest.mark.parametrize("controller", [LINUXCNC, "mach"])
+@pytest.mark.parametrize("controller", ["linuxcnc", "mach"])
 @settings(parent=CALM, max_examples=4)
 @given(machine_of(axes="XYZ"), programs(), st.booleans())
 def test_every_output_is_accepted(controller, machine, data, known):
@@ -77,7 +69,7 @@ def test_every_output_is_accepted(controller, machine, data, known):
     assert found.kept == result.program.lines - result.planned
 
 
-@pytest.mark.parametrize("controller", [LINUXCNC])
+@pytest.mark.parametrize("controller", ["linuxcnc"])
 @pytest.mark.parametrize("planner", PLANNERS)
 @settings(parent=CALM, max_examples=3)
 @given(st.data(), st.booleans(), st.sampled_from(["condition3", "cascade", "conventional"]))

@@ -105,13 +105,7 @@ def judged(data, machine, controller):
     return verify_files(io.BytesIO(data), io.BytesIO(result.output), machine, table=True)
 
 
-LINUXCNC = pytest.param(
-    "linuxcnc",
-    marks=pytest.mark.xfail(strict=False, reason="some blocks do not end on a servo period"),
-)
-
-
-@pytest.mark.parametrize("controller", [LINUXCNC, "mach", "csv"])
+@pytest.mark.parametrize("controller", ["linuxcnc", "mach", "csv"])
 @pytest.mark.parametrize("profile", WRITTEN)
 @pytest.mark.parametrize("name", SHIPPED)
 @settings(CALM, max_examples=1)
@@ -127,7 +121,7 @@ def test_outputs_on_shipped_machines_are_accepted(controller, profile, name, dat
     assert judged(program, machine, controller).violations == ()
 
 
-@pytest.mark.parametrize("controller", [LINUXCNC, "mach", "csv"])
+@pytest.mark.parametrize("controller", ["linuxcnc", "mach", "csv"])
 @pytest.mark.parametrize("profile", WRITTEN)
 @settings(CALM, max_examples=2)
 @given(machine=machines(axes="XZ", modes=(0, 2)), data=st.data())

@@ -108,7 +108,7 @@ DAMAGE = {
     "first F": (line(0), with_feed(0, lambda f: f * 0.999999), Kind.FEED),
     "F of the peak": (line(9), with_feed(9, lambda f: f * 2), Kind.FEED),
     "F zero": (line(9), with_feed(9, lambda f: 0.0), Kind.FEED),
-    "F of the tail": (line(19), with_feed(19, lambda f: f * 2), Kind.FEED),
+    "F of the tail": (line(19), with_feed(19, lambda f: f * 4), Kind.FEED),
     "equal F": (line(9), with_feed(9, lambda f: float(line(8).split("F")[1])), Kind.FEED),
     "last digit of a position": (line(6), moved(6, 1e-6), Kind.FEED),
     "point further by 0.01 mm": (line(6), moved(6, 0.01), Kind.FEED),

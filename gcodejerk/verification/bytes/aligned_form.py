@@ -15,8 +15,8 @@ from gcodejerk.verification.bytes.form import Stream, StreamReader, run_of
 from gcodejerk.verification.bytes.modes import read_words
 from gcodejerk.verification.findings import Kind
 
-DECIMALS, FEED_DECIMALS = 7, 12
-"""Of positions and of F, at most."""
+DECIMALS, INCH_DECIMALS, FEED_DECIMALS = 6, 7, 12
+"""Of positions in mm and in inches, and of F, at most."""
 Words = list[tuple[str, Decimal]]
 
 
@@ -67,9 +67,10 @@ class AlignedReader(StreamReader):
 
     def _run(self, letters: str) -> re.Pattern[bytes]:
         """Points with these axes, as many decimals as this form has."""
+        decimals = INCH_DECIMALS if self.rapids.inch[self.i] else DECIMALS
         # LinuxCNC computes in doubles, in whatever dialect the program was written.
         words = b"".join(
-            rb" %c-?(?:0|[1-9][0-9]{0,8})\.[0-9]{1,%d}" % (ord(a), DECIMALS) for a in letters
+            rb" %c-?(?:0|[1-9][0-9]{0,8})\.[0-9]{1,%d}" % (ord(a), decimals) for a in letters
         )
         feed = rb" F(?:0|[1-9][0-9]{0,8})\.[0-9]{1,%d}" % FEED_DECIMALS
         return run_of(b"G1" + words + feed, self.line_end)

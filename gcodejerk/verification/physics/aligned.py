@@ -109,8 +109,10 @@ class _Motion:
             lasts = np.where(point, 2.0 * length / (before + after), 0.0)
         # What has no speed never ends.
         lasts = np.where(np.isfinite(lasts), lasts, 1e9)
-        total = np.cumsum(lasts)
-        time = total - total[begin[owner]] + lasts[begin[owner]]
+        # Stream by stream: a hair would be lost in the sum of all.
+        time = np.zeros(rows)
+        for a, b in zip(begin.tolist(), paths.end.tolist(), strict=True):
+            time[a:b] = np.cumsum(lasts[a:b])
         return cls(paths, point, first, tail, length, feed, before, after, time)
 
 
