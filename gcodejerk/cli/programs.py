@@ -206,6 +206,10 @@ def verify(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="the original's cycles are written out")
     ] = False,
+    report: Annotated[
+        str | None,
+        typer.Option(metavar="FILE.json", help="hold streams for LinuxCNC to its profiles, too"),
+    ] = None,
     most: Annotated[int, typer.Option(min=1, help="stop after so many violations")] = 100,
 ) -> None:
     """Prove that a program is the original with only its rapids re-timed; list what it is not."""
@@ -215,6 +219,7 @@ def verify(
     from gcodejerk.verification.bytes.hal import CONTROLLER
     from gcodejerk.verification.bytes.stamp import read_stamp
     from gcodejerk.verification.proof import beside_of
+    from gcodejerk.verification.reported import read_reported
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
@@ -222,6 +227,9 @@ def verify(
     table = processed.lower().endswith(".csv")
     if table and expand_cycles:
         raise typer.BadParameter("--expand-cycles: a table of streams has no cycles written out")
+    if report is not None and expand_cycles:
+        raise typer.BadParameter("--report: its lines are the original's, before its cycles")
+    reported = None if report is None else read_reported(report)
     written = 0
     with ExitStack() as files:
         one, other = (files.enter_context(open_input(name)) for name in (original, processed))
@@ -251,7 +259,7 @@ def verify(
         else:
             found = verify_files(
                 one, other, described, names=names, dialect=dialect, most=most, table=table,
-                beside=beside,
+                beside=beside, reported=reported,
             )  # fmt: skip
     for violation in found.violations:
         file, line = (

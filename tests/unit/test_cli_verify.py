@@ -1,5 +1,6 @@
 """The command verify: what it accepts, what it lists, and its exit status."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -68,3 +69,19 @@ def test_a_missing_file_is_refused_and_two_standard_inputs_are_wrong_usage(run):
     code, out = run("verify", "plate.ngc", "none.ngc", "-m", "vmc")
     assert (code, "none.ngc" in out) == (1, True)
     assert run("verify", "-", "-", "-m", "vmc")[0] == 2
+
+
+def test_streams_are_held_to_the_profiles_of_a_report(run, processed, tmp_path):
+    assert run("process", "-q", "plate.ngc", "-m", "vmc", "--report", "r.json")[0] == 0
+    check = ("verify", "plate.ngc", "plate.jerk.ngc", "-m", "vmc", "--report", "r.json")
+    assert run(*check)[0] == 0
+    report = json.loads((tmp_path / "r.json").read_text())
+    rapid = next(r for r in report["rapids"] if r["status"] == "planned")
+    rapid["segments"][0]["jerk"] *= 0.8
+    (tmp_path / "r.json").write_text(json.dumps(report))
+    code, out = run(*check)
+    assert (code, "off the profile that was reported" in out) == (1, True)
+    for text in ("{}", "[", '{"rapids": 3}'):
+        (tmp_path / "r.json").write_text(text)
+        code, out = run(*check)
+        assert (code, "is no report of process" in out) == (1, True)

@@ -70,7 +70,7 @@ ROOMS = {
     findings
  <- bytes
  <- physics | second_reading
- <- cycles | table samples
+ <- cycles | table samples | reported
  <- proof
 """),
 }
