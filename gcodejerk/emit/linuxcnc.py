@@ -232,8 +232,7 @@ class _Points:
         at = [end] if filled else [end - 7 * way // 10, end - 4 * way // 10, end]
         if self.incremental:
             at = np.diff([0, *at]).tolist()
-        feed = Decimal(str(0.3 * self.scale * 10.0**-self.decimals / LEAD_TIME * 60.0))
-        feed = Decimal(repr(round(float(feed), INCH_FEED_DECIMALS)))
+        feed = per_minute(0.3 * self.scale * 10.0**-self.decimals / LEAD_TIME)
         words = [
             AXES[self.leading].encode() + format(Decimal(value).scaleb(-finer), "f").encode()
             for value in at
