@@ -151,7 +151,9 @@ def _too_slow(plans: Plans) -> list[str]:
     """What the INI file has to allow before streams run, where today's rapids have less."""
     raised = []
     for axis in plans.machine.axes:
+        stated = plans.machine.controller_options.max_acceleration
         today, needed = axis.rapid.acceleration, HEADROOM * axis.limit.acceleration
+        today = stated.get(axis.name, today)
         moves = plans.planned & (plans.displacement[:, AXES.index(axis.name)] != 0.0)
         if axis.planner == LINUXCNC and today < needed * (1.0 - 1e-6) and moves.any():
             raised.append(f"{axis.name} from {today:g} to {needed:g}")
@@ -232,7 +234,8 @@ class _Points:
         at = [end] if filled else [end - 7 * way // 10, end - 4 * way // 10, end]
         if self.incremental:
             at = np.diff([0, *at]).tolist()
-        feed = per_minute(0.3 * self.scale * 10.0**-self.decimals / LEAD_TIME)
+        # F is about the way of the axis, also where the program gives diameters.
+        feed = per_minute(0.3 * 10.0**-self.decimals / LEAD_TIME)
         words = [
             AXES[self.leading].encode() + format(Decimal(value).scaleb(-finer), "f").encode()
             for value in at

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.motion import Grid, profiles_response, sample_profiles
+from gcodejerk.motion import Grid, profiles_response
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.sampling import Counts
 from gcodejerk.motion.servo.knots import (
@@ -75,7 +75,9 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         as planned.
     """
     moves = StraightMoves.of(sampler)
-    knots, speeds, enough = _followed(moves, stride)
+    first, like = moves.alike()
+    knots, speeds, enough = _followed(moves.take(first), stride)
+    knots, speeds, enough = knots[like], speeds[like], enough[like]
     written = Written.of(moves, knots, speeds)
     played, grid = written.played()
     positions = {
@@ -117,10 +119,7 @@ def _knots(moves: StraightMoves, stride: int, *, calm: bool) -> tuple[Counts, ND
     With `calm` blocks are longer where a slow start is delicate.
     """
     interval, machine = moves.sampler.interval, moves.sampler.plans.machine
-    every = Grid.every(moves.count, 1, interval)
-    unit, speed = sample_profiles(moves.profiles, every.knots, interval)
-    way, speed = (each * moves.length[:, np.newaxis] for each in (unit, speed))
-    brake, full = moves.most / USED, moves.full
+    brake = moves.most / USED
     ahead = int(LOOK_AHEAD * machine.controller_options.optimization_depth)
     rows = np.arange(len(moves.count))
     knots = np.zeros((len(rows), 1), dtype=np.int64)
@@ -130,20 +129,17 @@ def _knots(moves: StraightMoves, stride: int, *, calm: bool) -> tuple[Counts, ND
         left = np.flatnonzero(~enough | (worst > 0.0))
         if not len(left):
             break
+        some = moves.take(left)
         part, far = aligned_knots(
-            moves.count[left], periods, ahead, way[left], speed[left], brake[left], interval
+            some.count, periods, ahead, some.way, some.speed, brake[left], interval
         )
-        at = np.take_along_axis(
-            speed[left], speed.shape[1] - 1 - moves.count[left, np.newaxis] + part, axis=1
-        )
-        # Longer blocks make a slow start less delicate: calm with all that the control may be set
-        # to, or with what it has to be, or as calm as may be.
-        shift, least = (early_shift(part, at, a[left], interval) for a in (full, brake))
-        bad = (
-            np.zeros(len(left))
-            if not calm
-            else np.where(shift < SHIFT, 0.0, np.where(least < SHIFT, 1.0, 2.0 + least))
-        )
+        bad = np.zeros(len(left))
+        if calm:
+            # Longer blocks make a slow start less delicate: calm with all that the control may be
+            # set to, or with what it has to be, or as calm as may be.
+            at = some.at(some.speed, part)
+            shift, least = (early_shift(part, at, a, interval) for a in (some.full, brake[left]))
+            bad = np.where(shift < SHIFT, 0.0, np.where(least < SHIFT, 1.0, 2.0 + least))
         taken = left[(far & (bad < worst[left])) | ~enough[left]]
         chosen = np.isin(left, taken)
         width = max(knots.shape[1], part.shape[1])
@@ -185,8 +181,7 @@ def _speeds(moves: StraightMoves, knots: Counts) -> tuple[Array, NDArray[np.bool
     """
     out = np.zeros(knots.shape)
     left = np.arange(len(knots))
-    unit, _ = sample_profiles(moves.profiles, knots, moves.sampler.interval)
-    exact = unit * moves.length[:, np.newaxis]
+    exact = moves.at(moves.way, knots)
     for emphasis, stiffness in EMPHASES:
         speeds = _fitted(moves.take(left), knots[left], emphasis, stiffness)
         out[left] = speeds
@@ -217,9 +212,7 @@ def _within(moves: StraightMoves, knots: Counts, speeds: Array) -> NDArray[np.bo
 def _fitted(moves: StraightMoves, knots: Counts, emphasis: float, stiffness: float) -> Array:
     """Speeds at the knots, shape (b, k) [mm/s]; `emphasis` is that of the responses."""
     sampler, interval = moves.sampler, moves.sampler.interval
-    every = Grid.every(moves.count, 1, interval)
-    unit, _ = sample_profiles(moves.profiles, every.knots, interval)
-    _, speed = sample_profiles(moves.profiles, knots, interval)
+    speed = moves.at(moves.speed, knots)
     total = moves.count.astype(np.float64)
     share = total * interval / moves.length
     poles, participation = sampler.modes.poles, sampler.modes.participation[:, : len(LINEAR)]
@@ -237,8 +230,8 @@ def _fitted(moves: StraightMoves, knots: Counts, emphasis: float, stiffness: flo
     weight = emphasis * np.repeat(WEIGHTS[: len(around)], len(chosen) // len(around))
     wanted = Wanted(
         knots=knots,
-        speeds=unfiltered(np.diff(unit, axis=1) * total[:, np.newaxis]),
-        rise=np.diff(speed, axis=1) * total[:, np.newaxis] * interval,
+        speeds=unfiltered(np.diff(moves.way, axis=1) * (share / interval)[:, np.newaxis]),
+        rise=np.diff(speed, axis=1) * share[:, np.newaxis],
         length=1.0 - (TAIL + 2.0 * moves.step) / moves.length,
         end_speed=CREEP * share,
         acceleration=moves.most * interval * share,
@@ -256,7 +249,7 @@ def _fitted(moves: StraightMoves, knots: Counts, emphasis: float, stiffness: flo
 
 def _deviation(moves: StraightMoves, played: Array, grid: Grid) -> Array:
     """How far each stream is played from its profile at most, shape (b,) [mm]."""
-    moments = np.maximum(grid.knots - 1, 0)
-    unit, _ = sample_profiles(moves.profiles, moments, grid.interval)
-    off: Array = np.abs(played - unit * moves.length[:, np.newaxis]).max(axis=1, initial=0.0)
+    # The filter begins a period early.
+    moments = np.clip(grid.knots - 1, 0, moves.count[:, np.newaxis])
+    off: Array = np.abs(played - moves.at(moves.way, moments)).max(axis=1, initial=0.0)
     return off

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion import Profiles
+from gcodejerk.motion import Grid, Profiles, sample_profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.sampling import Counts
 from gcodejerk.motion.servo.knots import END_PERIODS
@@ -21,6 +21,10 @@ HEADROOM, USED = 1.05, 0.99
 """MAX_ACCELERATION over what profiles use at least, and the share of it that speeds may use."""
 FULLEST = 1.5
 """The same at most, where the machine file does not say it."""
+FEWEST = 2.0
+"""Steps that an axis moves at least."""
+BITS = 36
+"""Of length, direction and profile in which moves that are alike agree."""
 LINEAR = "XYZ"
 """Axes that are played so: the planner blends no others."""
 
@@ -39,12 +43,14 @@ class StraightMoves:
         Nothing stands against playing it. What is impossible is computed as if it were not.
     count : ndarray of int, shape (b,)
         T_SUM. [intervals]
+    way, speed : ndarray, shape (b, longest + 1)
+        Of the profile at every interval, aligned at the end. [mm], [mm/s]
     length : ndarray, shape (b,)
         [mm]
     direction : ndarray, shape (b, 3)
         [-]
-    velocity, acceleration : ndarray, shape (b,)
-        What profiles may use along the path. [mm/s], [mm/s^2]
+    velocity : ndarray, shape (b,)
+        What profiles may use along the path. [mm/s]
     most, full : ndarray, shape (b,)
         What speeds between knots may use, and what the control may be set to. [mm/s^2]
     step : ndarray, shape (b,)
@@ -55,10 +61,11 @@ class StraightMoves:
     profiles: Profiles
     possible: NDArray[np.bool_]
     count: Counts
+    way: Array
+    speed: Array
     length: Array
     direction: Array
     velocity: Array
-    acceleration: Array
     most: Array
     full: Array
     step: Array
@@ -67,13 +74,17 @@ class StraightMoves:
     def of(cls, sampler: Sampler) -> StraightMoves:
         """Look at what the machine and the control allow."""
         plans = sampler.plans
-        way = plans.displacement[sampler.moves][:, : len(LINEAR)]
+        displacement = plans.displacement[sampler.moves]
+        way = displacement[:, : len(LINEAR)]
         length = np.sqrt((way**2).sum(axis=1))
         count = plans.counts[sampler.moves]
         # One profile for each move, along X, Y and Z alone, and room for two blocks.
         possible = np.bincount(sampler.row_of, minlength=len(count)) == 1
-        possible &= (plans.displacement[sampler.moves][:, len(LINEAR) :] == 0.0).all(axis=1)
+        possible &= (displacement[:, len(LINEAR) :] == 0.0).all(axis=1)
         possible &= count >= 2 * END_PERIODS
+        # An axis that moves by a step or two has no point in between.
+        step = sampler.number_format.step[:, 0]
+        possible &= ((way == 0.0) | (np.abs(way) > FEWEST * step[:, np.newaxis])).all(axis=1)
         length = np.where(possible, length, 1.0)
         # Of an axis that stands still the position may be unknown; of one on its own, too.
         way = np.where(possible[:, np.newaxis], way, np.eye(len(LINEAR))[0])
@@ -89,6 +100,8 @@ class StraightMoves:
                 limit[k], velocity[k] = axis.limit.acceleration, axis.limit.velocity
                 most[k] = options.max_acceleration.get(axis.name, HEADROOM * limit[k])
                 full[k] = options.max_acceleration.get(axis.name, FULLEST * limit[k])
+        every = Grid.every(count, 1, sampler.interval)
+        unit, speed = sample_profiles(profiles, every.knots, sampler.interval)
         peak = profiles.peak_acceleration * length
         possible &= HEADROOM * peak <= _along(most, direction) * (1.0 + 1e-6)
         return cls(
@@ -96,14 +109,34 @@ class StraightMoves:
             profiles=profiles,
             possible=possible,
             count=count,
+            way=unit * length[:, np.newaxis],
+            speed=speed * length[:, np.newaxis],
             length=length,
             direction=direction,
             velocity=_along(velocity, direction),
-            acceleration=_along(limit, direction),
             most=USED * _along(np.minimum(most, HEADROOM * limit), direction),
             full=_along(full, direction),
-            step=sampler.number_format.step[:, 0],
+            step=step,
         )
+
+    def at(self, values: Array, knots: Counts) -> Array:
+        """What `way` or `speed` is at knots, shape (b, k) aligned at the end."""
+        last = values.shape[1] - 1
+        out: Array = np.take_along_axis(values, last - self.count[:, np.newaxis] + knots, axis=1)
+        return out
+
+    def alike(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Moves that stand for all, and for each move which of these it is like.
+
+        Where a move begins changes what is written, and nothing of the speeds that are fitted.
+        """
+        shape = self.profiles.peak_velocity, self.profiles.peak_acceleration, self.profiles.total
+        columns = (self.direction.T, self.length, self.count, self.step, *shape)
+        # What differs in the last bits of a position alone is alike.
+        digits, exponent = np.frexp(np.vstack(columns).T)
+        key = np.ldexp(np.rint(digits * 2.0**BITS), exponent)
+        _, first, of = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        return first, np.reshape(of, -1)
 
     def take(self, rows: NDArray[np.int64]) -> StraightMoves:
         """Some of them."""

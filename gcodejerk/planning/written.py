@@ -25,6 +25,8 @@ FEEDBACK = 0.2
 """Share of the way by which rounding is behind that each block makes good."""
 LONGEST_TAIL = 0.0099
 """Of the tail. [s]"""
+ON_STEP = 1e-4
+"""A position this little off a step is on it. [steps]"""
 BITS = 8.0
 """Last bits of a position that the rounding of a length, in mm or inches, may be off by."""
 EARLIEST, SLOWLY, SLOW = 2e-6, 5e-5, 1.0
@@ -79,9 +81,14 @@ class Written:
         leading = np.abs(moves.direction).argmax(axis=1)
         sign = np.sign(moves.direction[rows, leading]).astype(np.int64)
 
+        # No point before the start or behind the end, wherever these lie between two steps.
+        limits = from_origin, from_origin + moves.direction * moves.length[:, np.newaxis]
+        lowest = np.ceil(np.minimum(*limits) / size - ON_STEP)
+        highest = np.floor(np.maximum(*limits) / size + ON_STEP)
+
         def whole_of(way: Array) -> NDArray[np.int64]:
-            exact = from_origin + moves.direction * way[:, np.newaxis]
-            return np.rint(exact / size).astype(np.int64)
+            exact = np.rint((from_origin + moves.direction * way[:, np.newaxis]) / size)
+            return np.clip(exact, lowest, np.maximum(highest, lowest)).astype(np.int64)
 
         count = knots.shape[1]
         whole = np.zeros((len(step), count + 1, len(LINEAR)), dtype=np.int64)
@@ -95,7 +102,7 @@ class Written:
         ideal, begin = np.zeros(len(step)), step
         lasts, length = np.zeros(len(step)), np.zeros(len(step))
         # A length far from zero is known to some last bits only, which a slow block feels.
-        far = np.abs(np.stack([at_rest, at_rest + moves.direction * moves.length[:, np.newaxis]]))
+        far = np.abs(np.stack(limits)) * moving
         both = np.where(np.diff(knots, axis=1) > 0, speeds[:, 1:] + speeds[:, :-1], np.inf)
         slowest = np.clip(both.min(axis=1, initial=np.inf), CREEP, 1e3)
         known = BITS * np.finfo(float).eps * (1.0 + far.max(axis=(0, 2)))

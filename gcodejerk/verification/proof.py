@@ -23,7 +23,7 @@ from gcodejerk.verification.bytes.hal import CONTROLLER, Beside, HalAlignment
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
 from gcodejerk.verification.findings import Findings, Kind, Verification
-from gcodejerk.verification.physics.aligned import Reported, check_aligned
+from gcodejerk.verification.physics.aligned import Reported, check_aligned, in_own_steps
 from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
 from gcodejerk.verification.samples import SampleReader
@@ -212,6 +212,8 @@ def _judge_program(
     stride = stride_of(machine)
     for streams in _batches(_checked(alignment, reader)):
         paths = reader.paths(streams)
+        if alignment.aligned:
+            paths = in_own_steps(paths)
         _check_lines(paths, program, machine, found)
         if alignment.aligned:
             check_aligned(paths, machine, found, reported)

@@ -348,3 +348,41 @@ def test_a_machine_whose_acceleration_is_too_low_keeps_its_rapids():
 def test_an_axis_that_the_planner_does_not_blend_is_left_alone():
     result = process(HEAD + b"G0 A20\nG0 X3 A40\nM2\n", MACHINE)
     assert result.planned == 0
+
+
+@pytest.mark.parametrize(
+    "blocks",
+    [
+        b"G0 X30 Z-3.1234567\nG1 X31\nG0 X1 Z-4\n",
+        b"G0 X0.7654321 Z-30.00000049\nG0 X30 Z-30.1\n",
+        b"G20\nG0 X1.12345678 Z0.333333333\nG21\nG0 X50 Z8.4700001\n",
+        b"G91\nG0 X0.1000004 Z30.00000051\nX5.5 Z-20.3333333\n",
+    ],
+)
+def test_no_point_is_past_an_end_between_two_steps(blocks):
+    result = process(HEAD + blocks + b"M2\n", MACHINE)
+    assert result.planned == 2
+
+
+def test_rapids_that_are_alike_have_the_same_speeds_wherever_they_begin():
+    program = HEAD + b"G0 X10 Z-5\nG1 X11.1 Z-3.3\nG0 X21.1 Z-8.3\nG0 X11.1 Z-3.3\nM2\n"
+    result = process(program, MACHINE)
+    feeds = []
+    for begin, end, row in result.edits.tolist():
+        if row >= 0:
+            _, _, points, _ = split(result.output[begin:end].splitlines())
+            feeds.append([float(f) for f in words(points, "F")])
+    assert len(feeds) == 3
+    # Rounding alone makes them differ: by some thousandths of 1 mm/s.
+    assert feeds[1] == pytest.approx(feeds[0], abs=1.0)
+
+
+def test_what_the_machine_file_says_of_the_control_is_not_asked_for_again():
+    limit = "}\n    limit: {acceleration: 2400, jerk: 5.0e+5}"
+    text = "controller: linuxcnc" + TEXT.replace(", jerk: 5.0e+4}", limit)
+    program = HEAD + b"G0 X30\nM2\n"
+    raised = [
+        any("raise MAX_ACCELERATION" in note for note in process(program, machine).notes)
+        for machine in map(Machine.loads, (text, text + OPTIONS % "max_acceleration: {X: 2520}"))
+    ]
+    assert raised == [True, False]

@@ -122,6 +122,8 @@ DAMAGE = {
     "point with seven decimals": (line(6), line(6).replace(" F", "1 F"), Kind.FORM),
     "another axis": (line(6), line(6).replace(" F", " X0.0 F"), Kind.FORM),
     "lead-in missing": (LEAD, "", Kind.FORM),
+    "lead-in in no time": (LEAD, LEAD.replace("F0.0018", "F18"), Kind.FEED),
+    "lead-in of an hour": (LEAD, LEAD.replace("F0.0018", "F0.000000005"), Kind.FEED),
     "lead-in of one line": (LEAD, "G0 Z0.000001\n", Kind.FORM),
     "lead-in without its block": ("G1 Z0.0000006 F0.0018\n", "", Kind.FORM),
     "lead-in that dwells": ("G0 Z0.000001\n", "G4 P0\n", Kind.FORM),

@@ -48,8 +48,10 @@ LONGEST, FEWEST = 0.01, 5
 """A longer block is no longer blended as the others: in seconds, or in periods if that is more."""
 OVER = 1.05
 """MAX_ACCELERATION over limit.acceleration."""
-LEAD = 1e-5
-"""How far what leads in may move. [mm]"""
+STEP = 1e-6
+"""Of the positions, in the program's unit of mm; in inches they have one decimal more."""
+LEAD, LEAD_TIME = 1e-5, (0.009, 0.011)
+"""How far what leads in may move, and how long its slow block may last. [mm], [s]"""
 CREEP = 0.02
 """Speed at the last period, at most. [mm/s]"""
 TOLERANCE = 0.01
@@ -116,13 +118,20 @@ class _Motion:
         return cls(paths, point, first, tail, length, feed, before, after, time)
 
 
+def in_own_steps(paths: Paths) -> Paths:
+    """The same, judged by the last decimal of what is written, whatever the resolutions say."""
+    step = STEP * np.where(paths.unit == 1.0, 1.0, 0.1 * paths.unit)
+    return replace(paths, step=np.repeat(step[:, np.newaxis], len(AXES), axis=1))
+
+
 def check_aligned(paths: Paths, machine: Machine, found: Findings, reported: Reported) -> None:
     """Judge streams.
 
     Parameters
     ----------
     paths : Paths
-        The streams, with what leads in as rows, and the block's own end as the last.
+        The streams, with what leads in as rows, the block's own end as the last, in their own
+        steps.
     machine : Machine
         Its limits, modes, interval and controller options.
     found : Findings
@@ -161,6 +170,12 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
     equal = point & ~first & (motion.feed == np.roll(motion.feed, 1))
     lead = paths.position[np.where(first, np.arange(len(first)) - 1, 0)] - paths.start[paths.owner]
     far = first & (np.abs(lead).max(axis=1) > LEAD)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slow = np.abs(np.diff(paths.position, axis=0, prepend=0.0)).max(axis=1) / (
+            paths.feed * paths.unit[paths.owner] / SECONDS_PER_MINUTE
+        )
+    leads = ~point & np.isfinite(paths.feed)
+    hasty = leads & ~((slow >= LEAD_TIME[0]) & (slow <= LEAD_TIME[1]))
     creeps = np.where(tail, motion.length / np.maximum(motion.feed, 1e-9), 0.0)
     usual, most = conventional_counts(paths, machine)
     lasting = np.zeros(len(first))
@@ -173,6 +188,7 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
         (Kind.FEED, other, "F is not the larger of the speeds at the ends of its block"),
         (Kind.FEED, equal, "two successive F are equal: the control may join the blocks"),
         (Kind.FEED, last & (motion.after > CREEP), "the tail is too fast to end in one period"),
+        (Kind.FEED, hasty, "what leads into the points does not last its ten milliseconds"),
         (Kind.FORM, far, "what leads into the points moves the axis too far"),
         (Kind.FEED, off, "with these F words the block does not end on a servo period"),
         (Kind.TIME, short, "block is too short for the control"),
@@ -191,7 +207,7 @@ def _accelerations(motion: _Motion, machine: Machine, lasts: Array) -> list[tupl
     out = []
     h = np.where(inner & (lasts > 0.0), lasts, 1.0)
     rise = np.where(inner, (motion.after - motion.before) / h, 0.0)
-    step = 2.0 * paths.unit[paths.owner] * 1e-6 / h**2
+    step = 2.0 * paths.step[paths.owner, 0] / h**2
     for axis in machine.axes:
         a = AXES.index(axis.name)
         share = np.abs(delta[:, a]) / np.where(motion.length > 0.0, motion.length, 1.0)
@@ -213,7 +229,7 @@ def _judge_played(motion: _Motion, machine: Machine, found: Findings, reported: 
             continue
         speed = np.abs(np.diff(played.position[:, a], prepend=0.0)) / machine.interval
         speed[played.begin] = 0.0
-        step = 2e-6 * paths.unit[played.owner] / machine.interval
+        step = 2.0 * paths.step[played.owner, a] / machine.interval
         fast = speed > axis.limit.velocity * (1.0 + RELATIVE) + step
         problem = f"{axis.name} passes its limit of {axis.limit.velocity:g} mm/s"
         _complain(found, played, Kind.VELOCITY, fast, problem, of_points=False)
