@@ -48,7 +48,7 @@ ROOMS = {
 """),
     "motion": order("""
     profiles
- <- residual
+ <- families residual
  <- amplitudes sampling shapers
  <- maps rounding | search | servo
 """),

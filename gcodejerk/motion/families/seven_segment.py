@@ -1,0 +1,35 @@
+"""Seven segments with one jerk, and trapezoids of velocity: limits that a planner keeps.
+
+Siemens SOFT (MD32300, MD32431), Heidenhain (MP1061, MP1090), grblHAL, LinuxCNC 2.10 type 1, KFLOP's
+G0: the fastest rapid within velocity, acceleration and jerk. Without a jerk limit it is the
+trapezoid of grbl, Klipper, Marlin and LinuxCNC 2.9.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gcodejerk.motion.families.family import ACCELERATION, JERK, VELOCITY, Family
+from gcodejerk.motion.profiles.profile import Array, Profiles
+from gcodejerk.motion.profiles.symmetric import conventional_profiles
+
+
+def seven_segment_profiles(velocity: Array, acceleration: Array, jerk: Array) -> Profiles:
+    """The fastest profiles within three limits, shape (n,) each [1/s], [1/s^2], [1/s^3]."""
+    return conventional_profiles(velocity, acceleration, jerk).general()
+
+
+def trapezoid_profiles(velocity: Array, acceleration: Array) -> Profiles:
+    """The fastest profiles within two limits, shape (n,) each [1/s], [1/s^2]."""
+    return seven_segment_profiles(velocity, acceleration, np.full_like(velocity, np.inf))
+
+
+SEVEN_SEGMENT = Family(
+    "jerk-limited", "seven segments with one jerk", (VELOCITY, ACCELERATION, JERK),
+    seven_segment_profiles,
+    "for example SINUMERIK 828D function manual B2 4.2.12 (SOFT)",
+)  # fmt: skip
+TRAPEZOID = Family(
+    "trapezoidal", "a trapezoid of velocity", (VELOCITY, ACCELERATION), trapezoid_profiles,
+    "for example grbl 1.1, doc/markdown/settings.md",
+)  # fmt: skip
