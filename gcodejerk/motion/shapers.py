@@ -29,13 +29,13 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.errors import PlanError
+from gcodejerk.motion.families.filtered import shaped_profiles
+from gcodejerk.motion.families.filters import impulses
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.residual import mode_poles
 
 SHAPERS = ("zv", "zvd", "ei", "mzv", "fir", "posicast")
 """Names of the shapers."""
-EI_VIBRATION = 0.05
-"""Vibration that the shaper ei tolerates at its frequency, as a share."""
 AVERAGED = 128
 """Parts of a moving average: its residual is right to (pi f / f0 / AVERAGED)^2 / 3."""
 
@@ -70,28 +70,13 @@ def shaper_impulses(name: str, frequency: float, damping: float = 0.0) -> tuple[
     """
     if name not in SHAPERS:
         raise PlanError(f"there is no shaper {name!r}", f"choose one of {', '.join(SHAPERS)}")
-    pole = complex(mode_poles(frequency, damping))
-    period = 2.0 * np.pi / pole.imag
-    left = float(np.exp(0.5 * pole.real * period))  # K
     if name == "fir":
         # Half of each end's part: the sum of a trapezoid rule, exactly null at the frequency.
+        period = 2.0 * np.pi / complex(mode_poles(frequency, damping)).imag
         amplitudes = np.ones(AVERAGED + 1)
         amplitudes[[0, -1]] = 0.5
         return np.linspace(0.0, period, AVERAGED + 1), amplitudes / AVERAGED
-    edge, ei = 1.0 - np.sqrt(0.5), EI_VIBRATION
-    table = {
-        "zv": ([0.0, 0.5], [1.0, left]),
-        "posicast": ([0.0, 0.5], [1.0 / (1.0 + left), left / (1.0 + left)]),
-        "zvd": ([0.0, 0.5, 1.0], [1.0, 2.0 * left, left**2]),
-        "ei": ([0.0, 0.5, 1.0], [1.0 + ei, 2.0 * (1.0 - ei) * left, (1.0 + ei) * left**2]),
-        "mzv": (
-            [0.0, 0.375, 0.75],
-            [edge, (np.sqrt(2.0) - 1.0) * left**0.75, edge * left**1.5],
-        ),
-    }
-    halves, impulses = table[name]
-    shares: Array = np.array(impulses)
-    return np.array(halves) * period, shares / shares.sum()
+    return impulses("zv" if name == "posicast" else name, frequency, damping)
 
 
 def shaped_profile(
@@ -117,18 +102,4 @@ def shaped_profile(
         As `shaper_impulses`.
     """
     delays, amplitudes = shaper_impulses(name, frequency, damping)
-    times = (profile.step_times() + delays[:, np.newaxis]).ravel()
-    order = np.argsort(times, kind="stable")
-    times = times[order]
-    steps = [
-        (amplitudes[:, np.newaxis] * step).ravel()[order]
-        for step in (profile.acceleration_steps(), profile.jerk_steps())
-    ]
-    duration = np.diff(times)
-    jerk = np.cumsum(steps[1])[:-1]
-    # The acceleration at each begin: its own steps, and what the jerk has added before.
-    acceleration = np.cumsum(steps[0])[:-1] + np.cumsum(jerk * duration) - jerk * duration
-    used = duration > 1e-12
-    jerk = np.where(np.abs(jerk) < 1e-12 * np.abs(jerk).max(initial=0.0), 0.0, jerk)
-    first = np.array([0, np.count_nonzero(used)])
-    return Profiles.of(first, duration[used], acceleration[used], jerk[used])
+    return shaped_profiles(profile, delays[np.newaxis], amplitudes[np.newaxis])
