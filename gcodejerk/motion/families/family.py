@@ -24,6 +24,8 @@ class Kind(Enum):
     TIME = "time"
     """That of the axis whose acceleration is the limit (Fanuc, A-78962EN p. 16); where the family
     has no acceleration, the longest of the axes that move."""
+    SHARED = "shared"
+    """One number of the control, the same for all axes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +121,7 @@ def unit_quantities(family: Family, values: Mapping[str, Array], share: Array) -
         else:
             per_axis = np.atleast_2d(values[quantity.name])[:, np.newaxis, :]
             each = np.where(moving, per_axis, 0.0)
-            if binding is None:
+            if binding is None or quantity.kind is Kind.SHARED:
                 unit = each.max(axis=-1)
             else:
                 each, at = np.broadcast_arrays(each, binding[..., np.newaxis])

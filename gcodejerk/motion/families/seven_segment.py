@@ -1,8 +1,13 @@
 """Seven segments with one jerk, and trapezoids of velocity: limits that a planner keeps.
 
-Siemens SOFT (MD32300, MD32431), Heidenhain (MP1061, MP1090), grblHAL, LinuxCNC 2.10 type 1, KFLOP's
-G0: the fastest rapid within velocity, acceleration and jerk. Without a jerk limit it is the
-trapezoid of grbl, Klipper, Marlin and LinuxCNC 2.9.
+Siemens SOFT (MD32300, MD32431), Heidenhain (MP1061, MP1090), LinuxCNC 2.10 with PLANNER_TYPE 1
+(MAX_LINEAR_JERK) and KFLOP's G0 (third order): the fastest rapid within velocity, acceleration and
+jerk. Without a jerk limit it is the trapezoid of grbl, Klipper, Marlin and LinuxCNC 2.9, and of
+KFLOP's G1 (second order).
+
+grblHAL with ENABLE_JERK_ACCELERATION only comes near it: its acceleration goes in steps of one
+segment of the step generator, its planner counts with an effective mean acceleration, and the last
+segment of a ramp takes what is missing (core f80fc34, stepper.c).
 """
 
 from __future__ import annotations
