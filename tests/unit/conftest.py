@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from gcodejerk import cli
 from gcodejerk.errors import GcodejerkError
 
-# For `jerk_sums`, which two modules of tests share.
+# For `jerk_sums` and `simulation`, which several modules of tests share.
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 
