@@ -21,6 +21,7 @@ from gcodejerk.cli.hosts import install
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.programs import inspect, process, verify
+from gcodejerk.cli.tuning import parameters
 from gcodejerk.errors import GcodejerkError
 
 app = typer.Typer(
@@ -40,6 +41,7 @@ app.command("verify")(verify)
 app.command("plan")(plan)
 app.command("map")(map_amplitudes)
 app.command("compare")(compare)
+app.command("parameters")(parameters)
 app.command("controllers")(controllers)
 app.command("install")(install)
 machine_app.command("check")(machine_check)

@@ -35,6 +35,7 @@ from gcodejerk.emit.base import Controller, Form, Options
 from gcodejerk.emit.frame import Frame
 from gcodejerk.emit.gcode import line_ends_of
 from gcodejerk.emit.guard import guarded, in_structures
+from gcodejerk.emit.linuxcnc_settings import LinuxcncSettings
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import LINUXCNC, Machine
@@ -56,7 +57,7 @@ LEAD_TIME = 0.01
 """In which the queue of motions fills. [s]"""
 
 
-class LinuxcncController(Controller):
+class LinuxcncController(LinuxcncSettings, Controller):
     """Writes G1 blocks that end on servo periods, with fitted speeds."""
 
     name = "linuxcnc"
@@ -70,6 +71,7 @@ class LinuxcncController(Controller):
             "needs ARC_BLEND_ENABLE = 1 and MAX_ACCELERATION 1.05 to 4 times the axis's "
             "limit.acceleration",
         ),
+        Form("parameters", "documented", "MAX_JERK of 2.10, MAX_ACCELERATION of 2.9: the INI file"),
     )
 
     def stride(self, interval: float) -> int:

@@ -210,6 +210,21 @@ class ControllerOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class ControllerParameter:
+    """One setting of the control that its owner has confirmed."""
+
+    number: str
+    """As the control calls it."""
+    axis: str | None = None
+    """The axis that it belongs to; None: all of them."""
+    unit: str | None = None
+    """In which the control takes it; None: as the control's table has it."""
+    meaning: str = ""
+    old: float | None = None
+    """What it is set to today; None unknown."""
+
+
+@dataclass(frozen=True, slots=True)
 class Description:
     """What a machine file says, in mm (or deg), s and Hz.
 
@@ -233,6 +248,7 @@ class Description:
     design: Design
     program: ProgramStart
     controller_options: ControllerOptions = field(default_factory=ControllerOptions)
+    controller_parameters: tuple[ControllerParameter, ...] = ()
     spindle: str | None = None
     """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
     inch: bool = field(default=False, compare=False)

@@ -24,6 +24,8 @@ from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.profiles.symmetric import SymmetricProfiles
 
 Complex = NDArray[np.complex128]
+STILL = 1e-9
+"""Acceleration that is none, of the profile's peak. [-]"""
 
 
 def mode_poles(frequency: ArrayLike, damping: ArrayLike) -> Complex:
@@ -170,15 +172,56 @@ def profiles_response(profiles: Profiles, poles: Complex) -> Complex:
     :math:`\sum_k (\Delta a_k/\lambda + \Delta j_k/\lambda^2)\, e^{\lambda (T - t_k)}`: what the
     integration leaves besides is zero where a profile ends at rest.
     """
-    response = np.empty((len(profiles), len(poles)), dtype=np.complex128)
     if not len(profiles):
-        return response
-    first = profiles.first[:-1] + np.arange(len(profiles))
+        return np.empty((0, len(poles)), dtype=np.complex128)
+    return _steps_response(profiles, poles, profiles.first[:-1] + np.arange(len(profiles)))
+
+
+def halves_response(profiles: Profiles, poles: Complex) -> tuple[Complex, Complex, Array]:
+    """The same in two parts: of what happens before the longest cruise, and of what follows it.
+
+    Parameters
+    ----------
+    profiles : Profiles
+        n profiles.
+    poles : ndarray of complex, shape (m,)
+        From `mode_poles`. [rad/s]
+
+    Returns
+    -------
+    before, after : ndarray of complex, shape (n, m)
+        Their sum is `profiles_response`. [1/s]
+    cruise : ndarray, shape (n,)
+        Between the two, at a constant speed; 0 where there is none, and all is before. [s]
+    """
+    peak = profiles.peak_acceleration[profiles.owner]
+    still = np.maximum(np.abs(profiles.acceleration), np.abs(profiles.end_acceleration)) < (
+        STILL * peak
+    )
+    long = np.where(still, profiles.duration, 0.0)
+    cruise = np.maximum.reduceat(long, profiles.first[:-1])
+    at = np.flatnonzero((long == cruise[profiles.owner]) & still)
+    # The last of equals.
+    last = np.full(len(profiles), -1)
+    last[profiles.owner[at]] = at
+    begin = profiles.first[:-1] + np.arange(len(profiles))
+    after = np.where(last >= 0, last + np.arange(len(profiles)) + 1, begin)
+    parts = _steps_response(profiles, poles, np.stack([begin, after], axis=1).ravel())
+    before, behind = parts[0::2], parts[1::2]
+    # Where nothing cruises both parts begin at the same step: the second one is all.
+    alone = last < 0
+    before[alone], behind[alone] = behind[alone], 0.0
+    return before, behind, cruise
+
+
+def _steps_response(profiles: Profiles, poles: Complex, starts: NDArray[np.int64]) -> Complex:
+    """Sums over the steps of profiles, from each start to the next, shape (len(starts), m)."""
+    response = np.empty((len(starts), len(poles)), dtype=np.complex128)
     left = np.repeat(profiles.total, np.diff(profiles.first) + 1) - profiles.step_times()
     a, j = profiles.acceleration_steps(), profiles.jerk_steps()
     for m, pole in enumerate(poles):
         each = (a + j / pole) * (_exponential(pole, left) / pole)
-        response[:, m] = np.add.reduceat(each, first)
+        response[:, m] = np.add.reduceat(each, starts)
     return response
 
 

@@ -39,7 +39,8 @@ ROOMS = {
     _version axes errors units reasons start advice
  <- nc | machine | motion
  <- cycles | planning
- <- studies | emit | verification | testing
+ <- studies | parameters | verification | testing
+ <- emit
  <- rewrite
  <- report
  <- batch

@@ -20,6 +20,7 @@ from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.parts import (
     Axis,
     ControllerOptions,
+    ControllerParameter,
     Description,
     Design,
     Limits,
@@ -230,6 +231,9 @@ def _machine(
         design=Design(**values["design"]),
         program=_program(values["program"]),
         controller_options=_controller_options(values.get("controller_options", {})),
+        controller_parameters=tuple(
+            ControllerParameter(**one) for one in values.get("controller_parameters", {}).values()
+        ),
         inch=checker.inch,
         source=name,
         warnings=tuple(

@@ -36,6 +36,13 @@ DIALECT_OF_CONTROLLER = {
     "mach": "mach",
     "marlin": "marlin",
     "klipper": "klipper",
+    "kalico": "klipper",
+    "rrf": "marlin",
+    "smoothieware": "marlin",
+    "grblhal": "grbl",
+    "fluidnc": "grbl",
+    "g2core": "grbl",
+    "kflop": "mach",
 }
 """How programs are read where the file does not say; `auto` for a controller that is not here."""
 
@@ -316,6 +323,20 @@ _PROGRAM = Section(
     )
 )  # fmt: skip
 
+_CONTROLLER_PARAMETER = Section(
+    (
+        Key("number", Text(r"\S+", "the number or name of a setting"),
+            "As the control calls it: 1620, MD32431, $120.", required=True, example="1620"),
+        Key("axis", Choice(tuple(AXES)),
+            "The axis that it belongs to. Left out: all of them.", example="X"),
+        Key("unit", Text(r"\S+", "a unit such as ms, us, s, mm/s^2 or m/s^3"),
+            "In which the control takes it. Left out: as the setup sheet says.", example="ms"),
+        Key("meaning", Text(r".*", "text"), "For the reader.", default="",
+            example="bell time of rapids"),
+        Key("old", Number("-"), "What it is set to today.", example="100"),
+    )
+)  # fmt: skip
+
 _CONTROLLER_OPTIONS = Section(
     (
         Key("version", Choice(("2.9", "2.10")),
@@ -371,6 +392,9 @@ MACHINE: Final = Section(
         Key("design", _DESIGN, "How profiles are chosen."),
         Key("controller_options", _CONTROLLER_OPTIONS,
             "What is set in the control and streams depend on; of LinuxCNC in this version."),
+        Key("controller_parameters", ListOf(_CONTROLLER_PARAMETER, at_most=200),
+            "Settings of the control that its owner has confirmed: what `gcodejerk parameters` "
+            "knows from hearsay only, it writes for these alone."),
         Key("program", _PROGRAM, "What a program may assume when it starts."),
     )
 )  # fmt: skip

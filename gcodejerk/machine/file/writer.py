@@ -17,6 +17,7 @@ from gcodejerk.machine.file.table import SCHEMA_VERSION
 from gcodejerk.machine.parts import (
     Axis,
     ControllerOptions,
+    ControllerParameter,
     Description,
     Limits,
     Mode,
@@ -62,6 +63,7 @@ def machine_yaml(machine: Description) -> str:
             f"  minimum_length: {_number(design.minimum_length)}",
             f"  max_extension: {_number(design.max_extension)}",
             *_controller_options(machine.controller_options),
+            *_controller_parameters(machine.controller_parameters),
             "program:",
             f"  start: {_flow(program.start)}",
             f"  offsets: {_braces(offsets | lengths)}",
@@ -95,6 +97,22 @@ def _controller_options(options: ControllerOptions) -> list[str]:
     said = [name for name in texts if getattr(options, name) != getattr(usual, name)]
     lines = [f"  {name}: {texts[name]}" for name in said]
     return ["controller_options:", *lines] if lines else []
+
+
+def _controller_parameters(confirmed: tuple[ControllerParameter, ...]) -> list[str]:
+    """Settings of the control, one line each."""
+    lines = ["controller_parameters:"] if confirmed else []
+    for one in confirmed:
+        texts = {
+            "number": _text(one.number),
+            "axis": one.axis,
+            "unit": None if one.unit is None else _text(one.unit),
+            "meaning": _text(one.meaning) if one.meaning else None,
+            "old": None if one.old is None else _number(one.old),
+        }
+        inner = ", ".join(f"{key}: {text}" for key, text in texts.items() if text is not None)
+        lines.append(f"  - {{{inner}}}")
+    return lines
 
 
 def settings_text(machine: Description) -> str:

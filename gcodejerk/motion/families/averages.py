@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.motion.families.family import ACCELERATION, VELOCITY, Family, Kind, Quantity
+from gcodejerk.motion.families.seven_segment import trapezoid_duration
 from gcodejerk.motion.profiles.boxes import box_profiles
 from gcodejerk.motion.profiles.profile import Array, Profiles
 
@@ -36,13 +37,25 @@ def averaged_trapezoid_profiles(
     return box_profiles(1.0 / v, v / acceleration, np.maximum(second_average, SHORTEST))
 
 
+def time_constant_duration(velocity: Array, first_average: Array, second_average: Array) -> Array:
+    """How long they take, shape (n,) [s]."""
+    return np.asarray(1.0 / velocity + first_average + second_average)
+
+
+def averaged_trapezoid_duration(
+    velocity: Array, acceleration: Array, second_average: Array
+) -> Array:
+    """How long trapezoids behind an average take, shape (n,) [s]."""
+    return trapezoid_duration(velocity, acceleration) + second_average
+
+
 TIME_CONSTANTS = Family(
     "time-constants", "two moving averages of fixed times", (VELOCITY, FT1, FT2),
     time_constant_profiles,
-    "Fanuc B-64124EN p. 389",
+    "Fanuc B-64124EN p. 389", duration=time_constant_duration,
 )  # fmt: skip
 AVERAGED_TRAPEZOID = Family(
     "averaged-trapezoid", "constant acceleration behind one moving average",
     (VELOCITY, ACCELERATION, FT2), averaged_trapezoid_profiles,
-    "Fanuc A-78962EN p. 16 (time to speed F/A + T)",
+    "Fanuc A-78962EN p. 16 (time to speed F/A + T)", duration=averaged_trapezoid_duration,
 )  # fmt: skip

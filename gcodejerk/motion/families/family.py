@@ -64,6 +64,9 @@ class Family:
     exact : bool
         Its profiles are those of the control; otherwise pieces of constant jerk stand for a law
         that has none, and `build` says how far they are off.
+    duration : callable, optional
+        The same columns -> how long the profiles take, shape (n,) [s], where that has a form of
+        its own.
     """
 
     name: str
@@ -72,6 +75,13 @@ class Family:
     build: Callable[..., Profiles]
     source: str
     exact: bool = True
+    duration: Callable[..., Array] | None = None
+
+    def durations(self, unit: Mapping[str, Array]) -> Array:
+        """How long the profiles of unit quantities take, shape (n,) [s]."""
+        if self.duration is None:
+            return self.build(**unit).total
+        return np.asarray(self.duration(**unit))
 
     def profiles(self, values: Mapping[str, Array], share: Array) -> Profiles:
         """Profiles of straight rapids.

@@ -29,12 +29,23 @@ def trapezoid_profiles(velocity: Array, acceleration: Array) -> Profiles:
     return seven_segment_profiles(velocity, acceleration, np.full_like(velocity, np.inf))
 
 
+def seven_segment_duration(velocity: Array, acceleration: Array, jerk: Array) -> Array:
+    """How long they take, shape (n,) [s]."""
+    return conventional_profiles(velocity, acceleration, jerk).total
+
+
+def trapezoid_duration(velocity: Array, acceleration: Array) -> Array:
+    """How long trapezoids take, shape (n,) [s]."""
+    v = np.minimum(velocity, np.sqrt(acceleration))
+    return np.asarray(1.0 / v + v / acceleration)
+
+
 SEVEN_SEGMENT = Family(
     "jerk-limited", "seven segments with one jerk", (VELOCITY, ACCELERATION, JERK),
     seven_segment_profiles,
-    "for example SINUMERIK 828D function manual B2 4.2.12 (SOFT)",
+    "for example SINUMERIK 828D function manual B2 4.2.12 (SOFT)", duration=seven_segment_duration,
 )  # fmt: skip
 TRAPEZOID = Family(
     "trapezoidal", "a trapezoid of velocity", (VELOCITY, ACCELERATION), trapezoid_profiles,
-    "for example grbl 1.1, doc/markdown/settings.md",
+    "for example grbl 1.1, doc/markdown/settings.md", duration=trapezoid_duration,
 )  # fmt: skip

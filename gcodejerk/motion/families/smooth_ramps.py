@@ -91,9 +91,15 @@ def poly5_profiles(velocity: Array, acceleration: Array) -> Profiles:
     return poly6_profiles(velocity, acceleration, np.full_like(velocity, 1.5))
 
 
+def quintic_duration(velocity: Array, jerk: Array) -> Array:
+    """How long quintic ramps and what is between them take, shape (n,) [s]."""
+    v = np.minimum(velocity, np.cbrt(jerk / JERK_PEAK))
+    return np.asarray(1.0 / v + np.sqrt(JERK_PEAK * v / jerk))
+
+
 QUINTIC_RAMPS = Family(
     "quintic", "ramps of quintic speed", (VELOCITY, JERK), quintic_profiles,
-    "g2core, g2core/plan_zoid.cpp at 12c2138", exact=False,
+    "g2core, g2core/plan_zoid.cpp at 12c2138", exact=False, duration=quintic_duration,
 )  # fmt: skip
 POLY5 = Family(
     "poly5", "ramps of quintic position, as long as a trapezoid's", (VELOCITY, ACCELERATION),

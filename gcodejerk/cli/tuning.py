@@ -1,0 +1,170 @@
+"""The command that tunes a control's own settings: `parameters`."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcodejerk.cli.common import MachineOption, console, load_machine, progress
+
+if TYPE_CHECKING:
+    from gcodejerk.machine import Machine
+    from gcodejerk.parameters import Moves
+
+FIGURES = (".png", ".svg", ".pdf")
+LENGTHS = 60
+"""Lengths between the two of --lengths."""
+
+
+def parameters(
+    machine: MachineOption,
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[FILE...]", help="programs and folders whose rapids it is tuned for"
+        ),
+    ] = None,
+    controller: Annotated[
+        str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
+    ] = None,
+    settings: Annotated[
+        str | None,
+        typer.Option("--settings", metavar="NAME", help="which of the control's settings, if it "
+                     "has several ways"),
+    ] = None,
+    lengths: Annotated[
+        str | None,
+        typer.Option(metavar="FROM:TO", help="in place of programs: rapids of these lengths [mm] "
+                     "on every axis with a mode"),
+    ] = None,
+    goal: Annotated[
+        str,
+        typer.Option(metavar="worst/mean", help="make the worst rapid before a cut small, or "
+                     "their mean"),
+    ] = "worst",
+    time: Annotated[
+        float,
+        typer.Option(metavar="SHARE", min=0.1, max=10.0,
+                     help="time of all rapids together, of today's"),
+    ] = 1.0,
+    output: Annotated[
+        str | None,
+        typer.Option("-o", "--output", metavar="FILE", help="write the setup sheet; - is standard "
+                     "output"),
+    ] = None,
+    as_json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="write the figures; - is standard output"),
+    ] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="draw what time buys, and robustness (.png, "
+                     ".svg, .pdf)"),
+    ] = None,
+    dialect: Annotated[str | None, typer.Option(help="how the programs are read")] = None,
+) -> None:  # fmt: skip
+    """Tune the control's own time constants, jerk limits and shapers for a shop's rapids."""
+    from gcodejerk.batch.files import new_file
+    from gcodejerk.emit import load_controller
+    from gcodejerk.emit.sheets import Sheets
+    from gcodejerk.errors import EmitError
+    from gcodejerk.parameters import GOALS, tune
+    from gcodejerk.report.records import dump
+    from gcodejerk.report.tuning_record import tuning_record
+    from gcodejerk.report.tuning_table import tuning_notes, tuning_tables
+
+    if bool(files) == (lengths is not None):
+        raise typer.BadParameter("give programs, or --lengths FROM:TO such as 1:500, and not both")
+    if goal not in GOALS:
+        raise typer.BadParameter(f"--goal {goal}: choose {' or '.join(GOALS)}")
+    if plot is not None and Path(plot).suffix.lower() not in FIGURES:
+        raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
+    written = [name for name in (output, as_json, plot) if name is not None]
+    if len(set(written)) < len(written):
+        raise typer.BadParameter("-o, --json and --plot are different files")
+    described = load_machine(machine, files[0] if files else None)
+    emitter = load_controller(controller or described.controller)
+    if not isinstance(emitter, Sheets):
+        raise EmitError(
+            f"controller {emitter.name}: nothing is known that could be set in it",
+            "`gcodejerk controllers` shows which have the form parameters",
+        )
+    with progress(False) as show:
+        moves, of = _moves(files or [], lengths, described, dialect)
+        scheme = emitter.scheme(described, settings)
+        found = tune(
+            scheme, moves, described, goal=goal, time=time,
+            progress=None if show is None else lambda done, total: show("searching", done, total),
+        )  # fmt: skip
+    sheet = emitter.sheet(found, of)
+    way = settings or next(iter(emitter.schemes(described)))
+    with ExitStack() as outputs:
+        if output is not None:
+            outputs.enter_context(new_file(output)).write(sheet)
+        if as_json is not None:
+            outputs.enter_context(new_file(as_json)).write(dump(tuning_record(found, way)))
+        if plot is not None:
+            from gcodejerk.report.tuning_figure import plot_tuning
+
+            plot_tuning(found, outputs.enter_context(new_file(plot)), Path(plot).suffix)
+    if "-" in written:
+        return
+    screen = console()
+    for table in tuning_tables(found):
+        screen.print(table)
+    for note in tuning_notes(found):
+        print(note)
+    others = [name for name in emitter.schemes(described) if name != way]
+    if others:
+        print(f"settings of {emitter.name}: {way}; also --settings {', '.join(others)}")
+    if output is None:
+        print(f"the setup sheet, with the way back: -o NAME{emitter.sheet_suffix}")
+    else:
+        print(f"{output}: the setup sheet, with the way back")
+
+
+def _moves(
+    files: list[str], lengths: str | None, machine: Machine, dialect: str | None
+) -> tuple[Moves, str]:
+    """The rapids that it is tuned for, and what they are called."""
+    import numpy as np
+
+    from gcodejerk.batch.files import open_input
+    from gcodejerk.batch.inputs import find_inputs
+    from gcodejerk.errors import ProgramError
+    from gcodejerk.nc import read_program
+    from gcodejerk.parameters import Moves, joined_moves, program_moves
+
+    if lengths is not None:
+        first, last = _range(lengths)
+        steps = np.unique(np.geomspace(first, last, LENGTHS).round(3))
+        return Moves.of_lengths(steps.tolist(), machine), f"{first:g} to {last:g} mm on each axis"
+    found, problems = find_inputs(files, None)
+    if problems:
+        raise ProgramError(str(problems[0]))
+    parts = []
+    for one in found:
+        with open_input(one.path) as source:
+            program = read_program(
+                source, name=one.path, dialect=dialect or machine.dialect,
+                start=machine.program_start(),
+            )  # fmt: skip
+            parts.append(program_moves(program.rapids, source, machine))
+    name = Path(found[0].path).name if len(found) == 1 else f"{len(found)} programs"
+    return joined_moves(parts, machine), name
+
+
+def _range(text: str) -> tuple[float, float]:
+    """`1:500` as two lengths."""
+    first, colon, last = text.partition(":")
+    try:
+        low, high = float(first), float(last)
+    except ValueError:
+        colon = ""
+        low = high = 0.0
+    if not colon or not 0.0 < low <= high < 1e6:
+        raise typer.BadParameter(f"--lengths {text}: give two lengths in mm, for example 1:500")
+    return low, high

@@ -1,0 +1,366 @@
+"""Tuning: a control's settings for a shop's own rapids, beside what they are today.
+
+This module owns the whole study of one control on one machine: what today's rapids take and leave,
+the settings that leave least in no more time, what more or less time would buy, and how either
+holds where the frequencies are not as written. It knows no control and writes nothing.
+
+Rule: today is what the machine file says (`rapid`), whatever control is asked for; no setting may
+take more time for all rapids together than that, unless the user says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.axes import AXES
+from gcodejerk.errors import PlanError
+from gcodejerk.machine import Machine
+from gcodejerk.motion.families import filters
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.parameters.judge import DAMPING, FILTER, MADE_FOR, Judge, Rows
+from gcodejerk.parameters.moves import Moves
+from gcodejerk.parameters.search import WORST, Found, Goal, Progress, goal_value, search
+from gcodejerk.parameters.settings import ALL, PATH, Scheme
+from gcodejerk.planning.plans import Modes
+from gcodejerk.planning.task import Task
+
+SHARES = (0.9, 0.95, 1.05, 1.1, 1.25, 1.5)
+"""Times that the curve looks at besides today's. [of today's]"""
+SPREAD = np.linspace(-0.2, 0.2, 41)
+"""Relative errors of all frequencies that robustness is drawn over."""
+CYCLES, GAINED = 3, 0.01
+"""How often the groups of settings are gone through at most, and the gain that counts. [-]"""
+SLOWER, LONGEST_PERIODS, SHORTEST_RAMP = 6.0, 3.0, 1e-3
+"""How much less acceleration than today's, how many periods of the lowest mode for a time, and how
+short a ramp of the acceleration are looked at. [-], [-], [s]"""
+RAMPS = 0.4
+"""What both ramps of a move take at most, for the frequencies that a band is looked at [s]."""
+HELD = 1.0 + 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What one way of moving takes and leaves.
+
+    Attributes
+    ----------
+    times, worst : ndarray, shape (n,)
+        Of each move; the residual is the largest within the band. [s], [mm]
+    total : float
+        Time of all moves, each as often as it occurs. [s]
+    value : float
+        The goal: worst or mean residual of the moves that need it. [mm]
+    """
+
+    times: Array
+    worst: Array
+    total: float
+    value: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Point:
+    """One point of what time buys.
+
+    Attributes
+    ----------
+    share : float
+        Time that was allowed, of today's. [-]
+    total, value : float
+        Time that is used, and what it leaves. [s], [mm]
+    written : ndarray, shape (s,)
+        The settings.
+    """
+
+    share: float
+    total: float
+    value: float
+    written: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tuning:
+    """The study of one control.
+
+    Attributes
+    ----------
+    machine : Machine
+    scheme : Scheme
+        What can be set.
+    moves : Moves
+        n distinct rapids.
+    goal : str
+        One of `search.GOALS`.
+    today : Outcome
+        What the machine file says of its control's own rapids.
+    before : ndarray, shape (s,)
+        The settings nearest to today's rapids; NaN where today's has none of it.
+    written : ndarray, shape (s,)
+        The settings that were chosen.
+    as_set, chosen : Outcome
+        What the control's law does with either.
+    curve : tuple of Point
+        By rising time; the choice is among them.
+    spread : ndarray, shape (3, r)
+        The goal with all frequencies off by `SPREAD`: today, as set, chosen. [mm]
+    proven : bool
+        No candidate leaves less.
+    judged : int
+        Settings that were judged on all moves.
+    """
+
+    machine: Machine
+    scheme: Scheme
+    moves: Moves
+    goal: str
+    today: Outcome
+    before: Array
+    written: Array
+    as_set: Outcome
+    chosen: Outcome
+    curve: tuple[Point, ...]
+    spread: Array
+    proven: bool
+    judged: int
+
+    @property
+    def gains(self) -> bool:
+        """Whether the choice leaves less than today."""
+        return self.chosen.value < self.today.value
+
+    def number(self, key: str) -> float:
+        """The chosen number of a setting."""
+        return float(self.written[[s.key for s in self.scheme.settings].index(key)])
+
+
+def tune(
+    scheme: Scheme,
+    moves: Moves,
+    machine: Machine,
+    *,
+    goal: str = WORST,
+    time: float = 1.0,
+    curve: bool = True,
+    progress: Progress | None = None,
+) -> Tuning:
+    """Choose a control's settings for rapids.
+
+    Parameters
+    ----------
+    scheme : Scheme
+        What can be set.
+    moves : Moves
+        The rapids.
+    machine : Machine
+        Its modes, limits and today's rapids.
+    goal : str
+        One of `search.GOALS`.
+    time : float
+        How much time all rapids together may take, of today's. [-]
+    curve : bool
+        Also what more and less time would buy.
+    progress : callable, optional
+        Called with how much is done, and of how much.
+
+    Returns
+    -------
+    Tuning
+
+    Raises
+    ------
+    PlanError
+        No rapid excites a mode.
+    """
+    rows = Rows.of(moves, machine)
+    if not (np.abs(moves.displacement) @ np.abs(rows.objective.weights)).any():
+        raise PlanError(
+            f"no rapid moves an axis that excites a mode of {machine.source}: nothing to tune",
+            "give programs that move such an axis, or describe its modes",
+        )
+    today, today_off = _today(machine, moves, goal)
+    judge = Judge(scheme, rows.in_band(machine.design.band, RAMPS))
+    before = scheme.today()
+    start = _filled(scheme, before, machine)
+    work = _Work(judge, machine, _ranges(scheme, machine), today, goal)
+    shares = sorted({time, *(SHARES if curve else ())})
+    found: dict[float, tuple[Found | None, Array]] = {}
+    for done, share in enumerate(sorted(shares, key=lambda s: s != time)):
+        if progress is not None:
+            progress(done, len(shares))
+        found[share] = work.groups(start, share)
+    best, written = found[time]
+    if best is None:
+        written = start
+    points = []
+    for share, (any_found, row) in sorted(found.items()):
+        if any_found is not None:
+            one = _at(judge, row, goal)
+            points.append(Point(share, one.total, one.value, row))
+    off = [Judge(scheme, rows.off_by(r)) for r in SPREAD.tolist()]
+    spread = [
+        goal_value(np.array([one.worst(row[np.newaxis])[0] for one in off]), moves, goal)
+        for row in (start, written)
+    ]
+    return Tuning(
+        machine=machine,
+        scheme=scheme,
+        moves=moves,
+        goal=goal,
+        today=today,
+        before=before,
+        written=written,
+        as_set=_at(judge, start, goal),
+        chosen=_at(judge, written, goal),
+        curve=tuple(points),
+        spread=np.stack([today_off, *spread]),
+        proven=best is not None and best.proven,
+        judged=work.judged,
+    )
+
+
+class _Work:
+    """The search over all groups of settings."""
+
+    def __init__(
+        self, judge: Judge, machine: Machine, ranges: Array, today: Outcome, goal: str
+    ) -> None:
+        self.judge, self.machine, self.ranges = judge, machine, ranges
+        self.today, self.goal = today, goal
+        self.judged = 0
+
+    def groups(self, start: Array, share: float) -> tuple[Found | None, Array]:
+        """Choose group after group, until none gains; the last find, and the numbers."""
+        written, last = start, None
+        values: dict[int, float] = {}
+        proven = True
+        groups = [g for g in self.judge.scheme.groups if len(self._concerned(g))]
+        for cycle in range(CYCLES if len(groups) > 1 else 1):
+            gained = False
+            for k, group in enumerate(groups):
+                index = self._concerned(group)
+                part = self.judge.take(index)
+                budget = share * float(self.today.times[index] @ part.moves.count)
+                found = search(
+                    part, written, group, self.ranges, Goal(self.goal, budget), self._allowed
+                )
+                if found is None:
+                    return None, start
+                self.judged += found.judged
+                proven = found.proven if cycle == 0 else proven and found.proven
+                if found.value < values.get(k, np.inf) * (1.0 - GAINED):
+                    values[k], written, gained, last = found.value, found.written, True, found
+            if not gained:
+                break
+        return (None if last is None else replace(last, proven=proven)), written
+
+    def _concerned(self, group: tuple[int, ...]) -> NDArray[np.intp]:
+        """The moves that a group of settings acts on."""
+        axes = [self.judge.scheme.settings[k].axis for k in group]
+        if PATH in axes or ALL in axes:
+            return np.arange(len(self.judge.moves))
+        columns = [AXES.index(axis) for axis in axes]
+        return np.flatnonzero((self.judge.moves.displacement[:, columns] != 0.0).any(axis=1))
+
+    def _allowed(self, written: Array) -> NDArray[np.bool_]:
+        """Settings that keep the machine's limits."""
+        axes, _ = self.judge.scheme.values(written)
+        allowed = np.ones(len(written), dtype=bool)
+        for axis in self.machine.axes:
+            at = AXES.index(axis.name)
+            q = {name: value[:, at] for name, value in axes.items()}
+            for name in ("acceleration", "deceleration"):
+                if name in q:
+                    allowed &= q[name] <= axis.limit.acceleration * HELD
+            if "jerk" in q:
+                # Without a jerk limit today, a trapezoid may stay one.
+                allowed &= (q["jerk"] <= axis.limit.jerk * HELD) | np.isinf(q["jerk"])
+            if "second_average" in q and "acceleration" in q:
+                with np.errstate(divide="ignore"):
+                    jerk = q["acceleration"] / q["second_average"]
+                allowed &= (jerk <= axis.limit.jerk * HELD) | np.isinf(jerk)
+        return allowed
+
+
+def _today(machine: Machine, moves: Moves, goal: str) -> tuple[Outcome, Array]:
+    """What the machine file says of the control's own rapids, and with frequencies that are off."""
+    rows = Rows.of(moves, machine)
+    task = Task.of(machine, Modes.of(machine), rows.share, speed=rows.stated)
+    own = task.conventional
+    times = rows.last(own.total[np.newaxis])[0]
+    judged = rows.in_band(machine.design.band, RAMPS)
+    worst = judged.residuals(own)[0].max(axis=-1, initial=0.0)
+    spread = [rows.off_by(r).residuals(own)[0].max(axis=-1, initial=0.0) for r in SPREAD.tolist()]
+    return _outcome(times, worst, moves, goal), goal_value(np.array(spread), moves, goal)
+
+
+def _outcome(times: Array, worst: Array, moves: Moves, goal: str) -> Outcome:
+    """Times and residuals with what they come to."""
+    value = float(goal_value(worst[np.newaxis], moves, goal)[0])
+    return Outcome(times, worst, float(times @ moves.count), value)
+
+
+def _at(judge: Judge, written: Array, goal: str) -> Outcome:
+    """What the control's law does with settings."""
+    row = written[np.newaxis]
+    return _outcome(judge.times(row)[0], judge.worst(row)[0], judge.moves, goal)
+
+
+def _filled(scheme: Scheme, before: Array, machine: Machine) -> Array:
+    """Today's settings; what today's rapid has none of is as gentle as it may be."""
+    ranges = _ranges(scheme, machine)
+    return np.asarray(np.where(np.isnan(before), ranges[:, 1], before))
+
+
+def _ranges(scheme: Scheme, machine: Machine) -> Array:
+    """Between which numbers each setting is looked for, shape (s, 2).
+
+    From much less acceleration than today's to the machine's limit; times up to some periods of the
+    lowest mode; jerks that build the acceleration up within the same; frequencies around the modes.
+    """
+    modes = Modes.of(machine)
+    frequency = np.array([mode.frequency for mode in modes.modes])
+    longest = LONGEST_PERIODS / frequency.min()
+    # Averages are made for a time, shapers for a frequency.
+    made_for = (0.5 * frequency.min(), 1.5 * frequency.max())
+    if set(scheme.shaped) <= {filters.AVERAGE, filters.TRIANGLE}:
+        made_for = (SHORTEST_RAMP, longest)
+    axes, path = scheme.values(np.full((1, len(scheme.settings)), np.nan))
+    limits = {axis.name: axis.limit for axis in machine.axes}
+    out = []
+    for setting in scheme.settings:
+        if setting.axis == PATH:
+            quantities = {name: value for name, value in path.items()}
+            most = {
+                "acceleration": max(limit.acceleration for limit in limits.values()),
+                "jerk": max(limit.jerk for limit in limits.values()),
+            }
+        else:
+            at = scheme.column(setting)
+            quantities = {name: value[:, at] for name, value in axes.items()}
+            own = limits[AXES[at]]
+            most = {
+                "acceleration": own.acceleration,
+                "deceleration": own.acceleration,
+                "jerk": own.jerk,
+            }
+        name = setting.relation.quantity
+        now = float(quantities[name][0]) if name in quantities else np.nan
+        acceleration = float(quantities.get("acceleration", np.array([np.nan]))[0])
+        bounds = {
+            "acceleration": (now / SLOWER, most.get("acceleration", now)),
+            "deceleration": (now / SLOWER, most.get("deceleration", now)),
+            "jerk": (acceleration / longest, min(most["jerk"], acceleration / SHORTEST_RAMP)),
+            MADE_FOR: made_for,
+            "notch": (0.3 * frequency.min(), 3.0 * frequency.max()),
+            FILTER: (0.0, float(len(scheme.shaped))),
+            DAMPING: (0.0, 0.3),
+        }.get(name, (0.0, longest))
+        ends = [
+            float(setting.relation.written(quantities | {name: np.array([b])})[0]) for b in bounds
+        ]
+        numbers = [float(setting.rounded(np.array(x))) for x in ends]
+        out.append(sorted(numbers))
+    return np.array(out).reshape(-1, 2)
