@@ -22,7 +22,15 @@ from gcodejerk.motion.families import filters
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.parameters.judge import DAMPING, FILTER, MADE_FOR, Judge, Rows
 from gcodejerk.parameters.moves import Moves
-from gcodejerk.parameters.search import WORST, Found, Goal, Progress, goal_value, search
+from gcodejerk.parameters.search import (
+    WORST,
+    Found,
+    Goal,
+    Progress,
+    goal_value,
+    representatives,
+    search,
+)
 from gcodejerk.parameters.settings import ALL, PATH, Scheme
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.task import Task
@@ -33,6 +41,8 @@ SPREAD = np.linspace(-0.2, 0.2, 41)
 """Relative errors of all frequencies that robustness is drawn over."""
 CYCLES, GAINED = 3, 0.01
 """How often the groups of settings are gone through at most, and the gain that counts. [-]"""
+SWEPT = 61
+"""Numbers of a setting that `Tuning.sweep` goes through at most."""
 SLOWER, LONGEST_PERIODS, SHORTEST_RAMP = 6.0, 3.0, 1e-3
 """How much less acceleration than today's, how many periods of the lowest mode for a time, and how
 short a ramp of the acceleration are looked at. [-], [-], [s]"""
@@ -110,6 +120,8 @@ class Tuning:
         No candidate leaves less.
     judged : int
         Settings that were judged on all moves.
+    judge : Judge
+        By which the choice was made.
     """
 
     machine: Machine
@@ -125,15 +137,38 @@ class Tuning:
     spread: Array
     proven: bool
     judged: int
+    judge: Judge
 
     @property
     def gains(self) -> bool:
         """Whether the choice leaves less than today."""
         return self.chosen.value < self.today.value
 
-    def number(self, key: str) -> float:
-        """The chosen number of a setting."""
-        return float(self.written[[s.key for s in self.scheme.settings].index(key)])
+    def sweep(self, setting: int) -> tuple[Array, Array, Array]:
+        """What one setting does, all others as chosen.
+
+        Parameters
+        ----------
+        setting : int
+            Its position.
+
+        Returns
+        -------
+        numbers, totals, values : ndarray, shape (k,)
+            Of the setting; time of all rapids [s]; the goal of the rapids that it acts on [mm]. Of
+            many of these, some stand for all, and the worst is among them.
+        """
+        own = self.scheme.settings[setting]
+        low, high = _ranges(self.scheme, self.machine)[setting].tolist()
+        numbers = np.unique(np.append(own.choices(low, high, SWEPT), self.written[setting]))
+        rows = np.tile(self.written, (len(numbers), 1))
+        rows[:, setting] = numbers
+        own_moves = concerned(self.scheme, self.moves, (setting,))
+        index = own_moves[representatives(self.moves.take(own_moves))[0]]
+        worst = [own_moves[one.worst[own_moves].argmax()] for one in (self.today, self.chosen)]
+        some = self.judge.take(np.union1d(index, worst))
+        totals = np.array([self.judge.times(row[np.newaxis])[0] @ self.moves.count for row in rows])
+        return numbers, totals, goal_value(some.worst(rows), some.moves, self.goal)
 
 
 def tune(
@@ -218,7 +253,17 @@ def tune(
         spread=np.stack([today_off, *spread]),
         proven=best is not None and best.proven,
         judged=work.judged,
+        judge=judge,
     )
+
+
+def concerned(scheme: Scheme, moves: Moves, group: tuple[int, ...]) -> NDArray[np.intp]:
+    """The moves that settings act on, by the positions of the settings."""
+    axes = [scheme.settings[k].axis for k in group]
+    if PATH in axes or ALL in axes:
+        return np.arange(len(moves))
+    columns = [AXES.index(axis) for axis in axes]
+    return np.flatnonzero((moves.displacement[:, columns] != 0.0).any(axis=1))
 
 
 class _Work:
@@ -236,11 +281,12 @@ class _Work:
         written, last = start, None
         values: dict[int, float] = {}
         proven = True
-        groups = [g for g in self.judge.scheme.groups if len(self._concerned(g))]
+        scheme, moves = self.judge.scheme, self.judge.moves
+        groups = [g for g in scheme.groups if len(concerned(scheme, moves, g))]
         for cycle in range(CYCLES if len(groups) > 1 else 1):
             gained = False
             for k, group in enumerate(groups):
-                index = self._concerned(group)
+                index = concerned(scheme, moves, group)
                 part = self.judge.take(index)
                 budget = share * float(self.today.times[index] @ part.moves.count)
                 found = search(
@@ -255,14 +301,6 @@ class _Work:
             if not gained:
                 break
         return (None if last is None else replace(last, proven=proven)), written
-
-    def _concerned(self, group: tuple[int, ...]) -> NDArray[np.intp]:
-        """The moves that a group of settings acts on."""
-        axes = [self.judge.scheme.settings[k].axis for k in group]
-        if PATH in axes or ALL in axes:
-            return np.arange(len(self.judge.moves))
-        columns = [AXES.index(axis) for axis in axes]
-        return np.flatnonzero((self.judge.moves.displacement[:, columns] != 0.0).any(axis=1))
 
     def _allowed(self, written: Array) -> NDArray[np.bool_]:
         """Settings that keep the machine's limits."""

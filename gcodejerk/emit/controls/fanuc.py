@@ -42,7 +42,8 @@ class FanucController(Sheets, GcodeController):
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:
         """FT1 and FT2 of each axis; at constant acceleration, or as fixed times."""
         today = today_of(machine, "velocity", "acceleration", "jerk")
-        bell = np.nan_to_num(today["acceleration"] / today["jerk"])
+        with np.errstate(invalid="ignore"):
+            bell = np.nan_to_num(today["acceleration"] / today["jerk"])
         speed = {a: float(today["velocity"][AXES.index(a)]) for a in machine.axis_names}
 
         def second(axis: str) -> Setting:
