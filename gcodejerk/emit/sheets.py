@@ -252,6 +252,8 @@ def sheet_header(tuning: Tuning, of: str) -> list[str]:
         f"as set: {tuning.chosen.total:.3f} s, {_um(tuning.chosen.value)} um",
         *(f"facts {mark}: {MARKS[mark]}" for mark in marks),
     ]
+    if not tuning.gains:
+        out.append("NO GAIN: this leaves no less than today; do not set it")
     out += list(scheme.notes)
     out += [f"not possible on this control: {text}" for text in scheme.cannot]
     if any(mark not in LIVE for mark in marks):

@@ -94,7 +94,8 @@ def share_of_ramp(per_unit: float) -> Relation:
     """The number is a share of today's time in which the acceleration builds up."""
 
     def ramp(q: Quantities) -> Array:
-        return np.asarray(q[TODAY + "acceleration"] / q[TODAY + "jerk"])
+        with np.errstate(invalid="ignore"):  # axes that the machine does not have
+            return np.asarray(q[TODAY + "acceleration"] / q[TODAY + "jerk"])
 
     return Relation(
         "jerk",

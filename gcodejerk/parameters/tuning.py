@@ -219,13 +219,13 @@ def tune(
     judge = Judge(scheme, rows.in_band(machine.design.band, RAMPS))
     before = scheme.today()
     start = _filled(scheme, before, machine)
-    work = _Work(judge, machine, _ranges(scheme, machine), today, goal)
+    work = _Work(judge, machine, start, today, goal)
     shares = sorted({time, *(SHARES if curve else ())})
     found: dict[float, tuple[Found | None, Array]] = {}
     for done, share in enumerate(sorted(shares, key=lambda s: s != time)):
         if progress is not None:
             progress(done, len(shares))
-        found[share] = work.groups(start, share)
+        found[share] = work.groups(share)
     best, written = found[time]
     if best is None:
         written = start
@@ -270,15 +270,16 @@ class _Work:
     """The search over all groups of settings."""
 
     def __init__(
-        self, judge: Judge, machine: Machine, ranges: Array, today: Outcome, goal: str
+        self, judge: Judge, machine: Machine, start: Array, today: Outcome, goal: str
     ) -> None:
-        self.judge, self.machine, self.ranges = judge, machine, ranges
+        self.judge, self.machine, self.start = judge, machine, start
+        self.ranges = _ranges(judge.scheme, machine)
         self.today, self.goal = today, goal
         self.judged = 0
 
-    def groups(self, start: Array, share: float) -> tuple[Found | None, Array]:
+    def groups(self, share: float) -> tuple[Found | None, Array]:
         """Choose group after group, until none gains; the last find, and the numbers."""
-        written, last = start, None
+        written, last = self.start, None
         values: dict[int, float] = {}
         proven = True
         scheme, moves = self.judge.scheme, self.judge.moves
@@ -293,7 +294,7 @@ class _Work:
                     part, written, group, self.ranges, Goal(self.goal, budget), self._allowed
                 )
                 if found is None:
-                    return None, start
+                    return None, self.start
                 self.judged += found.judged
                 proven = found.proven if cycle == 0 else proven and found.proven
                 if found.value < values.get(k, np.inf) * (1.0 - GAINED):
@@ -303,23 +304,27 @@ class _Work:
         return (None if last is None else replace(last, proven=proven)), written
 
     def _allowed(self, written: Array) -> NDArray[np.bool_]:
-        """Settings that keep the machine's limits."""
-        axes, _ = self.judge.scheme.values(written)
+        """Settings that keep the machine's limits, or pass them no more than today's numbers do."""
+        values = _limited(self.judge.scheme.values(written)[0])
+        today = _limited(self.judge.scheme.values(self.start[np.newaxis])[0])
         allowed = np.ones(len(written), dtype=bool)
         for axis in self.machine.axes:
             at = AXES.index(axis.name)
-            q = {name: value[:, at] for name, value in axes.items()}
-            for name in ("acceleration", "deceleration"):
-                if name in q:
-                    allowed &= q[name] <= axis.limit.acceleration * HELD
-            if "jerk" in q:
+            for name, value in values.items():
+                limit = getattr(axis.limit, name)
                 # Without a jerk limit today, a trapezoid may stay one.
-                allowed &= (q["jerk"] <= axis.limit.jerk * HELD) | np.isinf(q["jerk"])
-            if "second_average" in q and "acceleration" in q:
-                with np.errstate(divide="ignore"):
-                    jerk = q["acceleration"] / q["second_average"]
-                allowed &= (jerk <= axis.limit.jerk * HELD) | np.isinf(jerk)
+                allowed &= value[:, at] <= max(limit, today[name][0, at]) * HELD
         return allowed
+
+
+def _limited(axes: dict[str, Array]) -> dict[str, Array]:
+    """The quantities of axes that a machine limits, by the names of its limits."""
+    names: tuple[str, ...] = ("acceleration", "jerk")
+    out = {name: axes[name] for name in names if name in axes}
+    if "second_average" in axes and "acceleration" in axes:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            out["jerk"] = axes["acceleration"] / axes["second_average"]
+    return out
 
 
 def _today(machine: Machine, moves: Moves, goal: str) -> tuple[Outcome, Array]:
