@@ -146,8 +146,11 @@ class Sheets:
         """Live lines, and those that only ask; numbers that are not known are left to the user."""
         known = [(c, n) for c, n in zip(changed, numbers, strict=True) if n]
         missing = [c for c, n in zip(changed, numbers, strict=True) if not n]
-        live = self.lines(machine, [(c.setting, n) for c, n in known if c.live])
-        asked = self.lines(machine, [(c.setting, n) for c, n in known if not c.live])
+        sure, unsure = (
+            [(c.setting, n) for c, n in known if c.live is wanted] for wanted in (True, False)
+        )
+        live = self.lines(machine, sure) if sure else []
+        asked = self.lines(machine, unsure) if unsure else []
         out = self.frame(live) if live else []
         if asked:
             out += self._comment([f"not verified, {CONFIRM}:"])
@@ -199,7 +202,7 @@ def changes(tuning: Tuning) -> list[Change]:
         old = float(tuning.before[k])
         stated = said is not None and said.old is not None
         if stated and said is not None and said.old is not None:
-            old_text = f"{said.old:g}"
+            old_text = said.old
         else:
             old_text = "" if math.isnan(old) else _text(setting, old, scale)
         out.append(

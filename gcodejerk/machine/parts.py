@@ -220,8 +220,8 @@ class ControllerParameter:
     unit: str | None = None
     """In which the control takes it; None: as the control's table has it."""
     meaning: str = ""
-    old: float | None = None
-    """What it is set to today; None unknown."""
+    old: str | None = None
+    """What it is set to today, as the control has it; None unknown."""
 
 
 @dataclass(frozen=True, slots=True)

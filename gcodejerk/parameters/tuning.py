@@ -144,6 +144,10 @@ class Tuning:
         """Whether the choice leaves less than today."""
         return self.chosen.value < self.today.value
 
+    def number(self, key: str) -> float:
+        """The chosen number of a setting, by its key; ValueError where there is none."""
+        return float(self.written[[s.key for s in self.scheme.settings].index(key)])
+
     def sweep(self, setting: int) -> tuple[Array, Array, Array]:
         """What one setting does, all others as chosen.
 
@@ -225,10 +229,9 @@ def tune(
     for done, share in enumerate(sorted(shares, key=lambda s: s != time)):
         if progress is not None:
             progress(done, len(shares))
-        found[share] = work.groups(share)
+        found[share] = work.best(share)
     best, written = found[time]
-    if best is None:
-        written = start
+    written = start if best is None else _tidy(scheme, written, before)
     points = []
     for share, (any_found, row) in sorted(found.items()):
         if any_found is not None:
@@ -277,9 +280,33 @@ class _Work:
         self.today, self.goal = today, goal
         self.judged = 0
 
-    def groups(self, share: float) -> tuple[Found | None, Array]:
+    def best(self, share: float) -> tuple[Found | None, Array]:
+        """Choose all settings, from today's and with every filter on; the last find, the numbers.
+
+        Groups that share the time of all rapids may hinder each other: one that comes first and
+        takes it all leaves none for the others' filters. So there are two ways to begin.
+        """
+        found = [self.groups(start, share) for start in self._starts()]
+        ends = [_at(self.judge, row, self.goal).value for one, row in found if one is not None]
+        usable = [pair for pair in found if pair[0] is not None]
+        return usable[int(np.argmin(ends))] if usable else found[0]
+
+    def _starts(self) -> list[Array]:
+        """Today's numbers; and where several axes have filters, the first kind for all of them."""
+        kinds = [
+            k
+            for k, s in enumerate(self.judge.scheme.settings)
+            if s.relation.quantity == FILTER and s.axis != ALL
+        ]
+        if len(kinds) < 2:
+            return [self.start]
+        filtered = self.start.copy()
+        filtered[kinds] = 1.0
+        return [self.start, filtered]
+
+    def groups(self, start: Array, share: float) -> tuple[Found | None, Array]:
         """Choose group after group, until none gains; the last find, and the numbers."""
-        written, last = self.start, None
+        written, last = start, None
         values: dict[int, float] = {}
         proven = True
         scheme, moves = self.judge.scheme, self.judge.moves
@@ -294,7 +321,7 @@ class _Work:
                     part, written, group, self.ranges, Goal(self.goal, budget), self._allowed
                 )
                 if found is None:
-                    return None, self.start
+                    return None, start
                 self.judged += found.judged
                 proven = found.proven if cycle == 0 else proven and found.proven
                 if found.value < values.get(k, np.inf) * (1.0 - GAINED):
@@ -355,6 +382,20 @@ def _filled(scheme: Scheme, before: Array, machine: Machine) -> Array:
     """Today's settings; what today's rapid has none of is as gentle as it may be."""
     ranges = _ranges(scheme, machine)
     return np.asarray(np.where(np.isnan(before), ranges[:, 1], before))
+
+
+def _tidy(scheme: Scheme, written: Array, before: Array) -> Array:
+    """The numbers with those as before that a filter which is off has no use for."""
+    out = written.copy()
+    off = {
+        s.axis
+        for s, number in zip(scheme.settings, written.tolist(), strict=True)
+        if s.relation.quantity == FILTER and number == 0.0
+    }
+    for k, setting in enumerate(scheme.settings):
+        if setting.axis in off and setting.relation.quantity in (MADE_FOR, DAMPING):
+            out[k] = before[k]
+    return out
 
 
 def _ranges(scheme: Scheme, machine: Machine) -> Array:

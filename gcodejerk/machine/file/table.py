@@ -333,7 +333,8 @@ _CONTROLLER_PARAMETER = Section(
             "In which the control takes it. Left out: as the setup sheet says.", example="ms"),
         Key("meaning", Text(r".*", "text"), "For the reader.", default="",
             example="bell time of rapids"),
-        Key("old", Number("-"), "What it is set to today.", example="100"),
+        Key("old", Text(r"\S+", "a number or a word of the control"), "What it is set to today.",
+            example="100"),
     )
 )  # fmt: skip
 

@@ -108,7 +108,7 @@ def _controller_parameters(confirmed: tuple[ControllerParameter, ...]) -> list[s
             "axis": one.axis,
             "unit": None if one.unit is None else _text(one.unit),
             "meaning": _text(one.meaning) if one.meaning else None,
-            "old": None if one.old is None else _number(one.old),
+            "old": None if one.old is None else _text(one.old),
         }
         inner = ", ".join(f"{key}: {text}" for key, text in texts.items() if text is not None)
         lines.append(f"  - {{{inner}}}")
