@@ -36,6 +36,8 @@ from gcodejerk.planning.plans import Modes, path_length
 
 CHUNK = 1 << 18
 """Profiles that are judged at a time: what bounds the memory."""
+PIECES = 8
+"""Segments of a profile, about."""
 FILTER, MADE_FOR, DAMPING = "filter", "filter_for", "filter_damping"
 """Quantities of an axis's filter: its kind, counted from 1 (0: none), and the frequency [Hz] or
 time [s] and the damping ratio that it is made for."""
@@ -232,9 +234,17 @@ class Judge:
         """The largest of these over the frequencies, (k, s) -> (k, n) [mm]."""
         return np.asarray(self.residuals(written).max(axis=-1, initial=0.0))
 
-    def profiles(self, written: Array) -> Profiles:
-        """Unit profiles of the rows at one setting, before any filter."""
-        return self._profiles(*self.scheme.values(written[np.newaxis]))
+    def peaks(self, written: Array) -> tuple[Array, Array]:
+        """Peak acceleration and jerk of the unit profiles before any filter, (k, s) -> (k, l).
+
+        [1/s^2], [1/s^3]; where the acceleration steps, that is no jerk here.
+        """
+        out = np.empty((2, len(written), len(self.rows.share)))
+        for part in self._chunks(len(written), PIECES):
+            profiles = self._profiles(*self.scheme.values(written[part]))
+            for k, peak in enumerate((profiles.peak_acceleration, profiles.greatest_jerk)):
+                out[k, part] = peak.reshape(-1, len(self.rows.share))
+        return out[0], out[1]
 
     def _chunks(self, count: int, poles: int) -> list[slice]:
         """Settings in parts of bounded size."""

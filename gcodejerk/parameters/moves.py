@@ -133,7 +133,7 @@ def program_moves(rapids: Rapids, source: BinaryIO, machine: Machine) -> Part:
     speed : ndarray, shape (n,)
         As in `Moves`. [mm/s]
     """
-    known = np.isin(AXES, machine.axis_names)
+    known = np.array([axis in machine.axis_names for axis in AXES])
     named = (rapids.words[:, np.newaxis] >> np.arange(len(AXES))) & 1 != 0
     moved = np.where(named & known, rapids.target - rapids.start, 0.0)
     usable = (rapids.reason == CERTAIN) & np.isfinite(moved).all(axis=1)

@@ -10,28 +10,25 @@ take more time for all rapids together than that, unless the user says so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.families import filters
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.parameters.groups import Groups, concerned
 from gcodejerk.parameters.judge import DAMPING, FILTER, MADE_FOR, Judge, Rows
 from gcodejerk.parameters.moves import Moves
 from gcodejerk.parameters.search import (
     WORST,
-    Found,
-    Goal,
     Progress,
     goal_value,
     representatives,
-    search,
 )
-from gcodejerk.parameters.settings import ALL, PATH, Scheme
+from gcodejerk.parameters.settings import PATH, Scheme
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.task import Task
 
@@ -39,8 +36,6 @@ SHARES = (0.9, 0.95, 1.05, 1.1, 1.25, 1.5)
 """Times that the curve looks at besides today's. [of today's]"""
 SPREAD = np.linspace(-0.2, 0.2, 41)
 """Relative errors of all frequencies that robustness is drawn over."""
-CYCLES, GAINED = 3, 0.01
-"""How often the groups of settings are gone through at most, and the gain that counts. [-]"""
 SWEPT = 61
 """Numbers of a setting that `Tuning.sweep` goes through at most."""
 SLOWER, LONGEST_PERIODS, SHORTEST_RAMP = 6.0, 3.0, 1e-3
@@ -48,7 +43,6 @@ SLOWER, LONGEST_PERIODS, SHORTEST_RAMP = 6.0, 3.0, 1e-3
 short a ramp of the acceleration are looked at. [-], [-], [s]"""
 RAMPS = 0.4
 """What both ramps of a move take at most, for the frequencies that a band is looked at [s]."""
-HELD = 1.0 + 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,6 +110,8 @@ class Tuning:
         By rising time; the choice is among them.
     spread : ndarray, shape (3, r)
         The goal with all frequencies off by `SPREAD`: today, as set, chosen. [mm]
+    fits : bool
+        A setting takes no more time than it may; otherwise the numbers are today's.
     proven : bool
         No candidate leaves less.
     judged : int
@@ -135,14 +131,15 @@ class Tuning:
     chosen: Outcome
     curve: tuple[Point, ...]
     spread: Array
+    fits: bool
     proven: bool
     judged: int
     judge: Judge
 
     @property
     def gains(self) -> bool:
-        """Whether the choice leaves less than today."""
-        return self.chosen.value < self.today.value
+        """Whether the choice leaves less than today, in the time that it may take."""
+        return self.fits and self.chosen.value < self.today.value
 
     def number(self, key: str) -> float:
         """The chosen number of a setting, by its key; ValueError where there is none."""
@@ -223,20 +220,20 @@ def tune(
     judge = Judge(scheme, rows.in_band(machine.design.band, RAMPS))
     before = scheme.today()
     start = _filled(scheme, before, machine)
-    work = _Work(judge, machine, start, today, goal)
+    work = Groups(judge, machine, start, _ranges(scheme, machine), today.times, goal)
     shares = sorted({time, *(SHARES if curve else ())})
-    found: dict[float, tuple[Found | None, Array]] = {}
+    found: dict[float, tuple[Array, bool] | None] = {}
     for done, share in enumerate(sorted(shares, key=lambda s: s != time)):
         if progress is not None:
             progress(done, len(shares))
         found[share] = work.best(share)
-    best, written = found[time]
-    written = start if best is None else _tidy(scheme, written, before)
+    best = found[time]
+    written = start if best is None else _tidy(scheme, best[0], before)
     points = []
-    for share, (any_found, row) in sorted(found.items()):
-        if any_found is not None:
-            one = _at(judge, row, goal)
-            points.append(Point(share, one.total, one.value, row))
+    for share, way in sorted(found.items(), key=lambda item: item[0]):
+        if way is not None:
+            one = _at(judge, way[0], goal)
+            points.append(Point(share, one.total, one.value, way[0]))
     off = [Judge(scheme, rows.off_by(r)) for r in SPREAD.tolist()]
     spread = [
         goal_value(np.array([one.worst(row[np.newaxis])[0] for one in off]), moves, goal)
@@ -254,104 +251,11 @@ def tune(
         chosen=_at(judge, written, goal),
         curve=tuple(points),
         spread=np.stack([today_off, *spread]),
-        proven=best is not None and best.proven,
+        fits=best is not None,
+        proven=best is not None and best[1],
         judged=work.judged,
         judge=judge,
     )
-
-
-def concerned(scheme: Scheme, moves: Moves, group: tuple[int, ...]) -> NDArray[np.intp]:
-    """The moves that settings act on, by the positions of the settings."""
-    axes = [scheme.settings[k].axis for k in group]
-    if PATH in axes or ALL in axes:
-        return np.arange(len(moves))
-    columns = [AXES.index(axis) for axis in axes]
-    return np.flatnonzero((moves.displacement[:, columns] != 0.0).any(axis=1))
-
-
-class _Work:
-    """The search over all groups of settings."""
-
-    def __init__(
-        self, judge: Judge, machine: Machine, start: Array, today: Outcome, goal: str
-    ) -> None:
-        self.judge, self.machine, self.start = judge, machine, start
-        self.ranges = _ranges(judge.scheme, machine)
-        self.today, self.goal = today, goal
-        self.judged = 0
-
-    def best(self, share: float) -> tuple[Found | None, Array]:
-        """Choose all settings, from today's and with every filter on; the last find, the numbers.
-
-        Groups that share the time of all rapids may hinder each other: one that comes first and
-        takes it all leaves none for the others' filters. So there are two ways to begin.
-        """
-        found = [self.groups(start, share) for start in self._starts()]
-        ends = [_at(self.judge, row, self.goal).value for one, row in found if one is not None]
-        usable = [pair for pair in found if pair[0] is not None]
-        return usable[int(np.argmin(ends))] if usable else found[0]
-
-    def _starts(self) -> list[Array]:
-        """Today's numbers; and where several axes have filters, the first kind for all of them."""
-        kinds = [
-            k
-            for k, s in enumerate(self.judge.scheme.settings)
-            if s.relation.quantity == FILTER and s.axis != ALL
-        ]
-        if len(kinds) < 2:
-            return [self.start]
-        filtered = self.start.copy()
-        filtered[kinds] = 1.0
-        return [self.start, filtered]
-
-    def groups(self, start: Array, share: float) -> tuple[Found | None, Array]:
-        """Choose group after group, until none gains; the last find, and the numbers."""
-        written, last = start, None
-        values: dict[int, float] = {}
-        proven = True
-        scheme, moves = self.judge.scheme, self.judge.moves
-        groups = [g for g in scheme.groups if len(concerned(scheme, moves, g))]
-        for cycle in range(CYCLES if len(groups) > 1 else 1):
-            gained = False
-            for k, group in enumerate(groups):
-                index = concerned(scheme, moves, group)
-                part = self.judge.take(index)
-                budget = share * float(self.today.times[index] @ part.moves.count)
-                found = search(
-                    part, written, group, self.ranges, Goal(self.goal, budget), self._allowed
-                )
-                if found is None:
-                    return None, start
-                self.judged += found.judged
-                proven = found.proven if cycle == 0 else proven and found.proven
-                if found.value < values.get(k, np.inf) * (1.0 - GAINED):
-                    values[k], written, gained, last = found.value, found.written, True, found
-            if not gained:
-                break
-        return (None if last is None else replace(last, proven=proven)), written
-
-    def _allowed(self, written: Array) -> NDArray[np.bool_]:
-        """Settings that keep the machine's limits, or pass them no more than today's numbers do."""
-        values = _limited(self.judge.scheme.values(written)[0])
-        today = _limited(self.judge.scheme.values(self.start[np.newaxis])[0])
-        allowed = np.ones(len(written), dtype=bool)
-        for axis in self.machine.axes:
-            at = AXES.index(axis.name)
-            for name, value in values.items():
-                limit = getattr(axis.limit, name)
-                # Without a jerk limit today, a trapezoid may stay one.
-                allowed &= value[:, at] <= max(limit, today[name][0, at]) * HELD
-        return allowed
-
-
-def _limited(axes: dict[str, Array]) -> dict[str, Array]:
-    """The quantities of axes that a machine limits, by the names of its limits."""
-    names: tuple[str, ...] = ("acceleration", "jerk")
-    out = {name: axes[name] for name in names if name in axes}
-    if "second_average" in axes and "acceleration" in axes:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            out["jerk"] = axes["acceleration"] / axes["second_average"]
-    return out
 
 
 def _today(machine: Machine, moves: Moves, goal: str) -> tuple[Outcome, Array]:

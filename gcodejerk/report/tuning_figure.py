@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from gcodejerk.parameters import Tuning
-from gcodejerk.parameters.tuning import SPREAD, concerned
+from gcodejerk.parameters.groups import concerned
+from gcodejerk.parameters.tuning import SPREAD
 from gcodejerk.report.figures import PLANNED, TODAY, new_figure, save
 
 if TYPE_CHECKING:

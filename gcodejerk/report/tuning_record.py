@@ -39,6 +39,7 @@ def tuning_record(tuning: Tuning, way: str) -> Record:
         "today": _outcome(tuning.today),
         "law_as_today": _outcome(tuning.as_set),
         "chosen": _outcome(tuning.chosen),
+        "fits": tuning.fits,
         "gains": tuning.gains,
         "proven": tuning.proven,
         "judged": tuning.judged,

@@ -78,10 +78,15 @@ def tuning_notes(tuning: Tuning) -> list[str]:
         f"residual: {GOAL_TEXT[tuning.goal]}, with every frequency anywhere within {band:g} % "
         f"of the machine file; {len(tuning.moves)} distinct rapids"
     ]
-    if not tuning.gains:
+    if not tuning.fits:
+        out.append("no setting of this control takes so little time: give it more (--time 1.1)")
+    elif not tuning.gains:
         out.append("no setting of this control leaves less in no more time: leave it as it is")
     out += [f"this control cannot express {text}" for text in tuning.scheme.cannot]
     out += list(tuning.scheme.notes)
     if not tuning.proven:
-        out.append("the search was not exhaustive: of a mean, the best of those that were judged")
+        out.append(
+            "the best of what was searched; that no other setting is better is proven for the "
+            "worst rapid of a control whose settings are chosen together"
+        )
     return out

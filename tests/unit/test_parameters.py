@@ -256,6 +256,7 @@ def test_few_candidates_are_judged_on_all_moves():
     moves = moves_of(machine, np.stack([rng.uniform(1, 400, 300), np.zeros(300)], axis=1))
     found = tune(scheme, moves, machine, curve=False)
     assert found.proven
+    assert found.fits
     assert found.judged < 60
     assert found.chosen.total <= found.today.total * (1 + 1e-6)
     assert found.chosen.value < found.today.value
@@ -368,3 +369,21 @@ def test_nothing_to_tune_is_said():
     moves = moves_of(machine, [[3.0, 0.0]])
     with pytest.raises(PlanError, match="excites a mode"):
         tune(two_averages(paper), moves, paper)
+
+
+def test_axes_give_each_other_time():
+    """An axis that leaves little gives its time to the one that leaves most."""
+    machine = machine_of(band=0.0)
+    scheme = two_averages(machine)
+    moves = moves_of(machine, [[300.0, 0.0], [40.0, 0.0], [0.0, 200.0], [0.0, 30.0]])
+    found = tune(scheme, moves, machine, curve=False)
+    alone = []
+    for axis in (0, 1):
+        own = moves_of(
+            machine,
+            np.eye(2)[axis] * [[300.0], [40.0]] if axis == 0 else np.eye(2)[1] * [[200.0], [30.0]],
+        )
+        alone.append(tune(scheme, own, machine, curve=False).chosen.value)
+    assert found.chosen.total <= found.today.total * (1 + 1e-6)
+    assert found.chosen.value <= max(alone) * (1 + 1e-6)
+    assert not found.proven

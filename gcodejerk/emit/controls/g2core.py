@@ -35,7 +35,8 @@ class G2coreController(SettingsOnly):
             ]  # fmt: skip
 
         today = today_of(machine, "velocity", "acceleration", "jerk")
-        ramp = today["acceleration"] ** 2 / today["velocity"]
+        with np.errstate(invalid="ignore"):  # axes that the machine does not have
+            ramp = today["acceleration"] ** 2 / today["velocity"]
         today["jerk"] = np.where(np.isinf(today["jerk"]), 4.0 * ramp, today["jerk"])
         settings, groups = axis_settings(machine, one)
         scheme = Scheme(

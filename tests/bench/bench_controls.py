@@ -1,0 +1,89 @@
+"""What each control's own settings can do, beside a stream: one program on one machine.
+
+    python tests/bench/bench_controls.py [PROGRAM MACHINE DIALECT]
+
+For each control and each way to set it: the residual of its law as today's rapids are set, of the
+best setting in no more time, and below them what streams leave and what no profile can go below.
+The README's table is made by this.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from gcodejerk.emit import controllers, load_controller
+from gcodejerk.emit.sheets import Sheets
+from gcodejerk.errors import GcodejerkError
+from gcodejerk.machine import Machine, find_machine
+from gcodejerk.nc import read_program
+from gcodejerk.parameters import joined_moves, program_moves, tune
+from gcodejerk.parameters.search import needs
+from gcodejerk.planning.designs import known_limits
+from gcodejerk.planning.plan import plan_moves
+
+ROOT = Path(__file__).parents[2]
+UM = 1e3
+
+
+def moves_of(path, machine, dialect):
+    """The distinct rapids of a program."""
+    with path.open("rb") as source:
+        program = read_program(
+            source, name=path.name, dialect=dialect, start=machine.program_start()
+        )
+        return joined_moves([program_moves(program.rapids, source, machine)], machine)
+
+
+def stream_row(name, profile, moves, machine):
+    """What a profile leaves, in today's time: worst in the band over the rapids before a cut."""
+    plans = plan_moves(moves.displacement, machine, profile)
+    value = UM * float(plans.worst_in_band[needs(moves) > 0.0].max())
+    total = float(plans.counts * machine.interval @ moves.count)
+    return f"| {name} | | {total:.3f} | | {value:.3g} |", plans
+
+
+def main():
+    """Print the table."""
+    program, name, dialect = (
+        sys.argv[1:] if len(sys.argv) > 1 else ("samples/plate.ngc", "centre", "linuxcnc")
+    )
+    machine = Machine.load(find_machine(name))
+    moves = moves_of(ROOT / program, machine, dialect)
+    print(f"{program} on {name}: {moves.count.sum():.0f} rapids, {len(moves)} distinct\n")
+    print("| control | law | time [s] | as set today [um] | best setting [um] |")
+    print("|---|---|---|---|---|")
+    first = True
+    for control in sorted(controllers()):
+        emitter = load_controller(control)
+        if not isinstance(emitter, Sheets):
+            continue
+        try:
+            schemes = emitter.schemes(machine)
+        except GcodejerkError as error:
+            print(f"| {control} | {error.problem} | | | |")
+            continue
+        for way, scheme in schemes.items():
+            found = tune(scheme, moves, machine, curve=False)
+            if first:
+                today = found.today
+                print(
+                    f"| today | {machine.planner} | {today.total:.3f} | {UM * today.value:.3g} | |"
+                )
+                first = False
+            best = f"{UM * found.chosen.value:.3g}" if found.gains else "no gain"
+            print(
+                f"| {control} ({way}) | {scheme.family.title} | {found.chosen.total:.3f} | "
+                f"{UM * found.as_set.value:.3g} | {best} |",
+                flush=True,
+            )
+    for profile in ("condition3", "optimal"):
+        row, plans = stream_row(f"stream, {profile}", profile, moves, machine)
+        print(row)
+    limits = known_limits(plans, None)
+    if limits is not None and np.isfinite(limits).any():
+        print(f"| limit of any profile, exact frequencies | | | | {UM * np.nanmax(limits):.3g} |")
+
+
+if __name__ == "__main__":
+    main()
