@@ -150,7 +150,7 @@ def _law(draw: st.DrawFn, planner: str, velocity: float, acceleration: float) ->
         elif name in ("deceleration", "upper_acceleration", "upper_deceleration"):
             value = acceleration * float(draw(_number(0.3, 1.0)))
         elif name == "first_average":
-            value = velocity / acceleration * float(draw(_number(1.0, 3.0)))
+            value = min(velocity / acceleration * float(draw(_number(1.0, 3.0))), 2.0)
         else:
             value = float(draw(_number(0.002, 0.1)))
         out.append(f", {name}: {value!r}")

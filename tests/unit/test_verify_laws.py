@@ -137,3 +137,33 @@ def test_such_a_machine_is_written_as_it_was_read(planner, behind):
     own = machine(planner, behind)
     assert Machine.loads(machine_yaml(own)) == own
     assert not own.warnings
+
+
+KEPT = """
+interval: 0.001
+positioning: independent
+spindle: mill
+axes:
+  X:
+    rapid: {velocity: 79.16, acceleration: 919.6, planner: poly6, overshoot: 1.401, FILTER}
+    limit: {acceleration: 2758.8, jerk: 413820.0}
+    modes:
+      - {frequency: 85.52, damping: 0.002994, participation: 0.07727}
+      - {frequency: 260.7, damping: 0.0, participation: 0.1415}
+  Z:
+    rapid: {velocity: 347.7, acceleration: 849.0, planner: poly6, overshoot: 1.401, FILTER}
+    limit: {acceleration: 1698.0}
+    modes: [{frequency: 17.62, damping: 0.00106, participation: 0.281}]
+design: {profile: cascade, band: 0.05, guard: 0.0, max_extension: 0.0}
+program: {start: {X: 0.0, Z: 0.0}, startup: "G21 G90"}
+"""
+
+
+def test_an_axis_that_keeps_an_asymmetric_rapid_of_its_own_is_accepted():
+    """Under independent positioning one axis gains, and the other stays as it is."""
+    behind = "filter: {type: 3hei, frequency: 17.72, damping: 0.05}"
+    own = Machine.loads(KEPT.replace("FILTER", behind))
+    program = b"G91 G21\nG0 X-2.7 Z-2.7\nM2\n"
+    result = process(program, own, controller="grbl", verify=False)
+    assert result.planned
+    assert verify(program, result.output, own, controller="grbl").ok

@@ -52,8 +52,8 @@ def check_axes(
     owner = paths.owner
     h = np.diff(t, prepend=t[:1])
     h[paths.begin] = 0.0
-    profile = machine.design.profile
-    mirrored = profile in SYMMETRIC and (profile != "conventional" or is_mirrored(machine))
+    # An axis that would not gain keeps the control's own profile, whatever the others get.
+    mirrored = machine.design.profile in SYMMETRIC and is_mirrored(machine)
     low, high = (1.0, 1.0) if mirrored else MIDDLE
     out = []
     for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
