@@ -7,7 +7,9 @@ from gcodejerk.machine.find import find_machine
 from gcodejerk.machine.model import Machine
 from gcodejerk.machine.parts import (
     BELL,
+    FILTERS,
     JERK_LIMITED,
+    LAWS,
     LINUXCNC,
     LONE_SHARE,
     PLANNERS,
@@ -15,6 +17,7 @@ from gcodejerk.machine.parts import (
     Axis,
     ControllerParameter,
     Design,
+    Filter,
     Limits,
     Mode,
     ProgramStart,
@@ -25,7 +28,9 @@ from gcodejerk.machine.problems import MachineFileError
 __all__ = [
     "BELL",
     "DIALECT_OF_CONTROLLER",
+    "FILTERS",
     "JERK_LIMITED",
+    "LAWS",
     "LINUXCNC",
     "LONE_SHARE",
     "PLANNERS",
@@ -33,6 +38,7 @@ __all__ = [
     "Axis",
     "ControllerParameter",
     "Design",
+    "Filter",
     "Limits",
     "Machine",
     "MachineFileError",

@@ -16,10 +16,34 @@ from gcodejerk.errors import MachineError
 
 OSCILLATORS = 4
 """That a line of a spectrum stands for."""
-LINUXCNC, TRAPEZOIDAL, JERK_LIMITED, BELL = PLANNERS = (
+LINUXCNC, TRAPEZOIDAL, JERK_LIMITED, BELL = (
     "linuxcnc-2.9", "trapezoidal", "jerk-limited", "bell",
 )  # fmt: skip
+LAWS: Mapping[str, tuple[str, ...]] = {
+    "averaged-trapezoid": ("second_average",),
+    "time-constants": ("first_average", "second_average"),
+    "four-ramp": ("deceleration", "rise", "fall", "braking_rise", "braking_fall"),
+    "two-stage": ("changeover", "upper_acceleration", "deceleration", "upper_deceleration"),
+    "quintic": ("jerk",),
+    "poly5": (),
+    "poly6": ("overshoot",),
+    "notch-ramp": ("notch",),
+}
+"""Families of rapids that need quantities of their own beside velocity and acceleration; `motion`
+has their laws."""
+PLANNERS = (LINUXCNC, TRAPEZOIDAL, JERK_LIMITED, BELL, *LAWS)
 """The profiles that a control's own rapid may follow (`Axis.conventional`)."""
+FALLS_BACK = {"deceleration": "acceleration", "upper_deceleration": "upper_acceleration"}
+"""Quantities that may be left out: they are then like another."""
+SHARED = ("overshoot", "notch")
+"""Quantities that a control has one of, whatever axis moves."""
+AVERAGES = ("average", "triangle")
+FILTERS = (
+    *AVERAGES,
+    *("zv", "zvd", "zvdd", "zvddd", "mzv", "marlin-mzv", "ei", "2hei", "3hei"),
+    *("klipper-ei", "2hump_ei", "3hump_ei", "ei2", "ei3"),
+)
+"""What may act behind the planner; the first two are set by a time, the others by a mode."""
 LONE_SHARE = 0.5
 """Share of MAX_ACCELERATION that LinuxCNC 2.9 gives a lone G0.
 
@@ -39,6 +63,25 @@ class Limits:
     """[mm/s^2] or [deg/s^2]"""
     jerk: float
     """[mm/s^3] or [deg/s^3]; infinite where no jerk limit is given"""
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """What a control does to the motion that its planner has made."""
+
+    kind: str
+    """One of `FILTERS`."""
+    time: float = 0.0
+    """Of an average; a triangle is twice as long. [s]"""
+    frequency: float = 0.0
+    """That a shaper is made for. [Hz]"""
+    damping: float = 0.0
+    """The same. [-]"""
+
+    @property
+    def setting(self) -> float:
+        """Time of an average [s], frequency of a shaper [Hz]."""
+        return self.time if self.kind in AVERAGES else self.frequency
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +178,10 @@ class Axis:
     `gcodejerk.nc.Start` has them; None where the file does not say."""
     planner: str = JERK_LIMITED
     """Which profile the controller's own G0 follows, one of `PLANNERS`; all axes' are alike."""
+    law: tuple[tuple[str, float], ...] = ()
+    """Quantities of `LAWS` that the planner needs. [mm or deg, s, Hz]"""
+    filter: Filter | None = None
+    """What acts behind it; the same for all axes of straight rapids."""
 
     def conventional(self, lone: bool = True) -> Limits:
         """What the controller's own G0 does: this sets the conventional time.
@@ -147,7 +194,8 @@ class Axis:
         Returns
         -------
         Limits
-            Under `bell`, the acceleration and the jerk of a ramp that is long enough for both.
+            Under `bell`, the acceleration and the jerk of a ramp that is long enough for both. Of a
+            planner of `LAWS` what it has besides is left out.
         """
         own = self.rapid
         share = LONE_SHARE if lone and self.planner == LINUXCNC else 1.0
@@ -270,6 +318,8 @@ class Description:
         `trapezoidal` is `jerk-limited` without a jerk, so that axes of both may move together.
         """
         found = {axis.planner for axis in self.axes}
+        if len(found) == 1:
+            return found.pop()
         return min(found, key=(JERK_LIMITED, TRAPEZOIDAL, LINUXCNC, BELL).index)
 
     @property

@@ -14,33 +14,108 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.machine import BELL, Limits, Machine
+from gcodejerk.machine import BELL, LAWS, Limits, Machine
 from gcodejerk.motion import Profiles, SymmetricProfiles, conventional_profiles
+from gcodejerk.motion.families import FAMILIES, Family, Kind, unit_quantities
+from gcodejerk.motion.families.family import VELOCITY
+from gcodejerk.motion.families.filtered import filtered
 from gcodejerk.motion.profiles.bell import bell_profiles
 from gcodejerk.motion.profiles.profile import Array
 
 
 def todays_profiles(
-    machine: Machine, limits: tuple[Array, Array, Array]
+    machine: Machine,
+    limits: tuple[Array, Array, Array],
+    share: Array,
+    speed: Array | None = None,
 ) -> tuple[SymmetricProfiles, Profiles]:
     """Profiles of the control's own rapids.
 
     Parameters
     ----------
     machine : Machine
-        Its planner.
+        Its planner, and what acts behind it.
     limits : tuple of ndarray, shape (n,)
-        Of `conventional_limits`. [1/s], [1/s^2], [1/s^3]
+        Of `conventional_limits`, the speed of the program in them. [1/s], [1/s^2], [1/s^3]
+    share : ndarray, shape (n, 9)
+        Displacement of each axis. [mm] or [deg]
+    speed : ndarray, shape (n,), optional
+        Speed that the program states; NaN for none. [1/s]
 
     Returns
     -------
     symmetric : SymmetricProfiles
-        The fastest symmetric profiles within these limits: those of the control, but for a bell.
+        The fastest symmetric profiles within these limits: those of the control, unless it has a
+        law or a filter of its own.
     conventional : Profiles
         Those of the control.
     """
     symmetric = conventional_profiles(*limits)
-    return symmetric, bell_profiles(*limits) if machine.planner == BELL else symmetric.general()
+    if machine.planner == BELL:
+        conventional = bell_profiles(*limits)
+    elif machine.planner in LAWS:
+        conventional = law_profiles(machine, FAMILIES[machine.planner], share, speed)
+    else:
+        conventional = symmetric.general()
+    return symmetric, behind_filters(machine, conventional, share)
+
+
+def law_profiles(
+    machine: Machine,
+    family: Family,
+    share: Array,
+    speed: Array | None = None,
+    more: Mapping[str, Array] | None = None,
+) -> Profiles:
+    """Profiles of straight rapids by one law.
+
+    Parameters
+    ----------
+    machine : Machine
+        What its axes' rapids are set to.
+    family : Family
+        The law.
+    share, speed
+        As for `todays_profiles`.
+    more : mapping of str to ndarray, shape (9,), optional
+        Quantities of each axis that the machine file does not state.
+    """
+    values = {} if more is None else dict(more)
+    for quantity in family.quantities:
+        if quantity.name not in values:
+            values[quantity.name] = _of_axes(machine, quantity.name, quantity.kind)
+    unit = unit_quantities(family, values, share)
+    if speed is not None:
+        unit[VELOCITY.name] = np.fmin(unit[VELOCITY.name], speed)
+    return family.build(**unit)
+
+
+def _of_axes(machine: Machine, name: str, kind: Kind) -> Array:
+    """A quantity of each axis of `AXES`; no limit, or no time, where there is no such axis."""
+    out = np.full(len(AXES), np.inf if kind is Kind.LIMIT else 0.0)
+    for axis in machine.axes:
+        own = dict(axis.law)
+        out[AXES.index(axis.name)] = own[name] if name in own else getattr(axis.rapid, name)
+    return out
+
+
+def behind_filters(machine: Machine, profiles: Profiles, share: Array) -> Profiles:
+    """Profiles behind the filters of the axes that make them, shape (n, 9) of displacements.
+
+    Axes that move along one line have the same filter: the machine file is held to that.
+    """
+    own = {axis.name: axis.filter for axis in machine.axes}
+    if not any(own.values()):
+        return profiles
+    first = np.argmax(share != 0.0, axis=1)
+    for k in np.unique(first):
+        behind = own.get(AXES[k])
+        rows = np.flatnonzero(first == k)
+        if behind is None:
+            continue
+        shaped = filtered(profiles.take(rows), behind.kind, behind.setting, behind.damping)
+        profiles = profiles.replaced(rows, shaped)
+    return profiles
 
 
 def unit_limits(machine: Machine, share: Array) -> tuple[Array, Array, Array]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.machine import Machine
+from gcodejerk.machine import LAWS, Machine
 from gcodejerk.motion import (
     Objective,
     Profiles,
@@ -46,14 +46,16 @@ class Task:
     conventional : Profiles
         What the controller does today.
     symmetric : SymmetricProfiles
-        The fastest symmetric profiles within the same limits: what the controller does, but for a
-        bell.
+        The fastest symmetric profiles within the same limits: what the controller does, unless it
+        has a law or a filter of its own.
     objective : Objective
         What they are judged by.
     interval, band, guard, tolerance : float
         Of the machine. [s], [-], [-], [mm]
     progress : callable or None
         For designs that take long.
+    own_law : bool
+        What the controller does today does not follow from the limits alone.
     """
 
     counts: NDArray[np.int64]
@@ -66,6 +68,7 @@ class Task:
     guard: float
     tolerance: float
     progress: Progress | None = None
+    own_law: bool = False
 
     @classmethod
     def of(
@@ -99,7 +102,7 @@ class Task:
         rapid, limits = conventional_limits(machine, share, lone), unit_limits(machine, share)
         if speed is not None:
             rapid, limits = ((np.fmin(V, speed), A, J) for V, A, J in (rapid, limits))
-        symmetric, conventional = todays_profiles(machine, rapid)
+        symmetric, conventional = todays_profiles(machine, rapid, share, speed)
         if counts is None:
             counts = np.maximum(whole_intervals(conventional.total, machine.interval), 1)
         weights = np.abs(share @ modes.participation.T)
@@ -114,6 +117,7 @@ class Task:
             guard=machine.design.guard,
             tolerance=machine.design.tolerance,
             progress=progress,
+            own_law=machine.planner in LAWS or any(axis.filter for axis in machine.axes),
         )
 
     def __len__(self) -> int:
@@ -152,6 +156,8 @@ class Task:
         scale = self.objective.weights.max(axis=1, initial=0.0)
         weights = self.objective.weights / np.where(scale > 0.0, scale, 1.0)[:, np.newaxis]
         today = [column / total for column in self.symmetric.columns()]
+        if self.own_law:
+            today += self._outline()
         numbers = np.column_stack(
             [self.counts, V * total, A * total**2, J * total**3, *today, weights]
         )
@@ -165,6 +171,13 @@ class Task:
         common = hashlib.blake2b(objective.poles.tobytes() + objective.group.tobytes())
         common.update(np.array([self.band, self.interval]).tobytes())
         return [common.digest() + row.tobytes() for row in rows], first, same.reshape(-1)
+
+    def _outline(self) -> list[Array]:
+        """What tells one profile of today from another, in units of T_SUM: its response."""
+        at = [2j * np.pi * k for k in (0.7, 1.9, 3.3, 5.1)]
+        scaled = self.conventional.stretched(1.0 / self.total)
+        response = profiles_response(scaled, np.array(at))
+        return [*response.real.T, *response.imag.T, self.conventional.total / self.total]
 
     def alike(self) -> Iterator[tuple[NDArray[np.intp], float]]:
         """Moves that excite the same modes and take about as long, and a time that none exceeds.

@@ -55,6 +55,10 @@ def compare_record(comparison: Comparison) -> Record:
             present[name] if name in present else _absent(name, comparison.absent[name])
             for name in CONTENDERS
         ],
+        "families": [
+            *(_profile(comparison, candidate, usual) for candidate in comparison.families),
+            *(_absent(name, why) for name, why in comparison.families_absent.items()),
+        ],
     }
 
 

@@ -7,6 +7,7 @@ have on this machine is no best.
 from __future__ import annotations
 
 from collections.abc import Callable
+from textwrap import wrap
 
 from rich.table import Table
 from rich.text import Text
@@ -21,6 +22,8 @@ NEVER = "never"
 UNKNOWN = "-"
 SAME = 1.0 + 1e-6
 """Figures that differ by less are the same."""
+WIDTH = 118
+"""Of a terminal that a line of notes may fill."""
 
 
 def compare_table(comparison: Comparison) -> Table:
@@ -49,7 +52,12 @@ def compare_table(comparison: Comparison) -> Table:
         (f"limit\n[{small}]", "right"),
     )
     best = _Best(comparison)
-    for candidate in comparison.candidates:
+    first_law = comparison.families[0] if comparison.families else None
+    for candidate in (*comparison.candidates, *comparison.families):
+        if candidate is first_law:
+            for name in comparison.absent:
+                table.add_row(f"{name} **", *[UNKNOWN] * (len(table.columns) - 1))
+            table.add_row(*[""] * len(table.columns))
         peak = axis_peaks(comparison, candidate)[axis]
         table.add_row(
             candidate.name + ("" if candidate.within_limits else " *"),
@@ -65,8 +73,6 @@ def compare_table(comparison: Comparison) -> Table:
             ),
             UNKNOWN if candidate.limit is None else _small(candidate.limit),
         )
-    for name in comparison.absent:
-        table.add_row(f"{name} **", *[UNKNOWN] * (len(table.columns) - 1))
     return table
 
 
@@ -91,6 +97,7 @@ def compare_notes(comparison: Comparison) -> list[str]:
         "limit: the least that any profile of that time within the limits leaves; all of the "
         "profiles themselves, before sampling",
         _shapers(comparison),
+        *_laws(comparison),
     ]
     if comparison.machine.positioning != "linear":
         lines.append("positioning: independent: each axis moves and arrives on its own")
@@ -101,6 +108,13 @@ def compare_notes(comparison: Comparison) -> list[str]:
     ]
     if broken:
         lines.append(f"* beyond the limits: {', '.join(broken)}")
+    laws = [
+        f"{c.name} ({', '.join(f'{name} {_times(use)}' for name, use in c.broken)})"
+        for c in comparison.families
+        if c.broken
+    ]
+    if laws:
+        lines.append(f"* of the laws: {', '.join(laws)}")
     reasons: dict[str, list[str]] = {}
     for name, why in comparison.absent.items():
         reasons.setdefault(why, []).append(name)
@@ -152,6 +166,25 @@ def _shapers(comparison: Comparison) -> str:
     )
 
 
+def _laws(comparison: Comparison) -> list[str]:
+    """What the laws of controls are taken at."""
+    if not comparison.families:
+        return []
+    names = [candidate.name for candidate in comparison.families]
+    said: dict[str, list[str]] = {}
+    for candidate in comparison.families:
+        for part in filter(None, candidate.note.split("; ")):
+            quantities, _, what = part.partition(" = ")
+            said.setdefault(what, []).extend(quantities.split(", "))
+    equal = "; ".join(f"{what} for {', '.join(dict.fromkeys(q))}" for what, q in said.items())
+    out = [f"{names[0]} to {names[-1]}: laws of other controls at the limits of axes.?.rapid"]
+    out += wrap(f"where the file states none: {equal}", WIDTH) if equal else []
+    reasons: dict[str, list[str]] = {}
+    for name, why in comparison.families_absent.items():
+        reasons.setdefault(why, []).append(name)
+    return [*out, *(f"not {', '.join(names)}: {why}" for why, names in reasons.items())]
+
+
 class _Best:
     """The best figure of each column, among those who keep the limits."""
 
@@ -163,6 +196,7 @@ class _Best:
         for k, band in enumerate(BANDS):
             figures[band] = lambda c, k=k: c.worst_band[k]  # type: ignore[misc]
         self.figures = figures
+        self.judged = comparison.candidates
         fair = [c for c in comparison.candidates if c.within_limits]
         self.least = {
             column: min((figure(c) for c in fair), default=float("inf"))
@@ -173,7 +207,8 @@ class _Best:
         """A figure, bold where it is the best of its column."""
         value = self.figures[column](candidate)
         best = (
-            candidate.within_limits
+            candidate in self.judged
+            and candidate.within_limits
             and value < float("inf")
             and value <= max(self.least[column] * SAME, 0.5e-5)
         )

@@ -16,7 +16,7 @@ keeps the limits, as the planner sees to. Who breaks a limit says so.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.task import Task
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.studies.families import family_profiles
 
 DESIGNED = ("condition3", "symmetric", "cascade", "optimal", "shortest")
 """Profiles that the planner makes, within the limits."""
@@ -125,6 +126,10 @@ class Comparison:
     shaped : tuple of (float, float)
         Frequency [Hz] and damping ratio that shapers were made for, one for each profile that has a
         shaper.
+    families : tuple of Candidate
+        The laws of controls at this machine's limits (`studies.families`); of none a limit.
+    families_absent : dict of str to str
+        The other laws, and why.
     """
 
     machine: Machine
@@ -135,6 +140,8 @@ class Comparison:
     absent: dict[str, str]
     time: float
     shaped: tuple[tuple[float, float], ...]
+    families: tuple[Candidate, ...] = ()
+    families_absent: dict[str, str] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Candidate:
         """The candidate of that name; KeyError where it is absent."""
@@ -210,15 +217,15 @@ def compare_move(
     row = np.where(np.abs(row) > STANDSTILL, row, 0.0)
     if not row.any():
         raise PlanError("no axis moves: nothing to compare", "for example Z=1")
-    field = _Field(machine, row, time, shaper_damping, progress)
-    if not field.task.objective.weights.any():
+    one = _Field(machine, row, time, shaper_damping, progress)
+    if not one.task.objective.weights.any():
         moving = ", ".join(AXES[k] for k in np.flatnonzero(row[0]))
         raise PlanError(
             f"{moving} of {machine.source} excites no mode: nothing to compare",
             "describe modes in the machine file (axes.?.modes, or modes of the structure)",
         )
-    field.enter()
-    return field.judged({a.upper(): float(x) for a, x in displacement.items()})
+    one.enter()
+    return one.judged({a.upper(): float(x) for a, x in displacement.items()})
 
 
 class _Field:
@@ -268,6 +275,11 @@ class _Field:
                 ]
             )
         self.shaped = [target for target in targets if target is not None]
+        frequency = [None if target is None else target[0] for target in targets]
+        laws, notes, self.families_absent = family_profiles(self.machine, self.share, frequency)
+        self.families = tuple(laws)
+        self.profiles |= laws
+        self.notes |= notes
 
     def _enter_designs(self) -> None:
         """What the planner makes, as it would make it."""
@@ -335,6 +347,7 @@ class _Field:
         return Comparison(
             self.machine, displacement, self.modes, self.share, candidates, absent,
             float(self.task.total.max()), tuple(self.shaped),
+            tuple(self._candidate(name, np.nan) for name in self.families), self.families_absent,
         )  # fmt: skip
 
     def _plans(self, names: list[str]) -> Plans:
@@ -369,7 +382,7 @@ class _Field:
         each = response / modes.poles.imag
         displacement = modes.grouped(each)
         broken = self._broken(profiles)
-        if not broken:
+        if not broken and name in CONTENDERS:
             # Segments that end between intervals may be a little better than the bound on these.
             limit = min(limit, float(displacement.max()))
         bands = worst_in_bands(profiles, self.weights, modes)

@@ -10,7 +10,7 @@ from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
 
 from gcodejerk.axes import AXES
-from gcodejerk.machine import BELL, JERK_LIMITED, Machine
+from gcodejerk.machine import BELL, FILTERS, JERK_LIMITED, LAWS, Machine
 
 
 @st.composite
@@ -23,6 +23,7 @@ def machines(
     jerk_limited: bool | None = None,
     interval: float | None = None,
     planner: str | None = None,
+    filtered: bool | None = False,
 ) -> Machine:
     """Strategy for machines over the range that is found in workshops.
 
@@ -41,7 +42,10 @@ def machines(
         Control command interval. Drawn between 0.0005 and 0.004. [s]
     planner : str, optional
         The profile of the control's own rapids, one of `gcodejerk.machine.PLANNERS`; the limits
-        alone say it where left out. It decides `jerk_limited`.
+        alone say it where left out. It decides `jerk_limited`. What a planner of
+        `gcodejerk.machine.LAWS` needs besides is drawn.
+    filtered : bool, optional
+        Whether an average or a shaper acts behind it, the same for all axes; None: drawn.
 
     Returns
     -------
@@ -58,7 +62,10 @@ def machines(
     >>> check()
     """
     if planner is not None:
-        jerk_limited = planner in (JERK_LIMITED, BELL)
+        jerk_limited = planner in (JERK_LIMITED, BELL) or "jerk" in LAWS.get(planner, ())
+    shared = "" if planner is None else draw(_shared(planner))
+    if filtered or (filtered is None and draw(st.booleans())):
+        shared += f", filter: {{{draw(_filter())}}}"
     letters = axes if axes is not None else draw(_letters)
     dt = interval if interval is not None else draw(st.sampled_from(_INTERVALS))
     lines = [
@@ -67,7 +74,7 @@ def machines(
         "axes:",
     ]
     for letter in letters:
-        lines += draw(_axis(letter, modes, dt, jerk_limited, planner))
+        lines += draw(_axis(letter, modes, dt, jerk_limited, planner, shared))
     if len(letters) > 1 and modes[1] > 0:
         lines += ["modes:", *draw(_structure_modes(letters, dt))]
     lines += [
@@ -97,7 +104,7 @@ def _number(low: float, high: float) -> st.SearchStrategy[str]:
 @st.composite
 def _axis(
     draw: st.DrawFn, letter: str, modes: tuple[int, int], dt: float, jerk_limited: bool | None,
-    planner: str | None,
+    planner: str | None, shared: str,
 ) -> list[str]:  # fmt: skip
     velocity = draw(_number(5.0, 2000.0))
     acceleration = draw(_number(100.0, 30000.0))
@@ -108,7 +115,8 @@ def _axis(
         jerk = float(acceleration) / float(draw(_number(0.002, 0.1)))
         rapid += f", jerk: {jerk:.4e}"
     if planner is not None:
-        rapid += f", planner: {planner}"
+        rapid += f", planner: {planner}" + draw(_law(planner, float(velocity), float(acceleration)))
+    rapid += shared
     reserve = float(draw(st.sampled_from(["1.0", "1.2", "2.0", "3.0"])))
     limit = f"acceleration: {reserve * float(acceleration)!r}"
     if draw(st.booleans()):
@@ -128,6 +136,42 @@ def _axis(
         lines.append("    modes:")
         lines += [f"      - {{{draw(_mode(dt))}}}" for _ in range(count)]
     return lines
+
+
+@st.composite
+def _law(draw: st.DrawFn, planner: str, velocity: float, acceleration: float) -> str:
+    """Quantities of an axis that a law needs."""
+    out = []
+    for name in LAWS.get(planner, ()):
+        if name in ("jerk", "overshoot", "notch"):
+            continue
+        if name == "changeover":
+            value = velocity * float(draw(_number(0.1, 1.5)))
+        elif name in ("deceleration", "upper_acceleration", "upper_deceleration"):
+            value = acceleration * float(draw(_number(0.3, 1.0)))
+        elif name == "first_average":
+            value = min(velocity / acceleration * float(draw(_number(1.0, 3.0))), 2.0)
+        else:
+            value = float(draw(_number(0.002, 0.1)))
+        out.append(f", {name}: {value!r}")
+    return "".join(out)
+
+
+@st.composite
+def _shared(draw: st.DrawFn, planner: str) -> str:
+    """Quantities that a law has one of."""
+    ranges = {"overshoot": (1.25, 1.875), "notch": (10.0, 120.0)}
+    names = [name for name in LAWS.get(planner, ()) if name in ranges]
+    return "".join(f", {name}: {draw(_number(*ranges[name]))}" for name in names)
+
+
+@st.composite
+def _filter(draw: st.DrawFn) -> str:
+    kind = draw(st.sampled_from(FILTERS))
+    if kind in ("average", "triangle"):
+        return f"type: {kind}, time: {draw(_number(0.001, 0.05))}"
+    damping = draw(st.sampled_from(["0.0", "0.05", "0.1"]))
+    return f"type: {kind}, frequency: {draw(_number(10.0, 200.0))}, damping: {damping}"
 
 
 @st.composite

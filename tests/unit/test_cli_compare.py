@@ -59,6 +59,8 @@ def test_the_table_has_everyone_and_fits_a_terminal(run):
     assert "[mm/s^2] [mm/s^3] [um] [um] [um] [um]" in head
     assert max(len(line) for line in said.splitlines()) <= 120
     assert "condition1 (acceleration 10 x, jerk 10 x)" in said
+    assert "notch-ramp" in said
+    assert "of the laws: trapezoidal (jerk steps)" in said
     assert "made for 30 Hz with damping 0 (--shaper-damping)" in said
     assert "the controller's own G0 never settles" in said
 

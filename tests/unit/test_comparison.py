@@ -13,6 +13,7 @@ from scipy.linalg import expm
 
 from gcodejerk.errors import MachineError, PlanError
 from gcodejerk.machine import Machine, find_machine
+from gcodejerk.motion.families import FAMILIES
 from gcodejerk.report.compare_record import compare_record
 from gcodejerk.report.compare_table import compare_notes
 from gcodejerk.report.records import dump
@@ -397,3 +398,46 @@ def test_a_measured_spectrum_counts_as_one_mode(tmp_path):
     assert usual.settling is None
     assert usual.worst_band[1] >= usual.worst_band[0] >= usual.worst
     assert found["optimal"].worst <= found["condition3"].worst * (1 + 1e-6)
+
+
+def test_every_law_has_a_row_at_the_machines_own_limits():
+    found = compared("paper", ("Z", 1.0))
+    laws = {law.name: law for law in found.families}
+    assert set(laws) | set(found.families_absent) == set(FAMILIES)
+    assert set(found.families_absent) == {"two-stage"}
+    usual = found["conventional"]
+    assert laws["jerk-limited"].time == pytest.approx(usual.time)
+    assert laws["jerk-limited"].worst == pytest.approx(usual.worst)
+    # sqrt(L/A) twice, and behind an average of A/J; 1/V + V/A + A/J.
+    assert laws["trapezoidal"].time == pytest.approx(2 * (1 / 5000) ** 0.5)
+    assert laws["averaged-trapezoid"].time == pytest.approx(2 * (1 / 5000) ** 0.5 + 0.01)
+    assert laws["time-constants"].time == pytest.approx(1 / 600 + 0.12 + 0.01)
+    assert laws["notch-ramp"].worst < 1e-9
+    assert not laws["trapezoidal"].within_limits
+    assert "second_average = A/J" in laws["averaged-trapezoid"].note
+    record = json.loads(dump(compare_record(found)))
+    jsonschema.validate(record, SCHEMA)
+    assert [row["profile"] for row in record["families"]][-1] == "two-stage"
+
+
+def test_laws_that_need_a_jerk_are_left_out_without_one():
+    found = compare_move({"X": 20.0}, Machine.load(find_machine("vmc")))
+    assert "jerk" in found.families_absent["quintic"]
+    assert {law.name for law in found.families} == {"trapezoidal", "poly5", "poly6", "notch-ramp"}
+
+
+def test_a_machine_that_states_a_law_is_that_law():
+    text = """
+interval: 0.001
+positioning: linear
+axes:
+  Z:
+    rapid: {velocity: 600, acceleration: 5000, planner: two-stage, changeover: 100,
+            upper_acceleration: 2000}
+    limit: {jerk: 5.0e+6, acceleration: 6000}
+    modes: [{frequency: 30, damping: 0.02}]
+"""
+    found = compare_move({"Z": 40.0}, Machine.loads(text))
+    law = next(law for law in found.families if law.name == "two-stage")
+    assert law.time == pytest.approx(found["conventional"].time)
+    assert law.note == ""

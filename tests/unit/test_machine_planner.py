@@ -174,3 +174,86 @@ def test_verify_holds_streams_to_a_bell(profile):
     result = process(PROGRAM, made, profile=profile)
     assert result.planned == 5
     assert result.verification.ok
+
+
+LAW_KEYS = {
+    "averaged-trapezoid": "second_average: 0.02",
+    "time-constants": "first_average: 0.1, second_average: 0.02",
+    "four-ramp": "rise: 0.01, fall: 0.02, braking_rise: 0.03, braking_fall: 0.04",
+    "two-stage": "changeover: 100, upper_acceleration: 2000",
+    "quintic": "jerk: 5.0e+5",
+    "poly6": "overshoot: 1.5",
+    "notch-ramp": "notch: 30",
+}
+
+
+@pytest.mark.parametrize("planner", LAW_KEYS)
+def test_a_law_lacks_none_of_its_quantities(planner):
+    said = f"{PLAIN[:-1]}, planner: {planner}, {LAW_KEYS[planner]}}}"
+    assert machine(said).planner == planner
+    for part in LAW_KEYS[planner].split(", "):
+        less = said.replace(f", {part}", "")
+        with pytest.raises(MachineFileError, match=f"needs axes.Z.rapid.{part.split(':')[0]}"):
+            machine(less)
+
+
+def test_what_is_left_out_is_like_another_quantity():
+    law = dict(
+        machine(f"{PLAIN[:-1]}, planner: two-stage, {LAW_KEYS['two-stage']}}}").axis("Z").law
+    )
+    assert law["deceleration"] == 5000
+    assert law["upper_deceleration"] == 2000
+
+
+def test_a_quantity_that_the_planner_has_no_use_for_is_warned_of():
+    made = machine(PLAIN[:-1] + ", planner: trapezoidal, notch: 30}")
+    assert any("no use for it" in str(warning) for warning in made.warnings)
+
+
+def two(first, second, positioning="linear"):
+    plain = "velocity: 100, acceleration: 1000"
+    return Machine.loads(
+        f"interval: 0.001\npositioning: {positioning}\naxes:\n"
+        f"  X: {{rapid: {{{plain}, {first}}}}}\n  Y: {{rapid: {{{plain}, {second}}}}}\n"
+    )
+
+
+def test_a_control_has_one_law_and_one_notch():
+    with pytest.raises(MachineFileError, match="one control makes the rapids of all axes"):
+        two("planner: poly5", "planner: notch-ramp, notch: 30")
+    with pytest.raises(MachineFileError, match="the control has one for all axes"):
+        two("planner: notch-ramp, notch: 20", "planner: notch-ramp, notch: 30")
+
+
+def test_straight_rapids_are_straight_behind_one_filter_only():
+    average, longer = "filter: {type: average, time: 0.02}", "filter: {type: average, time: 0.03}"
+    with pytest.raises(MachineFileError, match="no longer straight"):
+        two(average, longer)
+    assert two(average, average).axis("Y").filter.time == 0.02
+    assert two(average, longer, "independent").axis("Y").filter.time == 0.03
+
+
+@pytest.mark.parametrize(
+    ("behind", "problem"),
+    [
+        ("{type: average}", "has no time"),
+        ("{type: zv}", "has no frequency"),
+        ("{type: zv, frequency: 30, time: 0.1}", "which has none"),
+        ("{type: median, time: 0.1}", "expected one of"),
+        ("{time: 0.1}", "type is missing"),
+    ],
+)
+def test_a_filter_needs_its_number(behind, problem):
+    with pytest.raises(MachineFileError, match=problem):
+        machine(PLAIN[:-1] + f", filter: {behind}}}")
+
+
+def test_times_and_frequencies_are_no_lengths():
+    text = (
+        "units: inch\ninterval: 0.001\npositioning: linear\naxes:\n  Z:\n    rapid: {velocity: 10, "
+        "acceleration: 100, planner: two-stage, changeover: 2, upper_acceleration: 50,\n"
+        "            filter: {type: average, time: 0.02}}\n"
+    )
+    axis = Machine.loads(text).axis("Z")
+    assert dict(axis.law)["changeover"] == pytest.approx(50.8)
+    assert axis.filter.time == 0.02

@@ -14,7 +14,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import MachineError
 from gcodejerk.machine.file.checker import Checker, KeyPath, dotted
 from gcodejerk.machine.file.document import Document
-from gcodejerk.machine.file.planner import choose_planners, planner_warnings
+from gcodejerk.machine.file.planner import choose_planners, own_law, planner_warnings
 from gcodejerk.machine.file.plausibility import COARSEST_RESOLUTION, plausibility_warnings
 from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.parts import (
@@ -23,6 +23,7 @@ from gcodejerk.machine.parts import (
     ControllerParameter,
     Description,
     Design,
+    Filter,
     Limits,
     Mode,
     ProgramStart,
@@ -266,11 +267,20 @@ def _axis(
         ),
         spectrum=spectrum,
         planner=planner,
+        law=own_law(values["rapid"], planner),
+        filter=_filter(values["rapid"].get("filter")),
     )
 
 
 def _rapid(values: dict[str, float]) -> Limits:
     return Limits(values["velocity"], values["acceleration"], values.get("jerk", math.inf))
+
+
+def _filter(values: dict[str, Any] | None) -> Filter | None:
+    if not values:
+        return None
+    numbers = {name: values.get(name, 0.0) for name in ("time", "frequency", "damping")}
+    return Filter(values["type"], **numbers)
 
 
 def _limit(values: dict[str, float], rapid: Limits) -> Limits:

@@ -12,7 +12,17 @@ from typing import Any
 from gcodejerk.axes import AXES
 from gcodejerk.errors import MachineError
 from gcodejerk.machine.file.checker import Checker
-from gcodejerk.machine.parts import BELL, JERK_LIMITED, LINUXCNC, TRAPEZOIDAL
+from gcodejerk.machine.parts import (
+    AVERAGES,
+    BELL,
+    FALLS_BACK,
+    JERK_LIMITED,
+    LAWS,
+    LINUXCNC,
+    SHARED,
+    TRAPEZOIDAL,
+    Filter,
+)
 
 WITHOUT_JERK = {
     "linuxcnc": (LINUXCNC, "LinuxCNC 2.9"),
@@ -20,6 +30,8 @@ WITHOUT_JERK = {
     "grbl": (TRAPEZOIDAL, "grbl"),
 }
 """Controls whose G0 has no jerk limit: their profile, and what messages call them."""
+KEEP_JERK = tuple(law for law, names in LAWS.items() if "jerk" in names)
+"""Planners of `LAWS` that have a jerk limit."""
 
 
 def choose_planners(values: dict[str, Any], checker: Checker) -> dict[str, str]:
@@ -51,8 +63,88 @@ def choose_planners(values: dict[str, Any], checker: Checker) -> dict[str, str]:
                 f"axes.{a}.rapid.planner is {chosen[a]!r}, which needs axes.{a}.rapid.jerk",
                 "add the jerk, or say planner: trapezoidal",
             )
+        _check_law(a, rapids[a], chosen[a], checker)
     _check_alike(rapids, stated, checker)
+    _check_shared(rapids, chosen, checker)
+    _check_filters(values, rapids, checker)
     return chosen
+
+
+def own_law(rapid: dict[str, Any], planner: str) -> tuple[tuple[str, float], ...]:
+    """Quantities of a planner of `LAWS`, those that were left out filled in."""
+    out: dict[str, float] = {}
+    for name in LAWS.get(planner, ()):
+        if name in ("acceleration", "jerk"):
+            continue
+        back = FALLS_BACK.get(name)
+        known = rapid | out
+        out[name] = float(known[name] if name in known else known[str(back)])
+    return tuple(out.items())
+
+
+def _check_law(axis: str, rapid: dict[str, Any], planner: str, checker: Checker) -> None:
+    """Refuse a planner that lacks a quantity of its own."""
+    for name in LAWS.get(planner, ()):
+        if name not in rapid and name not in FALLS_BACK:
+            checker.problems.add(
+                checker.place(("axes", axis, "rapid", "planner")),
+                f"axes.{axis}.rapid.planner is {planner!r}, which needs axes.{axis}.rapid.{name}",
+                f"add {name}, or state another planner",
+            )
+
+
+def _check_shared(rapids: dict[str, Any], chosen: dict[str, str], checker: Checker) -> None:
+    """Refuse what a control has one of, and axes have each their own."""
+    for name in SHARED:
+        own = {a: rapids[a][name] for a in AXES if a in rapids and name in LAWS.get(chosen[a], ())
+               and name in rapids[a]}  # fmt: skip
+        first = next(iter(own), None)
+        for a, value in own.items():
+            if first is not None and value != own[first]:
+                checker.problems.add(
+                    checker.place(("axes", a, "rapid", name)),
+                    f"axes.{a}.rapid.{name} is {value:g}, that of {first} is {own[first]:g}: the "
+                    "control has one for all axes",
+                    "state the same for all axes",
+                )
+
+
+def _check_filters(values: dict[str, Any], rapids: dict[str, Any], checker: Checker) -> None:
+    """Refuse filters without their number, and those by which a straight rapid is no longer one."""
+    own: dict[str, Filter | None] = {}
+    for a in (a for a in AXES if a in rapids):
+        behind = rapids[a].get("filter") or {}
+        kind = behind.get("type")
+        if kind is None:
+            own[a] = None
+            continue
+        needed = "time" if kind in AVERAGES else "frequency"
+        for name in ("time", "frequency", "damping"):
+            fits = name == "time" if kind in AVERAGES else name != "time"
+            if name in behind and not fits:
+                checker.problems.add(
+                    checker.place(("axes", a, "rapid", "filter", name)),
+                    f"axes.{a}.rapid.filter.{name} stands beside type: {kind}, which has none",
+                    f"leave it out; {kind} is set by {needed}",
+                )
+        if needed not in behind:
+            checker.problems.add(
+                checker.place(("axes", a, "rapid", "filter")),
+                f"axes.{a}.rapid.filter has no {needed}, which {kind} is set by",
+                f"add {needed}",
+            )
+        own[a] = Filter(
+            kind, *(float(behind.get(name, 0.0)) for name in ("time", "frequency", "damping"))
+        )
+    first = next(iter(own), None)
+    for a, behind in own.items() if values.get("positioning") == "linear" else ():
+        if first is not None and behind != own[first]:
+            checker.problems.add(
+                checker.place(("axes", a, "rapid")),
+                f"axes.{a}.rapid.filter is not that of {first}: behind different filters a "
+                "straight rapid is no longer straight, which is not reckoned with",
+                "state the same filter for all axes, that of the axis that shakes most",
+            )
 
 
 def _default(
@@ -70,7 +162,7 @@ def _default(
 
 def _check_alike(rapids: dict[str, Any], stated: dict[str, str], checker: Checker) -> None:
     """Refuse profiles that no single control makes."""
-    kinds = {LINUXCNC: "1", BELL: "2"}
+    kinds = {LINUXCNC: "1", BELL: "2"} | {law: law for law in LAWS}
     first = next((a for a in AXES if a in stated), None)
     for a, planner in stated.items():
         if first is not None and kinds.get(planner) != kinds.get(stated[first]):
@@ -80,11 +172,11 @@ def _check_alike(rapids: dict[str, Any], stated: dict[str, str], checker: Checke
                 "one control makes the rapids of all axes",
                 "state the same planner for all axes",
             )
-        elif planner == BELL and set(rapids) - set(stated):
+        elif (planner == BELL or planner in LAWS) and set(rapids) - set(stated):
             other = min(set(rapids) - set(stated), key=AXES.index)
             checker.problems.add(
                 checker.place(("axes", other, "rapid")),
-                f"axes.{other}.rapid names no planner, axis {a} moves by {BELL!r}",
+                f"axes.{other}.rapid names no planner, axis {a} moves by {planner!r}",
                 "state the same planner for all axes",
             )
 
@@ -114,7 +206,17 @@ def planner_warnings(
         rapid, planner = axis["rapid"], planners[a]
         stated = checker.given(("axes", a, "rapid", "planner"))
         jerk = ("axes", a, "rapid", "jerk")
-        if "jerk" in rapid and planner not in (JERK_LIMITED, BELL):
+        for name in dict.fromkeys(name for names in LAWS.values() for name in names):
+            if name != "jerk" and name in rapid and name not in LAWS.get(planner, ()):
+                out.append(
+                    MachineError(
+                        f"axes.{a}.rapid.{name} stands beside planner: {planner}, which has no use "
+                        "for it",
+                        "leave it out, or state the planner that it belongs to",
+                        checker.place(("axes", a, "rapid", name)),
+                    )
+                )
+        if "jerk" in rapid and planner not in (JERK_LIMITED, BELL, *KEEP_JERK):
             out.append(
                 MachineError(
                     f"axes.{a}.rapid.jerk stands beside planner: {planner}, which has no jerk "

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from gcodejerk.axes import AXES
-from gcodejerk.machine.parts import PLANNERS
+from gcodejerk.machine.parts import FILTERS, PLANNERS
 
 SCHEMA_VERSION = 1
 
@@ -190,9 +190,61 @@ _POSITIONS = Table(((_LETTERS, _LENGTH),), _AXIS_NAMES, tuple(AXES))
 _PLANNER = Key("planner", Choice(PLANNERS),
     "Which profile the control's own G0 follows. linuxcnc-2.9: trapezoidal velocity, with half of "
     "the acceleration (MAX_ACCELERATION) where no other motion follows; trapezoidal; jerk-limited; "
-    "bell: a trapezoid of velocity averaged over acceleration/jerk. Left out: linuxcnc-2.9 with "
-    "controller: linuxcnc and no jerk; else jerk-limited with a jerk, trapezoidal without.",
+    "bell: a trapezoid of velocity averaged over acceleration/jerk; averaged-trapezoid: the same "
+    "over second_average (Fanuc, constant acceleration); time-constants: two averages of fixed "
+    "times (Fanuc, linear and bell); four-ramp: four jerks (TwinCAT, ISG); two-stage: two "
+    "accelerations (TwinCAT without jerk limit); quintic (TinyG, g2core: velocity and jerk); "
+    "poly5, poly6 (Marlin, M494); notch-ramp (Kalico). Left out: linuxcnc-2.9 with controller: "
+    "linuxcnc and no jerk; else jerk-limited with a jerk, trapezoidal without.",
     example="jerk-limited")  # fmt: skip
+_TIME = Number("s", at_least=0.0, at_most=10.0)
+_ACCELERATION = Number("mm/s^2", above=0.0)
+_LAW = (
+    Key("first_average", _TIME,
+        "time-constants: moving average of the commanded velocity (Fanuc 1620, linear).",
+        example="0.1"),
+    Key("second_average", _TIME,
+        "time-constants, averaged-trapezoid: second moving average (Fanuc 1621, bell).",
+        example="0.032"),
+    Key("deceleration", _ACCELERATION,
+        "four-ramp, two-stage: deceleration (P-AXIS-00002; 00281). Left out: as acceleration.",
+        example="5000"),
+    Key("rise", _TIME, "four-ramp: acceleration builds up (P-AXIS-00196).", example="0.01"),
+    Key("fall", _TIME, "four-ramp: acceleration is released (P-AXIS-00195).", example="0.03"),
+    Key("braking_rise", _TIME, "four-ramp: deceleration builds up (P-AXIS-00198).",
+        example="0.03"),
+    Key("braking_fall", _TIME, "four-ramp: deceleration is released (P-AXIS-00197).",
+        example="0.01"),
+    Key("changeover", Number("mm/s", above=0.0),
+        "two-stage: speed between acceleration and upper_acceleration (P-AXIS-00211).",
+        example="100"),
+    Key("upper_acceleration", _ACCELERATION,
+        "two-stage: acceleration above changeover (P-AXIS-00006).", example="3000"),
+    Key("upper_deceleration", _ACCELERATION,
+        "two-stage: deceleration above changeover (P-AXIS-00280). Left out: as "
+        "upper_acceleration.", example="3000"),
+    Key("overshoot", Number("-", at_least=1.0, at_most=2.0),
+        "poly6: peak of the acceleration over the set one (M494 O).", example="1.5"),
+    Key("notch", Number("Hz", above=0.0), "notch-ramp: the frequency that ramps leave alone.",
+        example="30"),
+)  # fmt: skip
+"""What planners need besides, and nobody else."""
+_FILTER = Key("filter", Section(
+    (
+        Key("type", Choice(FILTERS),
+            "average, triangle (the average twice), or an input shaper: zv, zvd, mzv and ei as "
+            "published; zvdd, zvddd, 2hei, 3hei, marlin-mzv (Marlin); klipper-ei, 2hump_ei, "
+            "3hump_ei (Klipper); ei2, ei3 (RepRapFirmware).", required=True, example="average"),
+        Key("time", Number("s", above=0.0, smallest=1e-5, at_most=10.0),
+            "Of the average (Siemens MD32410).", example="0.032"),
+        Key("frequency", Number("Hz", above=0.0), "That the shaper is made for.", example="30"),
+        Key("damping", Number("-", at_least=0.0, below=1.0),
+            "Damping ratio that the shaper is made for; most controls have 0.1 unless they are "
+            "told.", example="0.05"),
+    )),
+    "What acts on the axis behind the planner: a moving average or an input shaper. The same for "
+    "all axes under positioning: linear.",
+    example="{type: average, time: 0.032}")  # fmt: skip
 
 
 def _limits(required: bool, doc: str) -> Section:
@@ -207,7 +259,7 @@ def _limits(required: bool, doc: str) -> Section:
                 "Left out: the controller moves with trapezoidal velocity." if required else
                 "Left out: ten times that of rapid, or no limit where rapid has none."),
                 example="5.0e+5"),
-            *((_PLANNER,) if required else ()),
+            *((_PLANNER, *_LAW, _FILTER) if required else ()),
         )
     )  # fmt: skip
 

@@ -15,10 +15,12 @@ from dataclasses import replace
 
 from gcodejerk.machine.file.table import SCHEMA_VERSION
 from gcodejerk.machine.parts import (
+    AVERAGES,
     Axis,
     ControllerOptions,
     ControllerParameter,
     Description,
+    Filter,
     Limits,
     Mode,
     Spectrum,
@@ -144,7 +146,7 @@ def _axis(axis: Axis) -> list[str]:
         f"    type: {'rotary' if axis.rotary else 'linear'}",
         f"    diameter: {'true' if axis.diameter else 'false'}",
         f"    resolution: {_number(axis.resolution)}",
-        f"    rapid: {_limits(axis.rapid, axis.planner)}",
+        f"    rapid: {_rapid(axis)}",
         f"    limit: {_limits(axis.limit)}",
     ]
     if axis.rotary and axis.wrap is not None:
@@ -183,13 +185,26 @@ def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> lis
     return lines
 
 
-def _limits(limits: Limits, planner: str | None = None) -> str:
+def _rapid(axis: Axis) -> str:
+    """What the control's own rapids are set to; what its planner does not need is not there."""
+    own = {name: _number(value) for name, value in axis.law}
+    behind = {} if axis.filter is None else {"filter": _filter(axis.filter)}
+    return _limits(axis.rapid, {"planner": axis.planner} | own | behind)
+
+
+def _filter(behind: Filter) -> str:
+    if behind.kind in AVERAGES:
+        return _braces({"type": behind.kind, "time": _number(behind.time)})
+    shaped = {"frequency": behind.frequency, "damping": behind.damping}
+    return _braces({"type": behind.kind} | {k: _number(x) for k, x in shaped.items()})
+
+
+def _limits(limits: Limits, more: Mapping[str, str] | None = None) -> str:
     """Limits in braces; an infinite jerk is written by leaving it out."""
     values = {"velocity": limits.velocity, "acceleration": limits.acceleration}
     if math.isfinite(limits.jerk):
         values["jerk"] = limits.jerk
-    profile = {} if planner is None else {"planner": planner}
-    return _braces({key: _number(value) for key, value in values.items()} | profile)
+    return _braces({key: _number(value) for key, value in values.items()} | dict(more or {}))
 
 
 def _flow(values: Mapping[str, float]) -> str:

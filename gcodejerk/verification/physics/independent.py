@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.verification.findings import Kind
+from gcodejerk.verification.physics.laws import is_mirrored
 from gcodejerk.verification.physics.points import TINY, Array, Paths
 
 Rows = NDArray[np.bool_]
@@ -51,7 +52,9 @@ def check_axes(
     owner = paths.owner
     h = np.diff(t, prepend=t[:1])
     h[paths.begin] = 0.0
-    low, high = (1.0, 1.0) if machine.design.profile in SYMMETRIC else MIDDLE
+    # An axis that would not gain keeps the control's own profile, whatever the others get.
+    mirrored = machine.design.profile in SYMMETRIC and is_mirrored(machine)
+    low, high = (1.0, 1.0) if mirrored else MIDDLE
     out = []
     for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
         D = np.abs(paths.displacement[:, a])

@@ -11,6 +11,7 @@ import numpy as np
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, LINUXCNC, LONE_SHARE, Machine
 from gcodejerk.verification.physics.conventional import rapid_time
+from gcodejerk.verification.physics.laws import OwnRapids, has_law
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import LINEAR, Array, Index, Paths
 
@@ -53,7 +54,11 @@ def limits_of(machine: Machine) -> Array:
 def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
     displacement = paths.displacement
-    total = _move_time(rapid_limits(paths, machine), displacement, machine, machine.planner == BELL)
+    limits = rapid_limits(paths, machine)
+    if has_law(machine):
+        total = OwnRapids(displacement, machine, limits).totals().max(axis=1, initial=0.0)
+    else:
+        total = _move_time(limits, displacement, machine, machine.planner == BELL)
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
     longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
     if machine.design.profile == "shortest":
@@ -81,7 +86,11 @@ def _axis_times(limits: Array, displacement: Array, bell: bool = False) -> Array
 def own_times(paths: Paths, machine: Machine) -> tuple[Array, Array]:
     """What each axis takes by itself [s], shape (moves, 9): conventionally, and at most."""
     dt, displacement = machine.interval, paths.displacement
-    each = _axis_times(rapid_limits(paths, machine), displacement, machine.planner == BELL)
+    limits = rapid_limits(paths, machine)
+    if has_law(machine):
+        each = OwnRapids(displacement, machine, limits).totals()
+    else:
+        each = _axis_times(limits, displacement, machine.planner == BELL)
     usual = np.ceil(each / dt - ON_GRID)
     if machine.design.profile == "shortest":
         alone = _axis_times(_own_limits(displacement, machine), displacement)

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
 from gcodejerk.verification.physics.conventional import box_widths, rapid_position
+from gcodejerk.verification.physics.laws import OwnRapids, has_law
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import Array, Index, Paths
 
@@ -109,6 +110,7 @@ class _Streams:
         self, paths: Paths, machine: Machine, moment: Index, limits: Array, straight: bool
     ) -> None:
         self.paths, self.machine, self.straight = paths, machine, straight
+        self.laws = OwnRapids(paths.displacement, machine, limits) if has_law(machine) else None
         self.owner = paths.owner
         self.left = (moment[paths.end - 1][self.owner] - moment).astype(np.int64)
         """Until arrival, row by row. [intervals]"""
@@ -167,6 +169,8 @@ class _Streams:
         """Vibration left by the controller's own rapid, shape (streams, m) [mm]."""
         displacement = self.paths.displacement
         out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
+        if self.laws is not None:
+            return self._by_law(modes, self.laws)
         ends = np.zeros(displacement.shape)
         widths = {}
         for a in self.axes:
@@ -186,6 +190,19 @@ class _Streams:
                 out[:, m] += amount * factor / pole.imag
         return out
 
+    def _by_law(self, modes: Oscillators, laws: OwnRapids) -> NDArray[np.complex128]:
+        """The same of a control with a law or a filter of its own."""
+        displacement, ends = self.paths.displacement, laws.totals()
+        out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
+        rest = ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
+        for m, pole in enumerate(modes.poles):
+            for a in self.axes:
+                amount = modes.participation[m, a] * displacement[:, a]
+                if amount.any():
+                    left = np.exp(pole * rest[:, a]) / pole.imag
+                    out[:, m] += amount * left * laws.response(a, complex(pole))
+        return out
+
     def own_positions(self) -> Array:
         """Positions of the controller's own rapid at the moments of the points."""
         out = np.array(self.paths.position)
@@ -193,6 +210,10 @@ class _Streams:
         for a in self.axes:
             D = self.paths.displacement[:, a]
             V, A, J = (np.where(D != 0.0, limit[:, a], 1.0) for limit in self.limits)
+            if self.laws is not None:
+                share = self.laws.position(a, t, self.owner)
+                out[:, a] = self.paths.start[self.owner, a] + share * D[self.owner]
+                continue
             bell = self.machine.planner == BELL
             share = rapid_position(t, *(column[self.owner] for column in (V, A, J)), bell=bell)
             out[:, a] = self.paths.start[self.owner, a] + share * D[self.owner]
