@@ -30,6 +30,7 @@ from gcodejerk.planning.lines import (
     smoothed,
 )
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.pvt import Rows
 from gcodejerk.reasons import REASONS, Reason
 
 BATCH_SAMPLES = 400_000
@@ -209,7 +210,7 @@ class Residuals:
         self.residual = np.full(shape, np.nan)
         self.conventional = np.full(shape, np.nan)
 
-    def add(self, batch: Batch) -> None:
+    def add(self, batch: Batch | Rows) -> None:
         """Note one batch."""
         self.residual[batch.moves] = batch.residual
         self.conventional[batch.moves] = batch.conventional_residual

@@ -36,8 +36,13 @@ DIALECT_OF_CONTROLLER = {
     "mach": "mach",
     "marlin": "marlin",
     "klipper": "klipper",
+    **dict.fromkeys(("acs", "csp", "elmo", "galil", "json", "pmac", "ros2"), "linuxcnc"),
+    "fanuc15": "fanuc",
 }
 """How programs are read where the file does not say; `auto` for a controller that is not here."""
+
+CONFIRMABLE = ("acs-pvspline", "pmac-colon")
+"""Facts that no manual at hand shows: see the emitters that ask for them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +117,7 @@ class Pair:
 class ListOf:
     """A list."""
 
-    of: Section
+    of: Section | Choice
     at_most: int
     """More make no sense on a machine, and aliases could stand for very many."""
 
@@ -338,6 +343,25 @@ _CONTROLLER_OPTIONS = Section(
             "(M66 E3, #5399, O-words: docs/linuxcnc-guard.md); needs the HAL lines of `gcodejerk "
             "install linuxcnc INI --form guard`.",
             default=False),
+        Key("counts_per_unit", Table(
+            ((_LETTERS, Number("counts per mm or degree", above=0.0)),), _AXIS_NAMES, tuple(AXES)),
+            "Galil, Elmo, CSP, Fanuc 15i: counts (Fanuc: least increments) of each axis for 1 mm, "
+            "or for 1 degree of a rotary axis, also under units: inch.",
+            example="{X: 1000, Z: 1000}"),
+        Key("axis_names", Table(
+            ((_LETTERS, Text(r"[A-Za-z0-9_][A-Za-z0-9_./-]{0,59}", "a name of at most 60 "
+            "characters")),), _AXIS_NAMES, tuple(AXES)),
+            "What the controller calls each axis: a joint (ROS 2), a letter (Galil, PMAC), a "
+            "number (ACS, Fanuc 15i: the place in the record, from 1).",
+            example="{X: joint_x, Z: joint_z}"),
+        Key("isx90", Number("ms", above=0.0), "PMAC: Isx90 of the coordinate system, the unit of "
+            "time of velocities.", example="1000"),
+        Key("fanuc_distance", Choice(("general", "special")),
+            "Fanuc 15i: the format of distances in the remote buffer (parameter 7609#2, RDS).",
+            example="general"),
+        Key("confirmed", ListOf(Choice(CONFIRMABLE), at_most=len(CONFIRMABLE)),
+            "Facts that nobody could verify for us, and you have with your manual: lines that rest "
+            "on them are comments otherwise (docs/points.md).", example="[pmac-colon]"),
     )
 )  # fmt: skip
 
