@@ -41,7 +41,7 @@ from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 BATCH_ROWS = 200_000
 """Rows of a batch, about."""
-SHARE_OF_LIMIT = 0.02
+SHARE_OF_LIMIT = 0.05
 """Share of the acceleration limit that rounded positions may cost in the shortest segment."""
 MORE_TICKS = 2
 """Ticks more than the planned time that a move may take in any case."""
@@ -193,17 +193,17 @@ def told_in(plans: Plans, rapids: Rapids, form: RowFormat) -> tuple[Plans, Array
     speed = rapids.speed[move] / path_length(plans.displacement, machine)[move]
     limits = (np.fmin(V, speed), A, J)
     total = plans.profiles.total
-    usual = np.maximum(total, plans.conventional_time[move] * (1.0 + machine.design.max_extension))
+    usual = np.maximum(total, plans.conventional.total * (1.0 + machine.design.max_extension))
+    least = _least(machine, form, share)
+    coarser = _common_ticks(plans, form, least)
+    tick = form.tick * coarser
     ticks = np.ceil(total / form.tick - ON_TICK).astype(np.int64) + MORE_TICKS
-    most = np.maximum(ticks, np.floor(usual / form.tick + ON_TICK)).astype(np.int64)
+    most = np.maximum(ticks, np.floor(usual / form.tick + ON_TICK)).astype(np.int64) // coarser
+    least = -(-least // coarser)
     poles, weights = _compared(plans, share)
-    profiles, found = in_ticks(
-        TickTask(
-            plans.profiles, limits, _least(machine, form, share), most, poles, weights,
-            form.tick,
-        )
-    )  # fmt: skip
-    _rule_out(plans, np.unique(move[~found]), Reason.LIMITS)
+    task = TickTask(plans.profiles, limits, least, most, poles, weights, tick)
+    profiles, found = in_ticks(task)
+    _rule_out(plans, np.unique(move[~found]), Reason.NOT_PLAYED)
     lasting = np.zeros(len(plans))
     np.maximum.at(lasting, move, profiles.total)
     good = np.flatnonzero(plans.reason[move] == CERTAIN)
@@ -283,6 +283,23 @@ def _least(machine: Machine, form: RowFormat, share: Array) -> Ticks:
     time = np.where(share != 0.0, each, 0.0).max(axis=1, initial=0.0)
     least: Ticks = np.maximum(np.ceil(time / form.tick), 1.0).astype(np.int64)
     return least
+
+
+def _common_ticks(plans: Plans, form: RowFormat, least: Ticks) -> int:
+    """Ticks that are told as one, so that boundaries of axes that run on their own are apart.
+
+    Two of them a tick apart would be a segment that rounding makes nonsense of. Where they can,
+    they divide the interval.
+    """
+    several = np.diff(plans.move, prepend=-1) == 0
+    if not several.any():
+        return 1
+    shortest = int(least.max(initial=1))
+    interval = plans.machine.interval / form.tick
+    for ticks in range(shortest, 2 * shortest):
+        if abs(interval / ticks - round(interval / ticks)) < ON_TICK and round(interval) >= ticks:
+            return ticks
+    return shortest
 
 
 def make_rows(plans: Plans, rapids: Rapids, form: RowFormat, peaks: Array) -> Iterator[list[Rows]]:

@@ -241,8 +241,11 @@ def _by_moving(
     for _ in range(TRIES):
         if not len(open_):
             break
-        for odd in (False, True) if mirrored and k % 2 == 0 else (None,):
-            rows = open_ if odd is None else open_[(length[open_] % 2 == 1) == odd]
+        # An odd number of ticks has no middle: nothing is told where the acceleration is 0 there.
+        splits = mirrored and k % 2 == 0
+        uneven = splits & (length[open_] % 2 == 1)
+        for odd in (False, True):
+            rows = open_[uneven == odd]
             if not len(rows):
                 continue
             own = shape.take(rows).without_middle() if odd else shape.take(rows)

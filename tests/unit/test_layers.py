@@ -70,7 +70,7 @@ ROOMS = {
     findings
  <- bytes
  <- physics | second_reading
- <- cycles | table samples | reported
+ <- cycles | table samples | rows | reported
  <- proof
 """),
 }
