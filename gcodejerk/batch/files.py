@@ -251,12 +251,13 @@ def same_file(one: str, other: str) -> bool:
 
 
 _ROWS = re.compile(
-    rb'(?:(?://|REM|#|!|\() ?gcodejerk \S+ rows for |\{"gcodejerk": "[^"]+", "rows": )'
+    rb'(?:(?://|REM|#|!|\() ?gcodejerk \S+ rows for |\{"gcodejerk": "[^"]+", "rows": )',
+    re.IGNORECASE,
 )
 
 
 def is_ours(path: str) -> bool:
-    """Whether a file carries gcodejerk's stamp, or is one of its tables, files of rows or samples."""
+    """Whether a file carries gcodejerk's stamp, or is a table, or a file of rows or samples."""
     head = _head(path)
     tables = (b"block,t,", b"gcodejerk streams ")
     ours = head.startswith(tables) or _ROWS.match(head) or _STAMP.search(head)

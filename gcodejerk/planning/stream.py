@@ -31,6 +31,7 @@ from gcodejerk.planning.lines import (
 )
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.records import without_pauses
 from gcodejerk.reasons import REASONS, Reason
 
 BATCH_SAMPLES = 400_000
@@ -97,6 +98,7 @@ def _make_batch(
         batch = aligned_batch(sampler, stride)
     else:
         batch = _Maker(sampler, stride, play).batch()
+        batch = without_pauses(batch) if play is Play.INCREMENTS else batch
     worse = batch.worst_in_band > plans.most_in_band[moves]
     plans.reason[moves[worse]] = REASONS.index(Reason.NOT_BETTER)
     plans.reason[moves[batch.unplayable]] = REASONS.index(Reason.NOT_PLAYED)

@@ -28,7 +28,7 @@ from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.pvt import RowFormat, Rows, make_rows, told_in
+from gcodejerk.planning.pvt import RowFormat, Rows, in_steps, make_rows, told_in
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
@@ -213,6 +213,9 @@ def _process(
     plans = _plan(source, program, machine, settings, emitter, report)
     peaks = np.zeros((3, len(plans)))
     form = emitter.row_format(machine) if emitter.play is Play.CUBIC else None
+    steps = emitter.end_steps(machine)
+    if steps is not None:
+        plans = in_steps(plans, program.rapids, steps)
     if form is not None:
         plans, peaks = told_in(plans, program.rapids, form)
     writer = Rewriter(

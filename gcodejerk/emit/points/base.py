@@ -2,11 +2,12 @@
 
 Rule: every file says which gcodejerk, machine, controller and profile it is from and how sure its
 facts are; every rapid has a title with its line in the program, and its peaks before and after
-rounding. No line of a head or title is longer than 69 characters.
+rounding. No line of a head or title has 70 characters or more.
 """
 
 from __future__ import annotations
 
+import math
 import textwrap
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -22,11 +23,13 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
-from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.pvt import RowFormat, Rows
 
 Array = NDArray[np.float64]
 
-WIDTH = 69
+WIDTH = 68
+PEAKS = "V, A, J: velocity, acceleration, jerk along the way, mm (deg), s"
 CONFIRM = "confirm with your machine's manual before use"
 UM_PER_MM = 1e3
 MS_PER_S = 1e3
@@ -73,7 +76,7 @@ class PointsController(Controller):
                 *self.facts,
                 *([CONFIRM] if self.unsure else []),
                 *self.about(machine),
-                "V, A, J: velocity, acceleration, jerk along the way, mm and s",
+                *([PEAKS] if self.play is Play.CUBIC else []),
             ]
         )
 
@@ -94,10 +97,7 @@ class PointsController(Controller):
     def title(self, rows: Rows, index: int, rapids: Rapids) -> bytes:
         """What stands in front of a move."""
         move = int(rows.moves[index])
-        ways = [
-            f"{AXES[a]} {rapids.start[move, a]:.10g} to {rapids.target[move, a]:.10g}"
-            for a in rows.axes_of(index)
-        ]
+        ways = [way(rapids, move, a) for a in rows.axes_of(index)]
         lines = [f"rapid at line {rapids.line[move]}: {', '.join(ways)}"]
         planned = float(rows.plans.counts[move] * rows.plans.machine.interval)
         times = (planned, duration(rows, index))
@@ -105,6 +105,7 @@ class PointsController(Controller):
             V, A, J = peaks[:, index].tolist()
             lines.append(f"{word} V {V:.6g} A {A:.6g} J {J:.6g} in {time * MS_PER_S:.8g} ms")
         own, today = (f"{UM_PER_MM * amount:.6g}" for amount in left(rows, index))
+        lines += in_band(rows.plans, move, float(rows.worst_in_band[index]))
         lines.append(f"leaves {own} um, today's rapid {today} um")
         return self.commented(lines)
 
@@ -115,6 +116,79 @@ class PointsController(Controller):
     @abstractmethod
     def lines(self, rows: Rows, index: int, rapids: Rapids) -> bytes:
         """The rows of one move."""
+
+
+class CyclicController(PointsController):
+    """A controller that is given a position in every cycle: whole counts, one interval apart."""
+
+    play = Play.TABLE
+
+    def end_steps(self, machine: Machine) -> Array:
+        """Counts."""
+        return 1.0 / counts_of(machine, self.name)
+
+    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
+        """Counts from the program's zero, the ends too."""
+        step = np.broadcast_to(self.end_steps(machine), rapids.start.shape)
+        start = np.rint(rapids.start / step) * step
+        return NumberFormat(start, step, np.zeros_like(start), finer=False)
+
+    def render(
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        blocks: Sequence[bytes],
+        newline: bytes,
+        options: Options,
+    ) -> list[bytes]:
+        """A title and the counts of each move."""
+        out = []
+        for row, move in enumerate(batch.moves.tolist()):
+            axes = np.flatnonzero(batch.plans.displacement[move]).tolist()
+            first = batch.grid.knots.shape[1] - 1 - int(batch.grid.counts[row])
+            counts = np.stack([batch.whole[a][row, first:] for a in axes], axis=1)
+            ways = [way(rapids, move, a) for a in axes]
+            modes = batch.plans.modes
+            own, today = (
+                UM_PER_MM * float(modes.grouped(each[row]).max(initial=0.0))
+                for each in (batch.residual, batch.conventional_residual)
+            )
+            title = self.commented(
+                [
+                    f"rapid at line {rapids.line[move]}: {', '.join(ways)}",
+                    *in_band(batch.plans, move, float(batch.worst_in_band[row])),
+                    f"leaves {own:.6g} um, today's rapid {today:.6g} um",
+                ]
+            )
+            out.append(title + self.points(batch.plans.machine, axes, counts))
+        return out
+
+    @abstractmethod
+    def points(self, machine: Machine, axes: list[int], counts: NDArray[np.int64]) -> bytes:
+        """The counts (k, axes) of a move as text."""
+
+    def row_format(self, machine: Machine) -> RowFormat:
+        """Points are no rows."""
+        raise NotImplementedError
+
+    def lines(self, rows: Rows, index: int, rapids: Rapids) -> bytes:
+        """Points are no rows."""
+        raise NotImplementedError
+
+
+def in_band(plans: Plans, move: int, worst: float) -> list[str]:
+    """What is left at worst where the modes are not where the machine file says."""
+    today = float(plans.most_in_band[move])
+    if not (math.isfinite(today) and math.isfinite(worst)) or not plans.has_to_gain:
+        return []
+    band = 100.0 * plans.machine.design.band
+    own, today = UM_PER_MM * worst, UM_PER_MM * today
+    return [f"at worst within {band:.3g} % of the modes {own:.6g} um, today's {today:.6g} um"]
+
+
+def way(rapids: Rapids, move: int, axis: int) -> str:
+    """From where to where an axis moves."""
+    return f"{AXES[axis]} {rapids.start[move, axis]:.10g} to {rapids.target[move, axis]:.10g}"
 
 
 def duration(rows: Rows, index: int) -> float:

@@ -19,10 +19,12 @@ from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.rows.moves import Move, NoRowError, Steps
 from gcodejerk.verification.rows.readers import (
     DOUBLES,
+    RECORDS,
     TEXTS,
     TextFormat,
     json_move,
     made,
+    record_move,
     table_move,
 )
 
@@ -31,6 +33,7 @@ HEAD = 4096
 LONGEST_LINE = 1 << 24
 DIGITS = 16
 _TITLED = re.compile(rb"(?://|REM|#|!) gcodejerk \S{1,40} rows for ([a-z0-9]{1,20})\r?\n")
+_RECORDS = b"(GCODEJERK "
 _JSON = re.compile(rb'\{"gcodejerk": "[^"]{1,40}", "rows": 1, "controller": "json"')
 _TABLE = re.compile(rb"block,t,([A-Z],[A-Z]_velocity,?)+\r?\n")
 _NUMBER = re.compile(r"-?[0-9]{1,12}(?:\.[0-9]{1,15})?|nan")
@@ -53,6 +56,8 @@ def rows_format(file: BinaryIO) -> str | None:
     at = file.tell()
     head = file.read(HEAD)
     file.seek(at)
+    if head.startswith(_RECORDS):
+        return "fanuc15"
     if match := _TITLED.match(head):
         name = match[1].decode()
         return name if name in TEXTS else None
@@ -67,13 +72,18 @@ class RowsFile:
         self.line = 0
         """Of the last line that was read."""
         self.sum = hashlib.blake2b(digest_size=DIGITS // 2)
-        self.steps: Steps = (TEXTS[name].steps if name in TEXTS else DOUBLES)(machine)
+        if name in TEXTS:
+            self.steps: Steps = TEXTS[name].steps(machine)
+        else:
+            self.steps = (RECORDS if name == "fanuc15" else DOUBLES)(machine)
 
     def moves(self) -> Iterator[Move]:
         """Every move, up to the first line that is not of the format."""
         try:
             if self.name == "json":
                 yield from self._document()
+            elif self.name == "fanuc15":
+                yield from self._stream()
             elif self.name == "csv":
                 yield from self._table()
             else:
@@ -138,6 +148,40 @@ class RowsFile:
         if title is not None:
             yield made(*title, text.parse(body, self.machine), text, residual)
         self._check_sum(stated)
+
+    def _stream(self) -> Iterator[Move]:
+        """Text in parentheses, and binary records between a block G05 and a record of zeros."""
+        size = 2 * len(self.machine.axes) + 1
+        title: tuple[int, int] | None = None
+        stated: str | None = None
+        while (line := self._next()) is not None:
+            if match := re.fullmatch(r"\(SUM ([0-9A-F]{16})\)", line):
+                stated = match[1].lower()
+                break
+            self.sum.update(self.raw)
+            if begins := re.fullmatch(r"\(RAPID AT LINE ([0-9]{1,12}): .*", line):
+                title = (self.line, int(begins[1]))
+            elif line == "G05" and title is not None:
+                yield record_move(*title, self._records(size), self.machine)
+                title = None
+            elif not line.startswith("("):
+                raise NoRowError("expected a comment, or a block G05 below the title of a rapid")
+        self._check_sum(stated)
+
+    def _records(self, size: int) -> bytes:
+        """Records of one rapid, up to the record of zeros that ends it."""
+        parts: list[bytes] = []
+        while True:
+            record = self.file.read(size)
+            if len(record) < size:
+                raise NoRowError("the records of a rapid have no end")
+            self.sum.update(record)
+            if not any(record):
+                break
+            parts.append(record)
+        if not parts:
+            raise NoRowError("a rapid without records: its first record says that it is over")
+        return b"".join(parts)
 
     def _document(self) -> Iterator[Move]:
         """A JSON document, a rapid on each line."""

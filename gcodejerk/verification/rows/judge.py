@@ -19,6 +19,7 @@ from gcodejerk.machine import BELL, Machine
 from gcodejerk.nc import CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.physics.conventional import box_widths
+from gcodejerk.verification.physics.dynamics import check_dynamics
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.own_rapids import (
     conventional_counts,
@@ -32,12 +33,14 @@ from gcodejerk.verification.physics.points import (
     Array,
     Index,
     Paths,
+    check_line,
     check_rapids,
     resolutions,
 )
 from gcodejerk.verification.rows.files import RowsFile
 from gcodejerk.verification.rows.motion import Pieces
 from gcodejerk.verification.rows.moves import Move
+from gcodejerk.verification.rows.readers import CYCLIC
 
 BATCH = 500
 """Moves that are judged at a time."""
@@ -63,6 +66,9 @@ def judge_rows(file: RowsFile, rapids: Rapids, machine: Machine, found: Findings
     replaced: list[int] = []
     moves = _matched(file, rapids, machine, found, replaced)
     while not found.full and (batch := list(islice(moves, BATCH))):
+        if file.name in CYCLIC:
+            _judge_points(batch, file, rapids, machine, found)
+            continue
         _Judge([m for _, m in batch], [i for i, _ in batch], file, rapids, machine, found).run()
     return replaced
 
@@ -150,6 +156,39 @@ def _framed(move: Move, i: int, file: RowsFile, rapids: Rapids, found: Findings)
             complain(Kind.AXES, f"axis {AXES[a]} moves, which the block does not move")
             return None
     return replace(move, position=position, relative=False)
+
+
+def _judge_points(
+    batch: list[tuple[int, Move]], file: RowsFile, rapids: Rapids, machine: Machine, found: Findings
+) -> None:
+    """Judge points that are an interval apart like those of a stream."""
+    moves = [move for _, move in batch]
+    ends = _ends(np.array([i for i, _ in batch], dtype=np.int64), moves, rapids, machine)
+    size = np.array([len(move.t) for move in moves], dtype=np.int64)
+    end = np.cumsum(size)
+    step = file.steps.position
+    start = np.rint(ends.start / step) * step
+    named = np.zeros(start.shape, dtype=np.bool_)
+    position = np.repeat(start, size, axis=0)
+    for k, move in enumerate(moves):
+        named[k, list(move.axes)] = True
+        position[end[k] - size[k] : end[k], list(move.axes)] = move.position
+    moved = np.rint((ends.start + ends.displacement) / step) * step - start
+    paths = replace(
+        ends,
+        line=ends.line + 1,
+        begin=end - size,
+        end=end,
+        position=position,
+        feed=np.full(len(position), np.nan),
+        start=start,
+        displacement=np.where(named & (ends.displacement != 0.0), moved, 0.0),
+        step=np.tile(step, (len(moves), 1)),
+    )
+    check_rapids(ends, rapids, machine, found)
+    check_line(paths, machine, found)
+    if (paths.displacement != 0.0).any(axis=1).all():
+        check_dynamics(paths, machine, 1, found)
 
 
 class _Judge:

@@ -51,6 +51,8 @@ class TextFormat:
     relative: bool = False
     inert: bool = False
     """Its lines may all be comments."""
+    whole: bool = False
+    """The first row stands at the start."""
 
 
 def _counts(machine: Machine) -> Array:
@@ -194,6 +196,50 @@ def _ros2(lines: Sequence[str], machine: Machine) -> Body:
     return Body(axes, times, position, velocity)
 
 
+def _csp(lines: Sequence[str], machine: Machine) -> Body:
+    counts = _counts(machine)
+    named = {a: AXES.index(a) for a in machine.axis_names}
+    first, *letters = lines[0].split(",")
+    axes = tuple(_axis(letter, named) for letter in letters)
+    if first != "cycle" or not axes or len(set(axes)) < len(axes):
+        raise NoRowError("expected cycle,X")
+    times, position = [], []
+    pattern = ",".join([_WHOLE] * (1 + len(axes)))
+    for k, line in enumerate(lines[1:]):
+        cycle, *values = [int(x) for x in _matched(pattern, line, "whole numbers").groups()]
+        if cycle != k or max(map(abs, values)) >= 1 << 31:
+            raise NoRowError(f"expected cycle {k}, and positions of 32 bits")
+        times.append(cycle * machine.interval)
+        position.append([x / float(counts[a]) for x, a in zip(values, axes, strict=True)])
+    return Body(axes, times, position, [[0.0] * len(axes) for _ in times])
+
+
+def record_move(line: int, rapid: int, data: bytes, machine: Machine) -> Move:
+    """A move from the binary records of a Fanuc 15i; n axes of 2 bytes and a check byte each."""
+    n = len(machine.axes)
+    rows = np.frombuffer(data, np.uint8).reshape(-1, 2 * n + 1).astype(np.int64)
+    if (rows[:, :-1].sum(axis=1) % 256 != rows[:, -1]).any():
+        raise NoRowError("a check byte is not the sum of its record")
+    high, low = rows[:, 0:-1:2], rows[:, 1:-1:2]
+    if machine.controller_options.fanuc_distance == "special":
+        if ((high | low) & 1).any():
+            raise NoRowError("the low bit of a byte is set, which the special format has not")
+        value = (high >> 1) * 128 + (low >> 1)
+        value = np.where(value >= 1 << 13, value - (1 << 14), value)
+    else:
+        value = high * 256 + low
+        value = np.where(value >= 1 << 15, value - (1 << 16), value)
+    places = [int(machine.controller_options.axis_names[a]) - 1 for a in machine.axis_names]
+    value = value[:, places]
+    letters = np.flatnonzero(value.any(axis=0))
+    axes = tuple(AXES.index(machine.axis_names[k]) for k in letters.tolist())
+    counts = _counts(machine)[list(axes)]
+    position = np.cumsum(np.concatenate([np.zeros((1, len(axes))), value[:, letters]]), axis=0)
+    t = np.arange(len(position), dtype=np.float64) * machine.interval
+    position = position / counts
+    return Move(line, rapid, axes, np.asarray(t), position, np.zeros_like(position), relative=True)
+
+
 def _same(position: float, velocity: float, tick: float, **more: float) -> Callable[..., Steps]:
     """The same steps for all axes."""
 
@@ -217,6 +263,10 @@ def _in_counts(tick: float, **more: float) -> Callable[[Machine], Steps]:
     return steps
 
 
+def _csp_steps(machine: Machine) -> Steps:
+    return _in_counts(machine.interval)(machine)
+
+
 def _si_steps(machine: Machine) -> Steps:
     rotary = np.array([a in machine.axis_names and machine.axis(a).rotary for a in AXES])
     unit = np.where(rotary, 180.0 / math.pi, 1e3)
@@ -228,9 +278,16 @@ TEXTS = {
     "elmo": TextFormat("# ", _elmo, _in_counts(1e-3)),
     "pmac": TextFormat("// ", _pmac, _pmac_steps, inert=True),
     "acs": TextFormat("! ", _acs, _same(1e-7, 1e-5, 1e-3), inert=True),
+    "csp": TextFormat(
+        "# ", _csp, lambda machine: _in_counts(machine.interval)(machine), whole=True
+    ),
     "ros2": TextFormat("# ", _ros2, _si_steps),
 }
 """The formats of titled blocks, by controller."""
+RECORDS = _in_counts(1e-3)
+"""Whole increments; the unit time is the machine's interval, a number of ms."""
+CYCLIC = ("csp", "fanuc15")
+"""Of these the points are an interval apart, with straight lines between them."""
 DOUBLES = _same(1e-9, 1e-6, 1e-9)
 """What tables and JSON are written in."""
 
@@ -240,6 +297,9 @@ def made(line: int, rapid: int, body: Body, text: TextFormat, residual: float | 
     if not body.times:
         raise NoRowError("there are no rows")
     k = len(body.axes)
+    if text.whole:
+        t, p, v = (np.array(x) for x in (body.times, body.position, body.velocity))
+        return Move(line, rapid, body.axes, t, p, v, residual=residual)
     position = np.array([[0.0 if text.relative else np.nan] * k, *body.position])
     velocity = np.array([[0.0] * k, *body.velocity])
     t = np.array([0.0, *body.times])
