@@ -19,6 +19,7 @@ from gcodejerk.verification.rows.files import rows_format
 
 AXIS = "{rapid: {velocity: 500, acceleration: 5000, jerk: 150000}, limit: {jerk: 150000}, modes: [{frequency: 27, damping: 0.02}]}"  # noqa: E501
 EXAMPLE = f"interval: 0.001\npositioning: linear\naxes:\n  X: {AXIS}\n"
+TURNING = AXIS.replace("{rapid", "{wrap: none, rapid").replace("}]", ", participation: 1}]")
 MOVE = b"G21 G90 G94 G17 G40 G49 G80 G54\nG1 X0. F100.\nG0 X300.\nM2\n"
 OPTIONS = {
     "acs": "{axis_names: {X: '0'}}",
@@ -266,7 +267,7 @@ def test_degrees_inches_and_diameters():
     text = (
         "interval: 0.001\npositioning: linear\naxes:\n"
         f"  X: {AXIS.replace('{rapid', '{diameter: true, rapid', 1)}\n"
-        f"  A: {AXIS.replace('{rapid', '{wrap: none, rapid').replace('}]', ', participation: 1}]')}\n"
+        f"  A: {TURNING}\n"
     )
     program = b"G20 G90 G94 G7 G17 G40 G49 G80 G54\nG1 X0 A0 F9\nG0 X2\nG0 A-90\nM2\n"
     options = "{axis_names: {X: x, A: a}}"
