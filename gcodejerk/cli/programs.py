@@ -228,6 +228,9 @@ def verify(
     described = load_machine(machine, original)
     if report is not None and expand_cycles:
         raise typer.BadParameter("--report: its lines are the original's, before its cycles")
+    no_cycles = "--expand-cycles: a table of streams has no cycles written out"
+    if processed.lower().endswith(".csv") and expand_cycles:
+        raise typer.BadParameter(no_cycles)
     reported = None if report is None else read_reported(report)
     written = 0
     with ExitStack() as files:
@@ -235,9 +238,7 @@ def verify(
         names = (original, processed)
         table = processed.lower().endswith(".csv") or rows_format(other) is not None
         if table and expand_cycles:
-            raise typer.BadParameter(
-                "--expand-cycles: a table of streams has no cycles written out"
-            )
+            raise typer.BadParameter(no_cycles)
         # What the user does not say again, the stamp says.
         stamp = read_stamp(other, described)
         if stamp is not None and not stamp.known:

@@ -27,7 +27,8 @@ from gcodejerk.nc import DIALECTS, Dialect, Program, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 from gcodejerk.units import MM_PER_INCH
 
 GROUP = "gcodejerk.controllers"

@@ -28,10 +28,11 @@ from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.pvt import RowFormat, Rows, in_steps, make_rows, told_in
+from gcodejerk.planning.pvt import Rows, make_rows
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
+from gcodejerk.planning.told import RowFormat, in_steps, told_in
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.expanded import (
     hunks,

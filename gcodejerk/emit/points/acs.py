@@ -20,7 +20,8 @@ from gcodejerk.emit.points.base import PointsController, decimal, names_of, same
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 TICK = 1e-3
 PLACES, SPEED_PLACES = 7, 5
@@ -69,6 +70,10 @@ class AcsController(PointsController):
                 f"the lines are comments until controller_options has confirmed: [{CONFIRMED}]"
             )
         return lines
+
+    def inert(self, machine: Machine) -> bool:
+        """Until the arguments are confirmed."""
+        return CONFIRMED not in machine.controller_options.confirmed
 
     def lines(self, rows: Rows, index: int, rapids: Rapids) -> bytes:
         """A spline."""

@@ -24,7 +24,8 @@ from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 Array = NDArray[np.float64]
 
@@ -79,6 +80,19 @@ class PointsController(Controller):
                 *([PEAKS] if self.play is Play.CUBIC else []),
             ]
         )
+
+    def inert(self, machine: Machine) -> bool:
+        """Whether the rows are comments, since something was not confirmed."""
+        return False
+
+    def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
+        """That nothing would move."""
+        if not self.inert(plans.machine) or not plans.planned.any():
+            return []
+        return [
+            f"the rows for {self.name} are comments: they rest on facts that nobody could verify; "
+            "the head of the file says what to confirm (docs/points.md)"
+        ]
 
     def about(self, machine: Machine) -> list[str]:
         """Lines of the head about this machine."""

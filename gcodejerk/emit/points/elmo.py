@@ -18,7 +18,8 @@ from gcodejerk.emit.base import Form
 from gcodejerk.emit.points.base import PointsController, counts_of
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 TICK = 1e-3
 

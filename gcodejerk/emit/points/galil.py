@@ -24,7 +24,8 @@ from gcodejerk.emit.points.base import PointsController, counts_of, names_of
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 SAMPLES_PER_S = 1024.0
 LONGEST = 2048

@@ -24,7 +24,8 @@ from gcodejerk.emit.points.base import PointsController, decimal, duration, left
 from gcodejerk.emit.points.table import FINEST, PLACES, SPEED_PLACES, TIME_PLACES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 
 class JsonController(PointsController):

@@ -19,7 +19,8 @@ from gcodejerk.emit.base import Form
 from gcodejerk.emit.points.base import PointsController, decimal, same_step
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 TICK = 0.25e-6
 """Of I42 = 0. [s]"""
@@ -70,6 +71,10 @@ class PmacController(PointsController):
                 "isx90"
             )
         return lines
+
+    def inert(self, machine: Machine) -> bool:
+        """Until the colon form and Isx90 are confirmed."""
+        return not _live(machine)
 
     def lines(self, rows: Rows, index: int, rapids: Rapids) -> bytes:
         """A block of moves."""

@@ -23,7 +23,8 @@ from gcodejerk.emit.base import Form
 from gcodejerk.emit.points.base import PointsController, decimal, names_of
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 TICK = 1e-9
 NANOSECONDS = 1_000_000_000

@@ -15,7 +15,8 @@ from gcodejerk.emit.base import Form
 from gcodejerk.emit.points.base import PointsController, decimal, same_step
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.pvt import RowFormat, Rows
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 
 TIME_PLACES, PLACES, SPEED_PLACES = 9, 9, 6
 """Decimals of times [s], positions [mm] and velocities [mm/s]."""
