@@ -10,7 +10,7 @@ Rule 2: nothing is given back that `verify` has not accepted (unless the user sw
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import BinaryIO
 
@@ -24,12 +24,15 @@ from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
+from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.pvt import Rows, make_rows
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
+from gcodejerk.planning.told import RowFormat, in_steps, told_in
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.expanded import (
     hunks,
@@ -38,7 +41,7 @@ from gcodejerk.rewrite.expanded import (
     written_out,
 )
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
-from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes
+from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
 from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.stamp import stamp_text
@@ -165,6 +168,7 @@ def process_file(
         Without `output` and `beside`.
     """
     emitter = load_controller(settings.controller or machine.controller).in_form(settings.form)
+    emitter.require(machine)
     if emitter.beside and target is not None and beside is None:
         raise EmitError(
             f"controller {emitter.name} writes two files: the program and its {emitter.beside}",
@@ -208,6 +212,13 @@ def _process(
     lines = None if expansion is None else expansion.map
     program = _read(source, machine, settings, name, emitter, report, lines)
     plans = _plan(source, program, machine, settings, emitter, report)
+    peaks = np.zeros((3, len(plans)))
+    form = emitter.row_format(machine) if emitter.play is Play.CUBIC else None
+    steps = emitter.end_steps(machine)
+    if steps is not None:
+        plans = in_steps(plans, program.rapids, steps)
+    if form is not None:
+        plans, peaks = told_in(plans, program.rapids, form)
     writer = Rewriter(
         source, target, program, emitter,
         Options(settings.comments, find_dialect(program.dialect)),
@@ -215,7 +226,9 @@ def _process(
         beside,
         guarded=machine.controller_options.override_guard,
     )  # fmt: skip
-    collected, deviation = _write(writer, plans, machine, report)
+    design = replace(machine.design, profile=settings.profile or machine.design.profile)
+    designed = replace(machine, design=design)
+    collected, deviation = _write(writer, plans, designed, report, form, peaks)
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
@@ -244,6 +257,7 @@ def _process(
             *operator_notes(emitter, machine, plans),
             *program_notes(program, expansion, emitter),
             *dogleg_notes(plans, deviation),
+            *tick_notes(plans),
             *band_notes(plans, collected),
             *emitter.notes(program.rapids, plans),
         ),
@@ -320,7 +334,12 @@ def _chosen(machine: Machine, settings: Settings, emitter: Controller) -> list[s
 
 
 def _write(
-    writer: Rewriter, plans: Plans, machine: Machine, report: Progress
+    writer: Rewriter,
+    plans: Plans,
+    machine: Machine,
+    report: Progress,
+    form: RowFormat | None,
+    peaks: Array,
 ) -> tuple[Residuals, Array]:
     """Write all streams; what they leave, and how far each path is from the control's own [mm]."""
     emitter, dialect = writer.emitter, writer.options.dialect
@@ -328,15 +347,22 @@ def _write(
     deviation = np.zeros(len(plans))
     writer.write_header(machine)
     done = 0
-    for window in make_streams(
-        plans,
-        emitter.number_format(writer.program.rapids, machine, dialect),
-        emitter.stride(machine.interval),
-        emitter.play,
-    ):
+    windows: Iterator[list[Batch]] | Iterator[list[Rows]]
+    if form is not None:
+        windows = make_rows(plans, writer.program.rapids, form, peaks)
+    else:
+        windows = make_streams(
+            plans,
+            emitter.number_format(writer.program.rapids, machine, dialect),
+            emitter.stride(machine.interval),
+            emitter.play,
+        )
+    for window in windows:
         for batch in window:
             collected.add(batch)
-            deviation[batch.moves] = path_deviation(batch)
+            deviation[batch.moves] = (
+                batch.deviation() if isinstance(batch, Rows) else path_deviation(batch)
+            )
         writer.write(window)
         done += sum(map(len, window))
         report("writing", done, int(np.count_nonzero(plans.planned)))
