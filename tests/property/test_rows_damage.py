@@ -121,3 +121,12 @@ def test_rows_for_another_machine_are_found():
     )
     kinds = {str(v.kind) for v in verify(PROGRAM, output, slow).violations}
     assert "velocity limit" in kinds
+
+
+# A table without a sum may end behind any rapid.
+@pytest.mark.parametrize("controller", sorted(set(CONTROLLERS) - {"csv"}))
+def test_a_file_that_ends_behind_any_line_is_found(controller):
+    machine, output = made(controller)
+    ends = [k + 1 for k, byte in enumerate(output) if byte == ord("\n")]
+    for end in ends[:-1][:: max(1, len(ends) // 40)]:
+        assert not verify(PROGRAM, output[:end], machine).ok, end

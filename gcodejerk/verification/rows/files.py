@@ -21,6 +21,7 @@ from gcodejerk.verification.rows.readers import (
     DOUBLES,
     RECORDS,
     TEXTS,
+    Body,
     TextFormat,
     json_move,
     made,
@@ -116,6 +117,12 @@ class RowsFile:
             self.line += 1
             raise NoRowError("there is text behind the sum")
 
+    def _parsed(self, text: TextFormat, body: list[str]) -> Body:
+        """The rows of a titled block, which has some."""
+        if not body:
+            raise NoRowError("nothing stands below the title of a rapid")
+        return text.parse(body, self.machine)
+
     def _blocks(self, text: TextFormat) -> Iterator[Move]:
         """Titled blocks of lines; comments that no title begins are not looked at."""
         title: tuple[int, int] | None = None
@@ -132,7 +139,7 @@ class RowsFile:
             begins = _TITLE.fullmatch(remark) if remark is not None else None
             if begins or line == "---":
                 if title is not None:
-                    yield made(*title, text.parse(body, self.machine), text, residual)
+                    yield made(*title, self._parsed(text, body), text, residual)
                 title, residual, body = None, None, []
             if begins:
                 title = (self.line, int(begins[1]))
@@ -146,7 +153,7 @@ class RowsFile:
             elif remark is None and line != "---":
                 raise NoRowError("rows below no title")
         if title is not None:
-            yield made(*title, text.parse(body, self.machine), text, residual)
+            yield made(*title, self._parsed(text, body), text, residual)
         self._check_sum(stated)
 
     def _stream(self) -> Iterator[Move]:
