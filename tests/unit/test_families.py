@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from simulation import (
     DT,
     behind_averages,
@@ -229,8 +230,8 @@ def test_a_smooth_law_in_pieces_is_right_where_the_pieces_end():
     a = v / T * 30 * fine**2 * (1 - fine) ** 2
     for f, zeta in [*MODES, (211.0, 0.0)]:
         pole = mode_poles([f], [zeta])[0]
-        up = np.trapezoid(a * np.exp(pole * (profile.total[0] - fine * T)), fine * T)
-        down = np.trapezoid(-a * np.exp(pole * (T - fine * T)), fine * T)
+        up = trapezoid(a * np.exp(pole * (profile.total[0] - fine * T)), fine * T)
+        down = trapezoid(-a * np.exp(pole * (T - fine * T)), fine * T)
         mine = profiles_response(profile, np.array([pole]))[0, 0]
         assert abs(mine - up - down) < (1e-4 if f > 100 else 3e-6) * v
 
