@@ -20,6 +20,7 @@ from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
+from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
@@ -31,6 +32,7 @@ from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.rewrite.control_settings import PARAMETERS, plan_settings, write_settings
 from gcodejerk.rewrite.expanded import (
     hunks,
     in_original,
@@ -39,7 +41,7 @@ from gcodejerk.rewrite.expanded import (
 )
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes
-from gcodejerk.rewrite.result import Result
+from gcodejerk.rewrite.result import Result, reported_profiles
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.stamp import stamp_text
 from gcodejerk.verification import Verification, require, verify_files
@@ -164,7 +166,10 @@ def process_file(
     Result
         Without `output` and `beside`.
     """
-    emitter = load_controller(settings.controller or machine.controller).in_form(settings.form)
+    emitter = load_controller(settings.controller or machine.controller)
+    if settings.form == PARAMETERS:
+        return _set(source, target, machine, settings, name, emitter, progress or silent)
+    emitter = emitter.in_form(settings.form)
     if emitter.beside and target is not None and beside is None:
         raise EmitError(
             f"controller {emitter.name} writes two files: the program and its {emitter.beside}",
@@ -211,7 +216,7 @@ def _process(
     writer = Rewriter(
         source, target, program, emitter,
         Options(settings.comments, find_dialect(program.dialect)),
-        stamp_text(machine, _chosen(machine, settings, emitter)),
+        stamp_text(machine, _chosen(machine, settings, emitter.name, emitter.form)),
         beside,
         guarded=machine.controller_options.override_guard,
     )  # fmt: skip
@@ -247,6 +252,62 @@ def _process(
             *band_notes(plans, collected),
             *emitter.notes(program.rapids, plans),
         ),
+    )
+
+
+def _set(
+    source: BinaryIO,
+    target: BinaryIO | None,
+    machine: Machine,
+    settings: Settings,
+    name: str,
+    emitter: Controller,
+    report: Progress,
+) -> Result:
+    """Tune the control for a program, and put the lines that set it into it."""
+    sheets = require_way(emitter, emitter.name)
+    if settings.expand_cycles:
+        raise EmitError(
+            "--expand-cycles has nothing to do with --as parameters: no block is rewritten",
+            "leave --expand-cycles out",
+        )
+    program = _read(source, machine, settings, name, emitter, report, None)
+    inserted = plan_settings(source, program, machine, sheets)
+    kept = REASONS.index(Reason.CONTROL_SET if inserted.lines else Reason.NOT_BETTER)
+    before = program.rapids.reason
+    still = replace(program.rapids, reason=np.where(before == CERTAIN, kept, before))
+    plans = plan_rapids(still, machine, only_gains=True)
+    plans.reason[plans.planned] = kept
+    edits, differences = np.empty((0, 3), dtype=np.int64), np.empty((0, 5), dtype=np.int64)
+    verification = None
+    if target is not None:
+        stamp = stamp_text(machine, _chosen(machine, settings, emitter.name, PARAMETERS))
+        edits, differences = write_settings(source, target, program, inserted, stamp, emitter.name)
+        if settings.verify:
+            verification = _verified(
+                source, target, machine, settings, program, plans, emitter, None, None
+            )
+    residual = np.full((len(plans), len(plans.modes.poles)), np.nan)
+    return Result(
+        program=program,
+        plans=plans,
+        controller=emitter.name,
+        profile=settings.profile or machine.design.profile,
+        form=PARAMETERS,
+        residual=residual,
+        conventional_residual=residual,
+        deviation=np.zeros(len(plans)),
+        rest=left_alone(program.rapids, plans),
+        verification=verification,
+        edits=edits,
+        hunks=differences,
+        expansion=None,
+        notes=(
+            *operator_notes(emitter, machine, plans),
+            *inserted.settings.notes,
+            *program_notes(program, None, emitter),
+        ),
+        settings=inserted.settings,
     )
 
 
@@ -312,9 +373,9 @@ def _plan(
     return plans
 
 
-def _chosen(machine: Machine, settings: Settings, emitter: Controller) -> list[str]:
+def _chosen(machine: Machine, settings: Settings, name: str, form: str) -> list[str]:
     """The user's choices that shape the output, for the stamp."""
-    chosen = [emitter.name, emitter.form, settings.profile or machine.design.profile]
+    chosen = [name, form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
     return chosen + ([f"dialect {settings.dialect}"] if settings.dialect is not None else [])
 
@@ -367,7 +428,7 @@ def _verified(
             names=(program.name, f"the output for {program.name}"),
             dialect=program.dialect,
             table=not emitter.in_place,
-            reported=_reported(program, plans) if emitter.play is Play.ALIGNED else None,
+            reported=reported_profiles(program, plans) if emitter.play is Play.ALIGNED else None,
             beside=beside if emitter.beside else None,
         )
         require(lines_in_original(found, lines))
@@ -376,19 +437,6 @@ def _verified(
             raise changed_error(program.name) from None
         raise
     return found
-
-
-def _reported(program: Program, plans: Plans) -> dict[int, Array]:
-    """The profiles as reports say them: durations and jerks along the path, by line."""
-    out = {}
-    for move in np.flatnonzero(plans.planned).tolist():
-        rows = plans.profiles_of(move)
-        if len(rows) == 1:
-            segments = slice(*plans.profiles.first[rows.start : rows.start + 2].tolist())
-            jerk = plans.profiles.jerk[segments] * plans.length[move]
-            line = int(program.rapids.line[move])
-            out[line] = np.stack([plans.profiles.duration[segments], jerk], axis=1)
-    return out
 
 
 def silent(step: str, done: int, total: int) -> None:

@@ -28,6 +28,7 @@ from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
 from gcodejerk.verification.samples import SampleReader
 from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.settings import check_settings, settings_note
 from gcodejerk.verification.table import TableReader
 
 MOST = 100
@@ -185,6 +186,11 @@ def verify_files(
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
+    control = None if table else settings_note(processed)
+    if control is not None:
+        windows = Window(original), Window(processed)
+        kept, places = check_settings(*windows, program, machine, control, found)
+        return Verification(len(program.rapids), 0, kept, found.sorted(), names, places=places)
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
     elif machine.controller == CONTROLLER:

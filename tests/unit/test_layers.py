@@ -71,7 +71,7 @@ ROOMS = {
     findings
  <- bytes
  <- physics | second_reading
- <- cycles | table samples | reported
+ <- cycles | table samples settings | reported
  <- proof
 """),
 }
