@@ -1,6 +1,7 @@
 """Options of the test run."""
 
 import os
+import shutil
 import tempfile
 
 from hypothesis import settings
@@ -14,9 +15,14 @@ def pytest_configure(config):
     settings.register_profile("untimed", deadline=None)
     settings.load_profile("untimed")
     # No test reads or fills the user's own cache of solutions.
-    os.environ["GCODEJERK_CACHE"] = tempfile.mkdtemp(prefix="gcodejerk-cache-")
+    config.cache_folder = tempfile.mkdtemp(prefix="gcodejerk-cache-")
+    os.environ["GCODEJERK_CACHE"] = config.cache_folder
     # The first command that tests start compiles our modules; hundreds after it need not.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+def pytest_unconfigure(config):
+    shutil.rmtree(config.cache_folder, ignore_errors=True)
 
 
 def pytest_addoption(parser):

@@ -250,11 +250,18 @@ def same_file(one: str, other: str) -> bool:
         return os.path.abspath(one) == os.path.abspath(other)
 
 
+_ROWS = re.compile(
+    rb'(?:(?://|REM|#|!|\() ?gcodejerk \S+ rows for |\{"gcodejerk": "[^"]+", "rows": )',
+    re.IGNORECASE,
+)
+
+
 def is_ours(path: str) -> bool:
-    """Whether a file carries gcodejerk's stamp, or is one of its tables or files of samples."""
+    """Whether a file carries gcodejerk's stamp, or is a table, or a file of rows or samples."""
     head = _head(path)
     tables = (b"block,t,", b"gcodejerk streams ")
-    return head.startswith(tables) or _STAMP.search(head) is not None
+    ours = head.startswith(tables) or _ROWS.match(head) or _STAMP.search(head)
+    return bool(ours)
 
 
 def is_report(path: str) -> bool:

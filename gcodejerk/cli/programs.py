@@ -197,7 +197,8 @@ def inspect(
 def verify(
     original: Annotated[str, typer.Argument(metavar="ORIGINAL", help="the program as it was")],
     processed: Annotated[
-        str, typer.Argument(metavar="PROCESSED", help="the rewritten program, or its .csv table")
+        str,
+        typer.Argument(metavar="PROCESSED", help="the rewritten program, or its table or rows"),
     ],
     machine: MachineOption,
     profile: ProfileOption = None,
@@ -222,20 +223,24 @@ def verify(
     from gcodejerk.verification.bytes.stamp import read_stamp
     from gcodejerk.verification.proof import beside_of
     from gcodejerk.verification.reported import read_reported
+    from gcodejerk.verification.rows.files import rows_format
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
     described = load_machine(machine, original)
-    table = processed.lower().endswith(".csv")
-    if table and expand_cycles:
-        raise typer.BadParameter("--expand-cycles: a table of streams has no cycles written out")
     if report is not None and expand_cycles:
         raise typer.BadParameter("--report: its lines are the original's, before its cycles")
+    no_cycles = "--expand-cycles: a table of streams has no cycles written out"
+    if processed.lower().endswith(".csv") and expand_cycles:
+        raise typer.BadParameter(no_cycles)
     reported = None if report is None else read_reported(report)
     written = 0
     with ExitStack() as files:
         one, other = (files.enter_context(open_input(name)) for name in (original, processed))
         names = (original, processed)
+        table = processed.lower().endswith(".csv") or rows_format(other) is not None
+        if table and expand_cycles:
+            raise typer.BadParameter(no_cycles)
         # What the user does not say again, the stamp says.
         stamp = read_stamp(other, described)
         if stamp is not None and not stamp.known:

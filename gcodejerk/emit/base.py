@@ -27,6 +27,8 @@ from gcodejerk.nc import DIALECTS, Dialect, Program, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.told import RowFormat
 from gcodejerk.units import MM_PER_INCH
 
 GROUP = "gcodejerk.controllers"
@@ -84,6 +86,8 @@ class Controller(ABC):
     """What is added to the output's name for a file of samples that belongs to it; empty: none."""
     longest: int | None = None
     """Samples of the longest move that it can write."""
+    between: bytes = b""
+    """What stands between two moves of a file of its own."""
 
     def in_form(self, form: str) -> Controller:
         """The emitter for one of its forms.
@@ -100,6 +104,10 @@ class Controller(ABC):
                 f"it can write: {', '.join(names)}",
             )
         return self
+
+    def require(self, machine: Machine) -> None:
+        """Refuse a machine file that does not say what the text needs, before anything is read."""
+        return
 
     def opening(self, newline: bytes, sums: tuple[int, int] = (0, 0)) -> bytes:
         """Lines below the stamp, of a length that the sums of the file beside do not change."""
@@ -145,6 +153,22 @@ class Controller(ABC):
     def header(self, machine: Machine) -> bytes:
         """First lines of a file of its own; empty for streams in place."""
         return b""
+
+    def footer(self, digest: str) -> bytes:
+        """Last lines of a file of its own, from the sum of all in front in hexadecimal digits."""
+        return b""
+
+    def end_steps(self, machine: Machine) -> NDArray[np.float64] | None:
+        """Steps (9,) in which points begin and end too [mm] or [deg]; None: as the program says."""
+        return None
+
+    def row_format(self, machine: Machine) -> RowFormat:
+        """Ticks and steps of rows, for a controller that plays cubics (`Play.CUBIC`)."""
+        raise NotImplementedError(f"controller {self.name} writes no rows")
+
+    def render_rows(self, rows: Rows, rapids: Rapids, blocks: Sequence[bytes]) -> list[bytes]:
+        """Text of each move of a batch of rows, for such a controller."""
+        raise NotImplementedError(f"controller {self.name} writes no rows")
 
     @abstractmethod
     def render(

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Controller, Form, Options, decimal_step, step_sizes
+from gcodejerk.emit.base import Controller, Options, decimal_step, step_sizes
 from gcodejerk.emit.number_format import Column, format_lines
+from gcodejerk.emit.points.table import PvtTableController
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
@@ -29,7 +30,11 @@ class CsvController(Controller):
     name = "csv"
     in_place = False
     suffix = ".csv"
-    forms = (Form("stream", "measured", "read back and compared by the project's tests"),)
+    forms = PvtTableController.forms
+
+    def in_form(self, form: str) -> Controller:
+        """The emitter for points, or that for rows."""
+        return PvtTableController() if form == "pvt" else super().in_form(form)
 
     def stride(self, interval: float) -> int:
         """Every interval is written."""

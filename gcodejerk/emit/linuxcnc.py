@@ -68,8 +68,8 @@ class LinuxcncController(LinuxcncSettings, Controller):
             "stream",
             "measured",
             "LinuxCNC 2.9: played within 0.01 mm, what is left within a hundredth of today's; "
-            "needs ARC_BLEND_ENABLE = 1 and MAX_ACCELERATION 1.05 to 4 times the axis's "
-            "limit.acceleration",
+            "needs ARC_BLEND_ENABLE = 1 and MAX_ACCELERATION 1.05 times the axis's "
+            "limit.acceleration (more: state it in controller_options)",
         ),
         Form("parameters", "documented", "MAX_JERK of 2.10, MAX_ACCELERATION of 2.9: the INI file"),
     )

@@ -255,6 +255,16 @@ class ControllerOptions:
     """Axis -> its MAX_ACCELERATION when streams run. [mm/s^2] or [deg/s^2]"""
     override_guard: bool = False
     """Streams run at 100 % of all overrides only."""
+    counts_per_unit: Mapping[str, float] = field(default_factory=dict, hash=False)
+    """Axis -> counts of its drive. [1/mm] or [1/deg]"""
+    axis_names: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Axis -> what the controller calls it."""
+    isx90: float | None = None
+    """PMAC: unit of time of its velocities. [ms]"""
+    fanuc_distance: str | None = None
+    """Fanuc 15i: ``general`` or ``special``."""
+    confirmed: tuple[str, ...] = ()
+    """Unverified facts that the user has seen in a manual."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,8 +90,11 @@ class Groups:
                 total = float(self.judge.times(row)[0] @ self.judge.moves.count)
                 value = float(goal_value(self.judge.worst(row), self.judge.moves, self.goal)[0])
                 if total <= budget * SAME:
-                    usable.append((value, way))
-        return min(usable, key=lambda pair: pair[0])[1] if usable else None
+                    usable.append((value, total, way))
+        if not usable:
+            return None
+        least = min(value for value, _, _ in usable) * (1.0 + GAINED)
+        return min((one for one in usable if one[0] <= least), key=lambda one: one[1])[2]
 
     def _starts(self) -> list[Array]:
         """Today's numbers; and where several axes have filters, the first kind for all of them."""
@@ -156,13 +159,17 @@ class Groups:
         if combined is None:
             return None
         written = combined
-        for _ in range(CYCLES - 1):
-            for k in self._worst_first(written):
-                index = concerned(self.judge.scheme, self.judge.moves, self.groups[k])
-                part = self.judge.take(index)
-                others = self._total(written) - self._total(written, part)
-                found = self._search(part, written, self.groups[k], budget - others)
-                written = written if found is None else found.written
+        for _ in range(CYCLES * len(self.groups)):
+            k = self._worst(written)
+            index = concerned(self.judge.scheme, self.judge.moves, self.groups[k])
+            part = self.judge.take(index)
+            others = self._total(written) - self._total(written, part)
+            found = self._search(part, written, self.groups[k], budget - others)
+            own = goal_value(part.worst(written[np.newaxis]), part.moves, self.goal)[0]
+            # Time that buys nothing is not taken.
+            if found is None or found.value > own * (1.0 - GAINED):
+                break
+            written = found.written
         return written, False
 
     def _combined(self, value: float) -> Array | None:
@@ -176,12 +183,12 @@ class Groups:
             row[list(group)] = fastest.written[list(group)]
         return row
 
-    def _worst_first(self, written: Array) -> list[int]:
-        """The groups, the one whose moves leave most first."""
+    def _worst(self, written: Array) -> int:
+        """The group whose moves leave most."""
         worst = self.judge.worst(written[np.newaxis])[0]
         scheme, moves = self.judge.scheme, self.judge.moves
         left = [worst[concerned(scheme, moves, group)].max() for group in self.groups]
-        return [int(k) for k in np.argsort(left)[::-1]]
+        return int(np.argmax(left))
 
     def _total(self, written: Array, judge: Judge | None = None) -> float:
         """Time of all moves, or of some [s]."""

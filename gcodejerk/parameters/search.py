@@ -243,8 +243,9 @@ def representatives(moves: Moves, weight: Array | None = None) -> tuple[NDArray[
         if len(inside) and count[inside].any():
             index.append(inside[len(inside) // 2])
             weights.append(count[inside].sum())
-    out = np.array(weights)
-    return np.array(index), out if weight is None else out / out.sum()
+    rising = np.argsort(index)
+    out = np.array(weights)[rising]
+    return np.array(index)[rising], out if weight is None else out / out.sum()
 
 
 def search(

@@ -107,7 +107,7 @@ class Tuning:
     as_set, chosen : Outcome
         What the control's law does with either.
     curve : tuple of Point
-        By rising time; the choice is among them.
+        By rising time; the choice is among them, and no other leaves more in more time.
     spread : ndarray, shape (3, r)
         The goal with all frequencies off by `SPREAD`: today, as set, chosen. [mm]
     fits : bool
@@ -234,6 +234,14 @@ def tune(
         if way is not None:
             one = _at(judge, way[0], goal)
             points.append(Point(share, one.total, one.value, way[0]))
+    points = [
+        point
+        for point in points
+        if point.share == time
+        or not any(
+            o.total <= point.total and o.value <= point.value for o in points if o is not point
+        )
+    ]
     off = [Judge(scheme, rows.off_by(r)) for r in SPREAD.tolist()]
     spread = [
         goal_value(np.array([one.worst(row[np.newaxis])[0] for one in off]), moves, goal)

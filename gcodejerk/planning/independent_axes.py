@@ -7,11 +7,13 @@ the path differs a little from the one that the control itself takes. This modul
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.motion import sample_profiles
+from gcodejerk.motion import Grid, sample_profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.plans import Plans
@@ -38,7 +40,7 @@ def arrivals(plans: Plans, move: int) -> dict[str, tuple[float, float]]:
     out = {}
     for profile in plans.profiles_of(move):
         axis = int(np.argmax(plans.share[profile] != 0.0))
-        planned = float(plans.profile_counts[profile]) * plans.machine.interval
+        planned = float(plans.profile_times[profile])
         out[AXES[axis]] = (planned, float(plans.conventional.total[profile]))
     return out
 
@@ -58,25 +60,30 @@ def path_deviation(batch: Batch) -> Array:
         since only the part of that path is searched that is near in time. 0 where not more than
         one linear axis moves. [mm]
     """
-    plans, moves = batch.plans, batch.moves
+    moves, start = batch.moves, batch.number_format.start
+    return deviation_of(batch.plans, moves, batch.grid, batch.exact, start)
+
+
+def deviation_of(
+    plans: Plans, moves: NDArray[np.int64], grid: Grid, exact: Mapping[int, Array], begin: Array
+) -> Array:
+    """The same of moves whose positions are known at the knots of a grid; starts (b, 9) [mm]."""
     rows = np.concatenate([np.array(plans.profiles_of(int(move))) for move in moves])
     row_of = np.searchsorted(moves, plans.move[rows])
-    linear = [a for a in batch.exact if not _rotary(plans, a)]
+    linear = [a for a in exact if not _rotary(plans, a)]
     out = np.zeros(len(moves))
     if plans.machine.positioning == "linear" or len(linear) < 2:
         return out
     unit, _ = sample_profiles(
-        plans.conventional.take(rows), batch.grid.knots[row_of], plans.machine.interval
+        plans.conventional.take(rows), grid.knots[row_of], plans.machine.interval
     )
     planned, own = (np.zeros((len(moves), unit.shape[1], len(linear))) for _ in range(2))
     for column, axis in enumerate(linear):
         share = plans.share[rows, axis]
         used = share != 0.0
         np.add.at(own[..., column], row_of[used], unit[used] * share[used, np.newaxis])
-        start = np.where(
-            plans.displacement[moves, axis] != 0.0, batch.number_format.start[:, axis], 0.0
-        )
-        planned[..., column] = batch.exact[axis] - start[:, np.newaxis]
+        start = np.where(plans.displacement[moves, axis] != 0.0, begin[:, axis], 0.0)
+        planned[..., column] = exact[axis] - start[:, np.newaxis]
     result: Array = _distances(planned, own).max(axis=1, initial=0.0)
     return result
 

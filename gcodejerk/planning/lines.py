@@ -47,6 +47,8 @@ class Play(Enum):
     ALIGNED = "speeds that are straight lines between points on servo periods, filtered"
     TABLE = "straight lines between points, each at its own time"
     HELD = "straight lines between points, each at the F of its block"
+    INCREMENTS = "straight lines between points, and a count in every interval"
+    CUBIC = "cubics between rows of position and velocity"
     SCALED = "speeds at the points, added up by LinuxCNC's planner and smoothed by its filter"
 
 

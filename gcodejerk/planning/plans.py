@@ -132,6 +132,8 @@ class Plans:
         of `shortest` hardly more than the tolerance; NaN: anything. [mm]
     has_to_gain : bool
         It is the control's own rapid.
+    lasting : ndarray, shape (n,), or None
+        What is written lasts so long, where that is not whole intervals. [s]
     """
 
     machine: Machine
@@ -150,6 +152,7 @@ class Plans:
     worst_in_band: Array
     most_in_band: Array
     has_to_gain: bool
+    lasting: Array | None = None
 
     def __len__(self) -> int:
         return len(self.reason)
@@ -163,6 +166,20 @@ class Plans:
         """Which moves are planned, shape (n,)."""
         planned: NDArray[np.bool_] = self.reason == CERTAIN
         return planned
+
+    @property
+    def times(self) -> Array:
+        """How long each move lasts as written, 0 where it is not planned, shape (n,) [s]."""
+        if self.lasting is not None:
+            return np.where(self.planned, self.lasting, 0.0)
+        return np.asarray(self.counts * self.machine.interval, dtype=np.float64)
+
+    @property
+    def profile_times(self) -> Array:
+        """How long each profile lasts, shape (l,) [s]."""
+        if self.lasting is not None:
+            return self.profiles.total
+        return np.asarray(self.profile_counts * self.machine.interval, dtype=np.float64)
 
     def excited(self, move: int) -> list[int]:
         """The entries of the modes that a move excites."""

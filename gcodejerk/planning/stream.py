@@ -30,6 +30,8 @@ from gcodejerk.planning.lines import (
     smoothed,
 )
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.pvt import Rows
+from gcodejerk.planning.records import without_pauses
 from gcodejerk.reasons import REASONS, Reason
 
 BATCH_SAMPLES = 400_000
@@ -96,6 +98,7 @@ def _make_batch(
         batch = aligned_batch(sampler, stride)
     else:
         batch = _Maker(sampler, stride, play).batch()
+        batch = without_pauses(batch) if play is Play.INCREMENTS else batch
     worse = batch.worst_in_band > plans.most_in_band[moves]
     plans.reason[moves[worse]] = REASONS.index(Reason.NOT_BETTER)
     plans.reason[moves[batch.unplayable]] = REASONS.index(Reason.NOT_PLAYED)
@@ -209,7 +212,7 @@ class Residuals:
         self.residual = np.full(shape, np.nan)
         self.conventional = np.full(shape, np.nan)
 
-    def add(self, batch: Batch) -> None:
+    def add(self, batch: Batch | Rows) -> None:
         """Note one batch."""
         self.residual[batch.moves] = batch.residual
         self.conventional[batch.moves] = batch.conventional_residual

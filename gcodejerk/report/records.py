@@ -56,6 +56,9 @@ class Records:
         usual = whole_intervals(plans.conventional_time, interval)
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
         self.extension = extra * interval
+        if plans.lasting is not None:
+            more = plans.times - usual * interval
+            self.extension = np.where(plans.planned & (more > 1e-9), more, 0.0)
         self.rest = rest
         self.oscillators = (residual, conventional)
         self.peaks = (
@@ -74,7 +77,7 @@ class Records:
             "planned": int(np.count_nonzero(planned)),
             "left": int(np.count_nonzero(~planned)),
             "left_by_reason": {str(REASONS[codes[k]]): int(counts[k]) for k in order},
-            "rapid_time": number(float(plans.counts.sum()) * plans.machine.interval),
+            "rapid_time": number(_sum(plans)),
             "conventional_time": number(float(plans.conventional_time[planned].sum())),
             "extended": int(np.count_nonzero(self.extension)),
             "worst_residual": _largest(self.residual[planned]),
@@ -92,7 +95,7 @@ class Records:
             np.where(planned[:, np.newaxis], amplitude, left) for amplitude in self.oscillators
         )
         modes, tolerance = plans.modes, plans.machine.design.tolerance
-        motion = float(plans.counts.sum()) * plans.machine.interval
+        motion = _sum(plans)
         today = float(plans.conventional_time[planned].sum())
         out: Record = {
             "worst_residual_share": _share(self.residual[planned], self.conventional[planned]),
@@ -127,7 +130,7 @@ class Records:
         if planned:
             of_move = plans.profiles_of(row)
             record |= {
-                "time": number(float(plans.counts[row]) * plans.machine.interval),
+                "time": number(float(plans.times[row])),
                 "extension": number(float(self.extension[row])),
                 "profile": plans.designed,
                 "segments": self._segments(row, of_move),
@@ -149,16 +152,15 @@ class Records:
     def _segments(self, row: int, of_move: range) -> Any:
         """Segments of the common profile, or of each axis's."""
         plans = self.plans
-        interval = plans.machine.interval
         if plans.machine.positioning == "linear":
-            total = float(plans.counts[row]) * interval
+            total = float(plans.times[row])
             return _scaled(self.profiles.segments(of_move.start), float(plans.length[row]), total)
         out: Record = {}
         for k in of_move:
             axis = int(np.argmax(plans.share[k] != 0.0))
             length, total = (
                 abs(float(plans.share[k, axis])),
-                float(plans.profile_counts[k]) * interval,
+                float(plans.profile_times[k]),
             )
             out[AXES[axis]] = _scaled(self.profiles.segments(k), length, total)
         return out
@@ -401,6 +403,13 @@ def _positions(rapids: Rapids, position: Any, row: int) -> Record:
     """Positions of the axes that the block names, None where unknown."""
     words = int(rapids.words[row])
     return {axis: number(float(position[k])) for k, axis in enumerate(AXES) if words >> k & 1}
+
+
+def _sum(plans: Plans) -> float:
+    """How long all planned moves last together [s]."""
+    if plans.lasting is not None:
+        return float(plans.times.sum())
+    return float(plans.counts.sum()) * plans.machine.interval
 
 
 def _largest(residual: Array) -> float | None:

@@ -12,6 +12,9 @@ from gcodejerk.nc import Program
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Residuals
 
+LONGER = 1e-6
+"""A rapid that lasts so much longer is worth a word. [s]"""
+
 
 def operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[str]:
     """What comes first: for whoever stands at the machine, then for whoever reads the figures."""
@@ -65,6 +68,20 @@ def band_notes(plans: Plans, residuals: Residuals) -> list[str]:
         f"{rapids} more than today's at exactly the file's frequencies, and less at the worst "
         f"within {band} of them, which all are designed for (design.band)"
     ]
+
+
+def tick_notes(plans: Plans) -> list[str]:
+    """That some rapids last longer than whole intervals, since the control counts in ticks."""
+    if plans.lasting is None:
+        return []
+    more = plans.lasting - plans.counts * plans.machine.interval
+    longer = plans.planned & (more > LONGER)
+    count = int(np.count_nonzero(longer))
+    if not count:
+        return []
+    rapids = "1 rapid lasts" if count == 1 else f"{count} rapids last"
+    most = 1e3 * float(more[longer].max())
+    return [f"{rapids} up to {most:.3g} ms longer than planned, in whole ticks of the control"]
 
 
 def _finding(line: int | None, message: str) -> str:

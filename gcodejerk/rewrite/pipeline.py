@@ -10,7 +10,7 @@ Rule 2: nothing is given back that `verify` has not accepted (unless the user sw
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import BinaryIO
 
@@ -25,14 +25,17 @@ from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
+from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.pvt import Rows, make_rows
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
+from gcodejerk.planning.told import RowFormat, in_steps, told_in
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
-from gcodejerk.rewrite.control_settings import PARAMETERS, plan_settings, write_settings
+from gcodejerk.rewrite.control_settings import PARAMETERS
 from gcodejerk.rewrite.expanded import (
     hunks,
     in_original,
@@ -40,9 +43,10 @@ from gcodejerk.rewrite.expanded import (
     written_out,
 )
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
-from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes
+from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
 from gcodejerk.rewrite.result import Result, reported_profiles
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
+from gcodejerk.rewrite.set_control import set_control
 from gcodejerk.rewrite.stamp import stamp_text
 from gcodejerk.verification import Verification, require, verify_files
 
@@ -170,6 +174,7 @@ def process_file(
     if settings.form == PARAMETERS:
         return _set(source, target, machine, settings, name, emitter, progress or silent)
     emitter = emitter.in_form(settings.form)
+    emitter.require(machine)
     if emitter.beside and target is not None and beside is None:
         raise EmitError(
             f"controller {emitter.name} writes two files: the program and its {emitter.beside}",
@@ -213,6 +218,13 @@ def _process(
     lines = None if expansion is None else expansion.map
     program = _read(source, machine, settings, name, emitter, report, lines)
     plans = _plan(source, program, machine, settings, emitter, report)
+    peaks = np.zeros((3, len(plans)))
+    form = emitter.row_format(machine) if emitter.play is Play.CUBIC else None
+    steps = emitter.end_steps(machine)
+    if steps is not None:
+        plans = in_steps(plans, program.rapids, steps)
+    if form is not None:
+        plans, peaks = told_in(plans, program.rapids, form)
     writer = Rewriter(
         source, target, program, emitter,
         Options(settings.comments, find_dialect(program.dialect)),
@@ -220,7 +232,9 @@ def _process(
         beside,
         guarded=machine.controller_options.override_guard,
     )  # fmt: skip
-    collected, deviation = _write(writer, plans, machine, report)
+    design = replace(machine.design, profile=settings.profile or machine.design.profile)
+    designed = replace(machine, design=design)
+    collected, deviation = _write(writer, plans, designed, report, form, peaks)
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
@@ -249,6 +263,7 @@ def _process(
             *operator_notes(emitter, machine, plans),
             *program_notes(program, expansion, emitter),
             *dogleg_notes(plans, deviation),
+            *tick_notes(plans),
             *band_notes(plans, collected),
             *emitter.notes(program.rapids, plans),
         ),
@@ -272,43 +287,12 @@ def _set(
             "leave --expand-cycles out",
         )
     program = _read(source, machine, settings, name, emitter, report, None)
-    inserted = plan_settings(source, program, machine, sheets)
-    kept = REASONS.index(Reason.CONTROL_SET if inserted.lines else Reason.NOT_BETTER)
-    before = program.rapids.reason
-    still = replace(program.rapids, reason=np.where(before == CERTAIN, kept, before))
-    plans = plan_rapids(still, machine, only_gains=True)
-    plans.reason[plans.planned] = kept
-    edits, differences = np.empty((0, 3), dtype=np.int64), np.empty((0, 5), dtype=np.int64)
-    verification = None
-    if target is not None:
-        stamp = stamp_text(machine, _chosen(machine, settings, emitter.name, PARAMETERS))
-        edits, differences = write_settings(source, target, program, inserted, stamp, emitter.name)
-        if settings.verify:
-            verification = _verified(
-                source, target, machine, settings, program, plans, emitter, None, None
-            )
-    residual = np.full((len(plans), len(plans.modes.poles)), np.nan)
-    return Result(
-        program=program,
-        plans=plans,
-        controller=emitter.name,
-        profile=settings.profile or machine.design.profile,
-        form=PARAMETERS,
-        residual=residual,
-        conventional_residual=residual,
-        deviation=np.zeros(len(plans)),
-        rest=left_alone(program.rapids, plans),
-        verification=verification,
-        edits=edits,
-        hunks=differences,
-        expansion=None,
-        notes=(
-            *operator_notes(emitter, machine, plans),
-            *inserted.settings.notes,
-            *program_notes(program, None, emitter),
-        ),
-        settings=inserted.settings,
-    )
+    chosen = _chosen(machine, settings, emitter.name, PARAMETERS)
+    result = set_control(source, target, program, machine, emitter, sheets, chosen)
+    if target is None or not settings.verify:
+        return result
+    found = _verified(source, target, machine, settings, program, result.plans, emitter, None, None)
+    return replace(result, verification=found)
 
 
 def _read(
@@ -381,7 +365,12 @@ def _chosen(machine: Machine, settings: Settings, name: str, form: str) -> list[
 
 
 def _write(
-    writer: Rewriter, plans: Plans, machine: Machine, report: Progress
+    writer: Rewriter,
+    plans: Plans,
+    machine: Machine,
+    report: Progress,
+    form: RowFormat | None,
+    peaks: Array,
 ) -> tuple[Residuals, Array]:
     """Write all streams; what they leave, and how far each path is from the control's own [mm]."""
     emitter, dialect = writer.emitter, writer.options.dialect
@@ -389,15 +378,22 @@ def _write(
     deviation = np.zeros(len(plans))
     writer.write_header(machine)
     done = 0
-    for window in make_streams(
-        plans,
-        emitter.number_format(writer.program.rapids, machine, dialect),
-        emitter.stride(machine.interval),
-        emitter.play,
-    ):
+    windows: Iterator[list[Batch]] | Iterator[list[Rows]]
+    if form is not None:
+        windows = make_rows(plans, writer.program.rapids, form, peaks)
+    else:
+        windows = make_streams(
+            plans,
+            emitter.number_format(writer.program.rapids, machine, dialect),
+            emitter.stride(machine.interval),
+            emitter.play,
+        )
+    for window in windows:
         for batch in window:
             collected.add(batch)
-            deviation[batch.moves] = path_deviation(batch)
+            deviation[batch.moves] = (
+                batch.deviation() if isinstance(batch, Rows) else path_deviation(batch)
+            )
         writer.write(window)
         done += sum(map(len, window))
         report("writing", done, int(np.count_nonzero(plans.planned)))

@@ -62,7 +62,7 @@ def rapid_results(
     -------
     tuple of RapidResult, length n
     """
-    interval = plans.machine.interval
+    times = plans.times
     # A spectrum's oscillators count together, as in reports.
     worst, today = (
         np.max(plans.modes.grouped(each), axis=1, initial=0.0) for each in (residual, conventional)
@@ -79,7 +79,7 @@ def rapid_results(
                 reason=None if rewritten else str(REASONS[plans.reason[row]]),
                 displacement={AXES[k]: float(plans.displacement[row, k]) for k in moved},
                 profile=plans.designed if rewritten else None,
-                time=float(plans.counts[row]) * interval if rewritten else None,
+                time=float(times[row]) if rewritten else None,
                 conventional_time=usual if usual > 0.0 else None,
                 residual=float(worst[row]) if rewritten else None,
                 conventional_residual=float(today[row]) if rewritten else None,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+from collections.abc import Sequence
 from typing import BinaryIO
 
 from gcodejerk.advice import stamp_note
@@ -17,6 +18,7 @@ from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program
 from gcodejerk.planning.batch import Batch
+from gcodejerk.planning.pvt import Rows
 from gcodejerk.rewrite.expanded import TERMINATOR_LENGTH
 from gcodejerk.rewrite.stamp import SUM_DIGITS, SUM_MARK, SUM_UNKNOWN, SUM_WITHIN
 
@@ -89,16 +91,17 @@ class Rewriter:
         self.written = hashlib.blake2b(digest_size=SUM_DIGITS // 2)
         self.sum_at: int | None = None
         self.at = 0
+        self.between = b""
         self.edits: list[tuple[int, int, int]] = []
         source.seek(0)
 
     def write_header(self, machine: Machine) -> None:
         """Write the first lines of a file of its own."""
         if self.target is not None:
-            self.target.write(self.emitter.header(machine))
+            self._sign(self.emitter.header(machine))
         self._put_beside(self.emitter.beside_header(machine))
 
-    def write(self, window: list[Batch]) -> None:
+    def write(self, window: Sequence[Batch | Rows]) -> None:
         """Write the streams of a window; windows come in the order of the file."""
         if self.target is None:
             return
@@ -110,16 +113,20 @@ class Rewriter:
         rapids = self.program.rapids
         for batch in window:
             blocks = [self._block(move) for move in batch.moves]
-            new = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
+            if isinstance(batch, Rows):
+                new = self.emitter.render_rows(batch, rapids, blocks)
+            else:
+                new = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
             texts.update(zip(batch.moves.tolist(), new, strict=True))
-            if self.beside is not None:
+            if self.beside is not None and isinstance(batch, Batch):
                 samples = self.emitter.render_beside(batch, rapids)
                 aside.update(zip(batch.moves.tolist(), samples, strict=True))
         self.source.seek(self.at)
         for move in sorted(texts):
             self._copy(int(rapids.begin[move]))
             self._read(int(rapids.end[move] + TERMINATOR_LENGTH[rapids.terminator[move]]))
-            self._put(texts[move], move)
+            self._put(self.between + texts[move], move)
+            self.between = self.emitter.between
             self._put_beside(aside.get(move, b""))
 
     def _put_beside(self, text: bytes) -> None:
@@ -143,6 +150,12 @@ class Rewriter:
         if self.emitter.in_place:
             self.edits.append((begin, begin + len(text), move))
 
+    def _sign(self, text: bytes) -> None:
+        """Write the head of a file of its own; in place there is none."""
+        assert self.target is not None
+        self.target.write(text)
+        self.written.update(text)
+
     def _put_stamp(self) -> None:
         """Write the stamp, its sum to be filled in at the end."""
         assert self.target is not None
@@ -159,6 +172,7 @@ class Rewriter:
         if self.target is None:
             return
         self._copy(self.program.size)
+        self.target.write(self.emitter.footer(self.written.hexdigest()))
         if self.source.read(1) or self.digest.digest() != self.program.digest:
             raise changed_error(self.program.name)
         if self.beside is not None and self.opening_at is not None:

@@ -26,6 +26,8 @@ from gcodejerk.verification.findings import Findings, Kind, Verification
 from gcodejerk.verification.physics.aligned import Reported, check_aligned, in_own_steps
 from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
+from gcodejerk.verification.rows.files import RowsFile, rows_format
+from gcodejerk.verification.rows.judge import judge_rows
 from gcodejerk.verification.samples import SampleReader
 from gcodejerk.verification.second_reading.agreement import confirm
 from gcodejerk.verification.settings import check_settings, settings_note
@@ -106,9 +108,11 @@ def verify(
         if machine.controller == CONTROLLER:
             beside = beside_of(processed) if beside is None else beside
             samples = None if beside is None else stack.enter_context(_opened(beside))
+        table = rows_format(other) is not None
         return verify_files(
-            one, other, machine, names=names, dialect=dialect, most=most, beside=samples
-        )
+            one, other, machine, names=names, dialect=dialect, most=most, beside=samples,
+            table=table,
+        )  # fmt: skip
 
 
 def beside_of(processed: bytes | str | Path) -> str | None:
@@ -164,8 +168,8 @@ def verify_files(
     most : int, optional
         Violations after which it stops.
     table : bool, optional
-        What was processed is a table of the streams (controller `csv`): lines of violations are
-        those of the table, and no line counts as kept.
+        What was processed is a file of its own, a table of the streams (controller `csv`) or of
+        rows: lines of violations are those of the file, and no line counts as kept.
     reported : mapping of int to array, optional
         Of the line of each rapid: the profile that was reported, as rows of duration [s] and jerk
         along the path [mm/s^3]; streams for LinuxCNC are held to it.
@@ -272,6 +276,9 @@ def _judge_pair(
 
 def _judge_table(table: BinaryIO, program: Program, machine: Machine, found: Findings) -> list[int]:
     """Compare a table with its program; which rapids it replaces."""
+    name = rows_format(table)
+    if name is not None:
+        return judge_rows(RowsFile(table, name, machine, found), program.rapids, machine, found)
     reader = TableReader(table, program.rapids, machine, found)
     for paths in reader.paths():
         _check_lines(paths, program, machine, found)

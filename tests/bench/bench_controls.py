@@ -24,6 +24,8 @@ from gcodejerk.planning.plan import plan_moves
 
 ROOT = Path(__file__).parents[2]
 UM = 1e3
+NULL = 1e-6
+"""What is nothing [um]."""
 
 
 def moves_of(path, machine, dialect):
@@ -40,7 +42,7 @@ def stream_row(name, profile, moves, machine):
     plans = plan_moves(moves.displacement, machine, profile)
     value = UM * float(plans.worst_in_band[needs(moves) > 0.0].max())
     total = float(plans.counts * machine.interval @ moves.count)
-    return f"| {name} | | {total:.3f} | | {value:.3g} |", plans
+    return f"| {name} | | | | {total:.2f} | {value:.3g} |", plans
 
 
 def main():
@@ -51,38 +53,38 @@ def main():
     machine = Machine.load(find_machine(name))
     moves = moves_of(ROOT / program, machine, dialect)
     print(f"{program} on {name}: {moves.count.sum():.0f} rapids, {len(moves)} distinct\n")
-    print("| control | law | time [s] | as set today [um] | best setting [um] |")
-    print("|---|---|---|---|---|")
-    first = True
+    today = None
+    print("| control (settings) | law | set as today [s] | [um] | best [s] | [um] |")
+    print("|---|---|---|---|---|---|")
     for control in sorted(controllers()):
         emitter = load_controller(control)
         if not isinstance(emitter, Sheets):
             continue
         try:
             schemes = emitter.schemes(machine)
-        except GcodejerkError as error:
-            print(f"| {control} | {error.problem} | | | |")
+        except GcodejerkError:
+            print(
+                f"| `{control}` | sets a share of today's jerk, and this machine has none | | | | |"
+            )
             continue
         for way, scheme in schemes.items():
             found = tune(scheme, moves, machine, curve=False)
-            if first:
-                today = found.today
-                print(
-                    f"| today | {machine.planner} | {today.total:.3f} | {UM * today.value:.3g} | |"
-                )
-                first = False
-            best = f"{UM * found.chosen.value:.3g}" if found.gains else "no gain"
+            today = found.today
+            best = f"{found.chosen.total:.2f} | {UM * found.chosen.value:.3g}"
             print(
-                f"| {control} ({way}) | {scheme.family.title} | {found.chosen.total:.3f} | "
-                f"{UM * found.as_set.value:.3g} | {best} |",
+                f"| `{control}` ({way}) | {scheme.family.title} | {found.as_set.total:.2f} | "
+                f"{UM * found.as_set.value:.3g} | {best if found.gains else '- | no gain'} |",
                 flush=True,
             )
+    print(f"| **today** | {machine.planner} | {today.total:.2f} | {UM * today.value:.3g} | | |")
     for profile in ("condition3", "optimal"):
-        row, plans = stream_row(f"stream, {profile}", profile, moves, machine)
+        row, plans = stream_row(f"**stream**, {profile}", profile, moves, machine)
         print(row)
     limits = known_limits(plans, None)
     if limits is not None and np.isfinite(limits).any():
-        print(f"| limit of any profile, exact frequencies | | | | {UM * np.nanmax(limits):.3g} |")
+        least = UM * np.nanmax(limits)
+        least = least if least > NULL else 0.0
+        print(f"| **limit** of any profile, exact frequencies | | | | | {least:.2g} |")
 
 
 if __name__ == "__main__":

@@ -44,6 +44,12 @@ class FanucController(Sheets, GcodeController):
         today = today_of(machine, "velocity", "acceleration", "jerk")
         with np.errstate(invalid="ignore"):
             bell = np.nan_to_num(today["acceleration"] / today["jerk"])
+            ramp = np.nan_to_num(today["velocity"] / today["acceleration"])
+        # What the machine file states of its own averages stands.
+        for axis in machine.axes:
+            at, stated = AXES.index(axis.name), dict(axis.law)
+            bell[at] = stated.get("second_average", bell[at])
+            ramp[at] = stated.get("first_average", ramp[at])
         speed = {a: float(today["velocity"][AXES.index(a)]) for a in machine.axis_names}
 
         def second(axis: str) -> Setting:
@@ -82,8 +88,6 @@ class FanucController(Sheets, GcodeController):
             cannot=cannot,
         )  # fmt: skip
         settings, groups = axis_settings(machine, constant_time)
-        with np.errstate(invalid="ignore"):
-            ramp = np.nan_to_num(today["velocity"] / today["acceleration"])
         times = Scheme(
             self.name, "rapid time constants, constant time", FAMILIES["time-constants"],
             fixed | {"first_average": ramp}, settings, groups,
@@ -93,7 +97,9 @@ class FanucController(Sheets, GcodeController):
             ),
             cannot=cannot,
         )  # fmt: skip
-        return {"constant-acceleration": bells, "constant-time": times}
+        known = {"constant-acceleration": bells, "constant-time": times}
+        first = "constant-time" if machine.planner == times.family.name else next(iter(known))
+        return {first: known[first]} | known
 
     def lines(self, machine: Machine, numbers: Sequence[tuple[Setting, str]]) -> list[str]:
         """One block for each value; P counts the controlled axes from 1."""

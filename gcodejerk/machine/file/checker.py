@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from gcodejerk.errors import Place
-from gcodejerk.machine.file import table
+from gcodejerk.machine.file import kinds, table
 from gcodejerk.machine.file.document import Document
 from gcodejerk.machine.file.scalars import is_empty, number_remedy, number_value, shown
 from gcodejerk.machine.problems import Problems, nearest
@@ -91,33 +91,33 @@ class Checker:
             return {}
         return {key: value for key, _, value in self.document.entries(node, "", Problems())}
 
-    def _read(self, node: yaml.Node, kind: table.Kind, path: KeyPath) -> Any:
+    def _read(self, node: yaml.Node, kind: kinds.Kind, path: KeyPath) -> Any:
         """Give the value of one node, or `_MISSING` after telling what is wrong with it."""
         self._nodes[path] = node
         match kind:
-            case table.Section():
+            case kinds.Section():
                 return self._section(node, kind, path)
-            case table.Table():
+            case kinds.Table():
                 return self._table(node, kind, path)
-            case table.OrMapping():
+            case kinds.OrMapping():
                 return self._read(node, self._chosen(node, kind), path)
-            case table.ListOf():
+            case kinds.ListOf():
                 return self._list(node, kind, path)
-            case table.Pair():
+            case kinds.Pair():
                 return self._pair(node, kind, path)
-            case table.Number():
+            case kinds.Number():
                 return self._number(node, kind, path)
-            case table.Flag():
+            case kinds.Flag():
                 return self._flag(node, path)
-            case table.Choice() | table.Text():
+            case kinds.Choice() | kinds.Text():
                 return self._words(node, kind, path)
 
-    def _chosen(self, node: yaml.Node, kind: table.OrMapping) -> table.Kind:
+    def _chosen(self, node: yaml.Node, kind: kinds.OrMapping) -> kinds.Kind:
         """Which of the two a node is: a mapping none of whose keys fits is a list without dash."""
         fits = any(nearest(key, kind.mapping.names) for key in self._peek(node))
         return kind.mapping if fits else kind.plain
 
-    def _section(self, node: yaml.Node, kind: table.Section, path: KeyPath) -> Any:
+    def _section(self, node: yaml.Node, kind: kinds.Section, path: KeyPath) -> Any:
         what = f"a mapping with the keys {', '.join(kind.names)}"
         if not isinstance(node, yaml.MappingNode):
             return self._wrong(node, path, what)
@@ -144,7 +144,7 @@ class Checker:
                 values |= _default(key)
         return values
 
-    def _table(self, node: yaml.Node, kind: table.Table, path: KeyPath) -> Any:
+    def _table(self, node: yaml.Node, kind: kinds.Table, path: KeyPath) -> Any:
         if not isinstance(node, yaml.MappingNode):
             return self._wrong(node, path, f"a mapping; its keys: {kind.expected}")
         values: dict[str, Any] = {}
@@ -162,14 +162,14 @@ class Checker:
                 values[name] = value
         return values
 
-    def _list(self, node: yaml.Node, kind: table.ListOf, path: KeyPath) -> Any:
+    def _list(self, node: yaml.Node, kind: kinds.ListOf, path: KeyPath) -> Any:
         if not isinstance(node, yaml.SequenceNode) or len(node.value) > kind.at_most:
             what = f"a list of at most {kind.at_most} entries, each in braces or after a dash"
             return self._wrong(node, path, what)
         values = [self._read(n, kind.of, (*path, i)) for i, n in enumerate(node.value)]
         return {i: value for i, value in enumerate(values) if value is not _MISSING}
 
-    def _pair(self, node: yaml.Node, kind: table.Pair, path: KeyPath) -> Any:
+    def _pair(self, node: yaml.Node, kind: kinds.Pair, path: KeyPath) -> Any:
         what = f"a list of two numbers, the lower first [{self.unit(kind.of.unit, path)}]"
         if not isinstance(node, yaml.SequenceNode) or len(node.value) != 2:
             return self._wrong(node, path, what, "for example [-400, 50]")
@@ -180,7 +180,7 @@ class Checker:
             return self._wrong(node, path, what, "swap the two ends, or leave travel out")
         return low, high
 
-    def _number(self, node: yaml.Node, kind: table.Number, path: KeyPath) -> Any:
+    def _number(self, node: yaml.Node, kind: kinds.Number, path: KeyPath) -> Any:
         unit = self.unit(kind.unit, path)
         expected = kind.expected(unit)
         if not isinstance(node, yaml.ScalarNode):
@@ -205,12 +205,12 @@ class Checker:
             return text.lower() in {"true", "yes", "on"}
         return self._wrong(node, path, "true or false")
 
-    def _words(self, node: yaml.Node, kind: table.Choice | table.Text, path: KeyPath) -> Any:
+    def _words(self, node: yaml.Node, kind: kinds.Choice | kinds.Text, path: KeyPath) -> Any:
         if not isinstance(node, yaml.ScalarNode) or is_empty(node):
-            expected = kind.expected if isinstance(kind, table.Text) else _one_of(kind.words)
+            expected = kind.expected if isinstance(kind, kinds.Text) else _one_of(kind.words)
             return self._wrong(node, path, expected)
         text: str = node.value
-        if isinstance(kind, table.Text):
+        if isinstance(kind, kinds.Text):
             if re.fullmatch(kind.pattern, text):
                 return text
             return self._wrong(node, path, kind.expected)
@@ -246,14 +246,14 @@ class Checker:
         self.problems.add(self.document.place(node), f"{label} is not a known key{hint}", remedy)
         return close
 
-    def _missing(self, node: yaml.Node, key: table.Key, path: KeyPath) -> None:
+    def _missing(self, node: yaml.Node, key: kinds.Key, path: KeyPath) -> None:
         match key.kind:
-            case table.Number(unit=unit):
+            case kinds.Number(unit=unit):
                 expected = key.kind.expected(self.unit(unit, (*path, key.name)))
-            case table.Choice(words=words):
+            case kinds.Choice(words=words):
                 expected = _one_of(words)
             case (
-                table.Text(expected=expected) | table.OrMapping(plain=table.Text(expected=expected))
+                kinds.Text(expected=expected) | kinds.OrMapping(plain=kinds.Text(expected=expected))
             ):
                 pass
             case _:
@@ -272,17 +272,17 @@ def dotted(path: KeyPath) -> str:
     return text.removeprefix(".")
 
 
-def _default(key: table.Key) -> dict[str, Any]:
+def _default(key: kinds.Key) -> dict[str, Any]:
     """Entry that stands for an absent key; none for a key without a default."""
-    if isinstance(key.kind, table.Section) and not key.required:
+    if isinstance(key.kind, kinds.Section) and not key.required:
         return {key.name: {k: v for part in key.kind.keys for k, v in _default(part).items()}}
     return {} if key.default is None else {key.name: key.default}
 
 
-def _is_left_empty(node: yaml.Node, kind: table.Kind) -> bool:
+def _is_left_empty(node: yaml.Node, kind: kinds.Kind) -> bool:
     """Whether all entries of a key like `modes:` have been deleted or commented out."""
-    kind = kind.plain if isinstance(kind, table.OrMapping) else kind
-    collection = isinstance(kind, table.Section | table.Table | table.ListOf)
+    kind = kind.plain if isinstance(kind, kinds.OrMapping) else kind
+    collection = isinstance(kind, kinds.Section | kinds.Table | kinds.ListOf)
     return collection and is_empty(node)
 
 
@@ -292,18 +292,18 @@ def _one_of(words: tuple[str, ...]) -> str:
 
 def _example(path: KeyPath) -> str | None:
     """Remedy from the table's own example for a key."""
-    kind: table.Kind | None = table.MACHINE
-    key: table.Key | None = None
+    kind: kinds.Kind | None = table.MACHINE
+    key: kinds.Key | None = None
     for part in path:
-        if isinstance(kind, table.OrMapping):
+        if isinstance(kind, kinds.OrMapping):
             kind = kind.mapping if isinstance(part, str) else kind.plain
         match kind:
-            case table.Section():
+            case kinds.Section():
                 key = next((k for k in kind.keys if k.name == part), None)
                 kind = key.kind if key else None
-            case table.Table():
+            case kinds.Table():
                 kind = kind.kind_of(str(part))
-            case table.ListOf() | table.Pair():
+            case kinds.ListOf() | kinds.Pair():
                 kind = kind.of
     if key is None:
         return "start from machines/vmc.yaml"

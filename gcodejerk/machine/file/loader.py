@@ -309,6 +309,11 @@ def _controller_options(values: dict[str, Any]) -> ControllerOptions:
         optimization_depth=int(values["optimization_depth"]),
         max_acceleration=values.get("max_acceleration", {}),
         override_guard=values["override_guard"],
+        counts_per_unit=values.get("counts_per_unit", {}),
+        axis_names=values.get("axis_names", {}),
+        isx90=values.get("isx90"),
+        fanuc_distance=values.get("fanuc_distance"),
+        confirmed=tuple(sorted(set(values.get("confirmed", {}).values()))),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from gcodejerk.machine.file import table
+from gcodejerk.machine.file import kinds, table
 
 
 def machine_schema() -> dict[str, Any]:
@@ -38,39 +38,39 @@ def machine_schema() -> dict[str, Any]:
     }
 
 
-def _of(kind: table.Kind) -> dict[str, Any]:
+def _of(kind: kinds.Kind) -> dict[str, Any]:
     match kind:
-        case table.Section(keys=keys):
+        case kinds.Section(keys=keys):
             return {
                 "type": "object",
                 "properties": {key.name: _key(key) for key in keys},
                 "required": [key.name for key in keys if key.required],
                 "additionalProperties": False,
             }
-        case table.Table(entries=entries, at_least=at_least):
+        case kinds.Table(entries=entries, at_least=at_least):
             return {
                 "type": "object",
                 "patternProperties": {f"^({pattern})$": _of(of) for pattern, of in entries},
                 "minProperties": at_least,
                 "additionalProperties": False,
             }
-        case table.OrMapping(plain=plain, mapping=mapping):
+        case kinds.OrMapping(plain=plain, mapping=mapping):
             return {"anyOf": [_of(plain), _of(mapping)]}
-        case table.ListOf(of=of, at_most=at_most):
+        case kinds.ListOf(of=of, at_most=at_most):
             return {"type": "array", "items": _of(of), "maxItems": at_most}
-        case table.Pair(of=of):
+        case kinds.Pair(of=of):
             return {"type": "array", "items": _of(of), "minItems": 2, "maxItems": 2}
-        case table.Number():
+        case kinds.Number():
             return _number(kind)
-        case table.Text(pattern=pattern):
+        case kinds.Text(pattern=pattern):
             return {"type": "string", "pattern": f"^({pattern})$"}
-        case table.Choice(words=words):
+        case kinds.Choice(words=words):
             return {"enum": [int(word) if word.isdecimal() else word for word in words]}
-        case table.Flag():
+        case kinds.Flag():
             return {"type": "boolean"}
 
 
-def _number(kind: table.Number) -> dict[str, Any]:
+def _number(kind: kinds.Number) -> dict[str, Any]:
     bounds = {
         "exclusiveMinimum": kind.above,
         "minimum": kind.at_least,
@@ -81,7 +81,7 @@ def _number(kind: table.Number) -> dict[str, Any]:
     return {"type": "number"} | {key: value for key, value in bounds.items() if value is not None}
 
 
-def _key(key: table.Key) -> dict[str, Any]:
+def _key(key: kinds.Key) -> dict[str, Any]:
     schema = {"title": key.name, "description": key.doc} | _of(key.kind)
     unit = getattr(getattr(key.kind, "of", key.kind), "unit", None)
     if unit is not None:
@@ -92,7 +92,7 @@ def _key(key: table.Key) -> dict[str, Any]:
         schema["examples"] = [yaml.safe_load(key.example)]
     if not key.required and schema.get("type") in ("object", "array") and not unit:
         schema["type"] = [schema["type"], "null"]
-    if isinstance(key.kind, table.OrMapping) and isinstance(key.kind.plain, table.ListOf):
+    if isinstance(key.kind, kinds.OrMapping) and isinstance(key.kind.plain, kinds.ListOf):
         schema["anyOf"].append({"type": "null"})
     return schema
 

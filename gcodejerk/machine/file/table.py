@@ -9,11 +9,23 @@ Rule: defaults and bounds are in the package's own units (mm or deg, s, Hz). A u
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from gcodejerk.axes import AXES
+from gcodejerk.machine.file.kinds import (
+    Choice,
+    Flag,
+    Key,
+    Kind,
+    ListOf,
+    Number,
+    OrMapping,
+    Pair,
+    Section,
+    Table,
+    Text,
+)
 from gcodejerk.machine.parts import FILTERS, PLANNERS
 
 SCHEMA_VERSION = 1
@@ -43,140 +55,14 @@ DIALECT_OF_CONTROLLER = {
     "fluidnc": "grbl",
     "g2core": "grbl",
     "kflop": "mach",
+    **dict.fromkeys(("acs", "csp", "elmo", "galil", "json", "pmac", "ros2"), "linuxcnc"),
+    "fanuc15": "fanuc",
 }
 """How programs are read where the file does not say; `auto` for a controller that is not here."""
 
+CONFIRMABLE = ("acs-pvspline", "pmac-colon")
+"""Facts that no manual at hand shows: see the emitters that ask for them."""
 
-@dataclass(frozen=True, slots=True)
-class Number:
-    """A number within bounds; `above` and `below` are themselves excluded."""
-
-    unit: str
-    above: float | None = None
-    at_least: float | None = None
-    below: float | None = None
-    smallest: float = 1e-9
-    """Nothing on a machine is smaller, where zero is excluded: a slip in the exponent."""
-    at_most: float = 1e15
-    """Nothing on a machine is larger."""
-
-    def holds(self, value: float) -> bool:
-        """Whether a number lies within the bounds."""
-        return (
-            (self.above is None or value > self.above)
-            and (self.at_least is None or value >= self.at_least)
-            and (self.below is None or value < self.below)
-        )
-
-    def plausible(self, value: float) -> str | None:
-        """Words for the end that a number is beyond though it is within the bounds, if any."""
-        if abs(value) > self.at_most:
-            return f"at most {self.at_most:g}"
-        if self.above == 0.0 and 0.0 < value < self.smallest:
-            return f"at least {self.smallest:g}"
-        return None
-
-    def expected(self, unit: str) -> str:
-        """Words of a message for what should stand there."""
-        bounds = []
-        if self.above is not None:
-            bounds.append("above zero" if self.above == 0.0 else f"above {self.above:g}")
-        if self.at_least is not None:
-            bounds.append(f"of at least {self.at_least:g}")
-        if self.below is not None:
-            bounds.append(f"below {self.below:g}")
-        return " ".join(filter(None, ["a number", " and ".join(bounds), f"[{unit}]"]))
-
-
-@dataclass(frozen=True, slots=True)
-class Text:
-    """One line of text, taken as written."""
-
-    pattern: str
-    expected: str
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """One of a few words."""
-
-    words: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Flag:
-    """True or false."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """A low and a high end, as a list of two numbers."""
-
-    of: Number
-
-
-@dataclass(frozen=True, slots=True)
-class ListOf:
-    """A list."""
-
-    of: Section
-    at_most: int
-    """More make no sense on a machine, and aliases could stand for very many."""
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A mapping whose keys are names from a set, such as axes."""
-
-    entries: tuple[tuple[str, Kind], ...]
-    """Pattern of the name, and what stands under such a name."""
-    expected: str
-    known: tuple[str, ...]
-    """Names, or examples of names, that a misspelt one is compared with."""
-    at_least: int = 0
-
-    def kind_of(self, name: str) -> Kind | None:
-        """Give what stands under a name; None for a name that is not one of these."""
-        for pattern, kind in self.entries:
-            if re.fullmatch(pattern, name):
-                return kind
-        return None
-
-
-@dataclass(frozen=True, slots=True)
-class OrMapping:
-    """Something plain, or a mapping that says it at more length or otherwise."""
-
-    plain: Text | ListOf
-    mapping: Section
-
-
-@dataclass(frozen=True, slots=True)
-class Key:
-    """One key of a section."""
-
-    name: str
-    kind: Kind
-    doc: str
-    required: bool = False
-    default: float | str | bool | None = None
-    """What a missing key counts as; None where that depends on other keys or means `unknown`."""
-    example: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A mapping with fixed keys."""
-
-    keys: tuple[Key, ...]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of its keys."""
-        return tuple(key.name for key in self.keys)
-
-
-Kind = Number | Text | Choice | Flag | Pair | ListOf | Table | Section | OrMapping
 
 _NAME = Text(r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,200}", "a name of at most 200 characters")
 _WORD = Text(r"[a-z][a-z0-9_.+-]*", "a name in lower case")
@@ -412,6 +298,25 @@ _CONTROLLER_OPTIONS = Section(
             "(M66 E3, #5399, O-words: docs/linuxcnc-guard.md); needs the HAL lines of `gcodejerk "
             "install linuxcnc INI --form guard`.",
             default=False),
+        Key("counts_per_unit", Table(
+            ((_LETTERS, Number("counts per mm or degree", above=0.0)),), _AXIS_NAMES, tuple(AXES)),
+            "Galil, Elmo, CSP, Fanuc 15i: counts (Fanuc: least increments) of each axis for 1 mm, "
+            "or for 1 degree of a rotary axis, also under units: inch.",
+            example="{X: 1000, Z: 1000}"),
+        Key("axis_names", Table(
+            ((_LETTERS, Text(r"[A-Za-z0-9_][A-Za-z0-9_./-]{0,59}", "a name of at most 60 "
+            "characters")),), _AXIS_NAMES, tuple(AXES)),
+            "What the controller calls each axis: a joint (ROS 2), a letter (Galil, PMAC), a "
+            "number (ACS, Fanuc 15i: the place in the record, from 1).",
+            example="{X: joint_x, Z: joint_z}"),
+        Key("isx90", Number("ms", above=0.0), "PMAC: Isx90 of the coordinate system, the unit of "
+            "time of velocities.", example="1000"),
+        Key("fanuc_distance", Choice(("general", "special")),
+            "Fanuc 15i: the format of distances in the remote buffer (parameter 7609#2, RDS).",
+            example="general"),
+        Key("confirmed", ListOf(Choice(CONFIRMABLE), at_most=len(CONFIRMABLE)),
+            "Facts that nobody could verify for us, and you have with your manual: lines that rest "
+            "on them are comments otherwise (docs/points.md).", example="[pmac-colon]"),
     )
 )  # fmt: skip
 

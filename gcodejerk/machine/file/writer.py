@@ -95,6 +95,11 @@ def _controller_options(options: ControllerOptions) -> list[str]:
         "optimization_depth": str(options.optimization_depth),
         "max_acceleration": _flow(options.max_acceleration),
         "override_guard": str(options.override_guard).lower(),
+        "counts_per_unit": _flow(options.counts_per_unit),
+        "axis_names": _braces({axis: _text(name) for axis, name in options.axis_names.items()}),
+        "isx90": "" if options.isx90 is None else _number(options.isx90),
+        "fanuc_distance": str(options.fanuc_distance),
+        "confirmed": f"[{', '.join(options.confirmed)}]",
     }
     said = [name for name in texts if getattr(options, name) != getattr(usual, name)]
     lines = [f"  {name}: {texts[name]}" for name in said]

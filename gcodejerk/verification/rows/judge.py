@@ -1,0 +1,415 @@
+"""Rows against the program and the machine: whether they may be, where they lead, and how.
+
+Rule: what rounding explains is no violation, and nothing else is excused: the tolerance of every
+check is what half a step of position and of velocity can do to it, and even that is no more than a
+twentieth of a limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.axes import AXES
+from gcodejerk.machine import BELL, Machine
+from gcodejerk.nc import CERTAIN, Rapids
+from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.physics.conventional import box_widths
+from gcodejerk.verification.physics.dynamics import check_dynamics
+from gcodejerk.verification.physics.oscillators import Oscillators
+from gcodejerk.verification.physics.own_rapids import (
+    conventional_counts,
+    limits_of,
+    own_times,
+    rapid_limits,
+)
+from gcodejerk.verification.physics.points import (
+    STANDSTILL,
+    TINY,
+    Array,
+    Index,
+    Paths,
+    check_line,
+    check_rapids,
+    resolutions,
+)
+from gcodejerk.verification.rows.files import RowsFile
+from gcodejerk.verification.rows.motion import Pieces
+from gcodejerk.verification.rows.moves import Move
+from gcodejerk.verification.rows.readers import CYCLIC
+
+BATCH = 500
+"""Moves that are judged at a time."""
+WITHIN = 1e-8
+"""Share by which a number may pass a limit: float64 of decimal numbers."""
+MOST_BLUR = 0.05
+"""Share of a limit that rounding is an excuse for."""
+MORE_TICKS = 2.5
+"""Ticks that a move may last longer than whole intervals, since it lasts whole ticks."""
+STATED = 2e-3
+"""Share by which the residual that a file states may be off: its digits, and float64."""
+RELATIVE, SHORTEST = 0.02, 1.1
+"""Share by which rows may leave more than today's rapid; times the tolerance, of `shortest`."""
+BAND_POINTS, BAND_STEP = 9, 0.25
+"""Frequencies that a band is judged at, at least; their distance times half the duration [rad]."""
+MIRRORED = ("conventional", "condition3", "symmetric", "cascade")
+UNJUDGED = "conventional"
+"""A profile that is written whether or not it leaves less than today's rapid, which it is."""
+
+
+def judge_rows(file: RowsFile, rapids: Rapids, machine: Machine, found: Findings) -> list[int]:
+    """Judge a file of rows; indices of the rapids that it replaces."""
+    replaced: list[int] = []
+    moves = _matched(file, rapids, machine, found, replaced)
+    while not found.full and (batch := list(islice(moves, BATCH))):
+        if file.name in CYCLIC:
+            _judge_points(batch, file, rapids, machine, found)
+            continue
+        _Judge([m for _, m in batch], [i for i, _ in batch], file, rapids, machine, found).run()
+    return replaced
+
+
+def _matched(
+    file: RowsFile, rapids: Rapids, machine: Machine, found: Findings, replaced: list[int]
+) -> Iterator[tuple[int, Move]]:
+    """Moves with their rapids, complete with their start; what does not fit is told."""
+    known = sum(1 << AXES.index(axis) for axis in machine.axis_names)
+    at = 0
+    for move in file.moves():
+        i = int(np.searchsorted(rapids.line, move.rapid))
+        problem = ""
+        if i >= len(rapids) or rapids.line[i] != move.rapid:
+            problem = f"line {move.rapid} of the program is no rapid"
+        elif i < at:
+            problem = f"rapid of line {move.rapid} is out of order"
+        elif rapids.reason[i] != CERTAIN:
+            problem = f"rapid of line {move.rapid} had to be left alone"
+        elif int(rapids.words[i]) & ~known:
+            problem = f"rapid of line {move.rapid} moves an axis that the machine does not have"
+        if problem:
+            found.add(Kind.TABLE, move.line, None, problem)
+            continue
+        at = i + 1
+        whole = _framed(move, i, file, rapids, found)
+        if whole is not None:
+            replaced.append(i)
+            yield i, whole
+
+
+def _framed(move: Move, i: int, file: RowsFile, rapids: Rapids, found: Findings) -> Move | None:
+    """Check axes, times and ends; the move with its start, None where it is beyond judging."""
+    steps, axes = file.steps, list(move.axes)
+
+    def complain(kind: Kind, problem: str) -> None:
+        found.add(kind, move.line, int(rapids.line[i]), problem)
+
+    if len(move.t) < 2 or move.position.shape != (len(move.t), len(axes)):
+        complain(Kind.TABLE, "a motion has at least two rows")
+        return None
+    start, target = rapids.start[i], rapids.target[i]
+    step = steps.position[axes]
+    if np.isnan(start[axes]).any():
+        complain(Kind.AXES, "an axis is named whose position nobody knows")
+        return None
+    begin, end = (np.rint(where[axes] / step) * step for where in (start, target))
+    position = move.position.copy()
+    if move.relative:
+        position += begin
+    elif np.isnan(position[0]).any():
+        position[0] = begin
+    near = 1e-4 * step + 1e-12 * np.abs(end) + 1e-13
+    if not np.isfinite(position).all() or not np.isfinite(move.velocity).all():
+        complain(Kind.TABLE, "nan stands for what the program does not tell, and only for that")
+        return None
+    gaps = np.diff(move.t)
+    ticks = move.t / steps.tick
+    # float64 of a decimal time in ticks of 1 ns
+    slack = 1e-3 + 4e-16 * np.abs(ticks)
+    if move.t[0] != 0.0 or (gaps <= 0.5 * steps.tick).any():
+        complain(Kind.TIME, "the times of the rows do not rise from 0")
+        return None
+    if (np.abs(ticks - np.rint(ticks)) > slack).any():
+        complain(Kind.TIME, f"a time is no whole number of ticks of {steps.tick:g} s")
+    if (gaps > steps.longest * (1.0 + WITHIN)).any() or len(gaps) > steps.most:
+        complain(Kind.TIME, "a segment is longer, or there are more, than the controller can take")
+    for what, kind, row, wanted in (
+        ("begins", Kind.START, 0, begin),
+        ("ends", Kind.END, -1, end),
+    ):
+        for k in np.flatnonzero(np.abs(position[row] - wanted) > near).tolist():
+            at, said = position[row, k], (start if row == 0 else target)[axes[k]]
+            complain(kind, f"{AXES[axes[k]]} {what} at {at:.12g}, the program says {said:.12g}")
+        if move.velocity[row].any():
+            complain(kind, "the motion is not at rest there: its velocity is not 0")
+    moved = np.abs(np.rint(target / steps.position) - np.rint(start / steps.position)) > 0.0
+    moved &= np.abs(target - start) > STANDSTILL
+    for a in np.flatnonzero(moved).tolist():
+        if a not in axes:
+            complain(Kind.AXES, f"axis {AXES[a]} does not move, and the block moves it")
+    for k, a in enumerate(axes):
+        still = not moved[a]
+        if still and (np.ptp(position[:, k]) > near[k] or move.velocity[:, k].any()):
+            complain(Kind.AXES, f"axis {AXES[a]} moves, which the block does not move")
+            return None
+    return replace(move, position=position, relative=False)
+
+
+def _judge_points(
+    batch: list[tuple[int, Move]], file: RowsFile, rapids: Rapids, machine: Machine, found: Findings
+) -> None:
+    """Judge points that are an interval apart like those of a stream."""
+    moves = [move for _, move in batch]
+    ends = _ends(np.array([i for i, _ in batch], dtype=np.int64), moves, rapids, machine)
+    size = np.array([len(move.t) for move in moves], dtype=np.int64)
+    end = np.cumsum(size)
+    step = file.steps.position
+    start = np.rint(ends.start / step) * step
+    named = np.zeros(start.shape, dtype=np.bool_)
+    position = np.repeat(start, size, axis=0)
+    for k, move in enumerate(moves):
+        named[k, list(move.axes)] = True
+        position[end[k] - size[k] : end[k], list(move.axes)] = move.position
+    moved = np.rint((ends.start + ends.displacement) / step) * step - start
+    paths = replace(
+        ends,
+        line=ends.line + 1,
+        begin=end - size,
+        end=end,
+        position=position,
+        feed=np.full(len(position), np.nan),
+        start=start,
+        displacement=np.where(named & (ends.displacement != 0.0), moved, 0.0),
+        step=np.tile(step, (len(moves), 1)),
+    )
+    check_rapids(ends, rapids, machine, found)
+    check_line(paths, machine, found)
+    if (paths.displacement != 0.0).any(axis=1).all():
+        check_dynamics(paths, machine, 1, found)
+
+
+class _Judge:
+    """Some moves at once."""
+
+    def __init__(
+        self,
+        moves: list[Move],
+        index: list[int],
+        file: RowsFile,
+        rapids: Rapids,
+        machine: Machine,
+        found: Findings,
+    ) -> None:
+        self.moves, self.file, self.machine, self.found = moves, file, machine, found
+        self.rapids = rapids
+        self.pieces = Pieces.of(moves, file.steps)
+        self.paths = _ends(np.array(index, dtype=np.int64), moves, rapids, machine)
+        self.displacement = np.zeros((len(moves), len(AXES)))
+        for k, move in enumerate(moves):
+            self.displacement[k, list(move.axes)] = move.position[-1] - move.position[0]
+        steps = 0.5 * file.steps.position
+        self.displacement[np.abs(self.displacement) < steps] = 0.0
+        self.moving = self.displacement != 0.0
+        self.of_piece = self.moving[self.pieces.owner]
+
+    def run(self) -> None:
+        """Every check."""
+        check_rapids(self.paths, self.rapids, self.machine, self.found)
+        if not self.moving.any(axis=1).all():
+            return
+        self._check_duration()
+        self._check_limits()
+        self._check_steps()
+        self._check_way()
+        self._check_residual()
+
+    def _complain(self, kind: Kind, moves: Index | NDArray[np.bool_], problem: str) -> None:
+        """Note a violation for each of some moves."""
+        index = np.flatnonzero(moves) if moves.dtype == np.bool_ else np.unique(moves)
+        for k in index.tolist():
+            self.found.add(kind, self.moves[k].line, self.moves[k].rapid, problem)
+
+    def _check_duration(self) -> None:
+        """No longer than the rapid may last; under independent positioning, no axis."""
+        interval, tick = self.machine.interval, self.file.steps.tick
+        _, most = conventional_counts(self.paths, self.machine)
+        late = self.pieces.total > most * interval + MORE_TICKS * tick
+        self._complain(Kind.TIME, late, "the motion lasts longer than the rapid may")
+        if self.machine.positioning == "linear":
+            return
+        usual, longest = own_times(self.paths, self.machine)
+        pieces = self.pieces
+        end = self.displacement[pieces.owner]
+        size = np.where(self.of_piece, np.abs(end), 1.0)
+        own = (longest + interval + MORE_TICKS * tick)[pieces.owner]
+        left = np.abs(end - pieces.p1) * self.of_piece
+        after = (pieces.begin + pieces.T)[:, np.newaxis] >= own
+        step = self.file.steps.position
+        off = after & (left > step + TINY)
+        self._complain(
+            Kind.TIME, pieces.owner[off.any(axis=1)], "an axis arrives later than its own rapid may"
+        )
+        # The mean moment of the motion moves with any delay.
+        T = pieces.T[:, np.newaxis]
+        mean = 0.5 * T * (pieces.p0 + pieces.p1) + T**2 * (pieces.v0 - pieces.v1) / 12.0
+        area = np.add.reduceat((T * end - mean) / np.where(end != 0.0, end, 1.0) * self.of_piece,
+                               pieces.first[:-1], axis=0)  # fmt: skip
+        low, high = (1.0, 1.0) if self.machine.design.profile in MIRRORED else (0.5, 1.5)
+        error = interval + MORE_TICKS * tick + (step / size[pieces.first[:-1]]) * longest
+        wrong = (area < 0.5 * low * usual - error) | (area > 0.5 * high * longest + error)
+        self._complain(
+            Kind.TIME,
+            (wrong & self.moving).any(axis=1),
+            "an axis moves earlier or later than by its own profile",
+        )
+
+    def _check_limits(self) -> None:
+        """The extremes of every cubic against the limits."""
+        pieces = self.pieces
+        limits = limits_of(self.machine)[:, np.newaxis, :]
+        u = pieces.turning()
+        values = (
+            np.maximum(np.abs(pieces.velocity(u)), np.maximum(abs(pieces.v0), abs(pieces.v1))),
+            np.maximum(np.abs(pieces.acceleration(0.0)), np.abs(pieces.acceleration(1.0))),
+            np.abs(pieces.jerk()),
+        )
+        kinds = (Kind.VELOCITY, Kind.ACCELERATION, Kind.JERK)
+        for value, limit, blur, kind in zip(values, limits, pieces.blur(), kinds, strict=True):
+            excuse = blur if kind is Kind.JERK else np.minimum(blur, MOST_BLUR * limit)
+            bad = self.of_piece & (value > limit * (1.0 + WITHIN) + excuse)
+            for a in np.flatnonzero(bad.any(axis=0)).tolist():
+                problem = f"{AXES[a]} passes its limit of {limit[0, a]:g} mm, s"
+                self._complain(kind, pieces.owner[bad[:, a]], problem)
+
+    def _check_steps(self) -> None:
+        """The acceleration is continuous, and 0 at both ends."""
+        pieces = self.pieces
+        blur = pieces.blur()[1]
+        begin, end = pieces.acceleration(0.0), pieces.acceleration(1.0)
+        first = np.zeros(len(begin), dtype=np.bool_)
+        first[pieces.first[:-1]] = True
+        before = np.where(first[:, np.newaxis], 0.0, np.roll(end, 1, axis=0))
+        excuse = blur + np.where(first[:, np.newaxis], 0.0, np.roll(blur, 1, axis=0))
+        size = np.abs(begin).max(axis=0, initial=0.0)
+        bad = (np.abs(begin - before) > excuse + WITHIN * size) & self.of_piece
+        last = pieces.first[1:] - 1
+        bad[last] |= (np.abs(end[last]) > blur[last] + WITHIN * size) & self.moving
+        self._complain(Kind.JERK, pieces.owner[bad.any(axis=1)], "the acceleration steps at a row")
+
+    def _check_way(self) -> None:
+        """Forwards, not past the end, and straight where the axes move together."""
+        pieces = self.pieces
+        sign = np.sign(self.displacement)[pieces.owner]
+        blur = pieces.blur()[0]
+        low = np.minimum(
+            pieces.velocity(pieces.turning()) * sign, np.minimum(pieces.v0 * sign, pieces.v1 * sign)
+        )
+        end = np.abs(self.displacement)[pieces.owner]
+        step = self.file.steps.position
+        past = (pieces.p1 * sign > end + step) | (pieces.p1 * sign < -step)
+        back = ((low < -blur - WITHIN) | past) & self.of_piece
+        problem = "the motion goes backwards or past the end"
+        self._complain(Kind.BACKWARDS, pieces.owner[back.any(axis=1)], problem)
+        if self.machine.positioning != "linear":
+            return
+        off, may = pieces.off_line(self.displacement)
+        bad = (off > may + TINY) & self.of_piece
+        self._complain(
+            Kind.LINE, pieces.owner[bad.any(axis=1)], "the motion leaves the straight line"
+        )
+
+    def _check_residual(self) -> None:
+        """No more than the file states, and no more than today's rapid leaves over the band."""
+        modes = Oscillators.of(self.machine)
+        if not len(modes.poles):
+            return
+        nominal = modes.largest(self.pieces.response(modes))
+        for k, move in enumerate(self.moves):
+            # Lines of a spectrum are other oscillators there than here.
+            if move.residual is None or not modes.banded.all():
+                continue
+            if abs(nominal[k] - move.residual) > STATED * max(move.residual, nominal[k]) + 1e-9:
+                problem = (
+                    f"leaves {1e3 * nominal[k]:.6g} um of vibration, the file says "
+                    f"{1e3 * move.residual:.6g} um"
+                )
+                self.found.add(Kind.RESIDUAL, move.line, move.rapid, problem)
+        if self.machine.design.profile == UNJUDGED:
+            return
+        left, allowed = np.zeros(len(nominal)), np.zeros(len(nominal))
+        for factor in self._band(modes):
+            around = modes.at(float(factor))
+            left = np.maximum(left, around.largest(self.pieces.response(around)))
+            allowed = np.maximum(allowed, around.largest(self._own(around)))
+        allowed *= 1.0 + RELATIVE
+        if self.machine.design.profile == "shortest":
+            allowed = np.maximum(allowed, SHORTEST * self.machine.design.tolerance)
+        for k in np.flatnonzero(left > allowed + TINY).tolist():
+            problem = (
+                f"leaves {1e3 * left[k]:.3g} um of vibration, at most {1e3 * allowed[k]:.3g} um "
+                "are left by the controller's own rapid"
+            )
+            self.found.add(Kind.RESIDUAL, self.moves[k].line, self.moves[k].rapid, problem)
+
+    def _band(self, modes: Oscillators) -> Array:
+        """Frequencies of the band, relative to the modes' own."""
+        band = self.machine.design.band
+        longest = 0.5 * float(self.pieces.total.max())
+        phase = band * longest * float(np.abs(modes.poles).max(initial=0.0))
+        half = max(BAND_POINTS // 2, int(np.ceil(phase / BAND_STEP)))
+        return np.linspace(1.0 - band, 1.0 + band, 2 * half + 1) if band else np.ones(1)
+
+    def _own(self, modes: Oscillators) -> Array:
+        """What the controller's own rapids leave, in closed form, shape (b, m) [mm]."""
+        limits = rapid_limits(self.paths, self.machine)
+        if self.machine.positioning == "linear":
+            limits = np.repeat(limits.min(axis=2)[:, :, np.newaxis], len(AXES), axis=2)
+        D = self.paths.displacement
+        V, A, J = (np.where(D != 0.0, limit, 1.0) for limit in limits)
+        widths = box_widths(V, A, J, bell=self.machine.planner == BELL)
+        ends = np.where(D != 0.0, np.sum(widths, axis=0), 0.0)
+        rest = ends.max(axis=1, keepdims=True) - ends
+        out = np.zeros((len(D), len(modes.poles)), dtype=np.complex128)
+        for m, pole in enumerate(modes.poles):
+            factor = modes.participation[m] * D * pole * np.exp(pole * rest)
+            for width in widths:
+                factor = factor * _phi(pole * width)
+            out[:, m] = factor.sum(axis=1) / pole.imag
+        return np.abs(out)
+
+
+def _phi(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """(exp(x) - 1)/x, 1 at 0."""
+    small = np.abs(x) < 1e-6
+    safe = np.where(small, 1.0, x)
+    out: NDArray[np.complex128] = np.where(small, 1.0 + 0.5 * x, (np.exp(safe) - 1.0) / safe)
+    return out
+
+
+def _ends(index: Index, moves: list[Move], rapids: Rapids, machine: Machine) -> Paths:
+    """The ends of rapids, as the checks of streams have them."""
+    start = np.nan_to_num(rapids.start[index])
+    displacement = rapids.target[index] - rapids.start[index]
+    displacement = np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0)
+    n = len(index)
+    end = 2 * np.arange(1, n + 1)
+    position = np.stack([start, start + displacement], axis=1).reshape(2 * n, len(AXES))
+    return Paths(
+        rapid=index,
+        original_line=rapids.line[index],
+        line=np.array([move.line for move in moves], dtype=np.int64),
+        begin=end - 2,
+        end=end,
+        position=position,
+        feed=np.full(2 * n, np.nan),
+        start=start,
+        displacement=displacement,
+        unit=np.ones(n),
+        speed=rapids.speed[index],
+        step=np.tile(resolutions(machine), (n, 1)),
+        lone=rapids.lone[index],
+        lead=np.zeros(n, dtype=np.int64),
+    )

@@ -1,0 +1,103 @@
+"""`gcodejerk parameters`: what it prints, writes and refuses."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from gcodejerk.cli import app
+from gcodejerk.errors import GcodejerkError
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+PLATE = str(SAMPLES / "plate.ngc")
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["parameters", *map(str, arguments)])
+
+
+def refused(*arguments):
+    """The message of a run that is refused."""
+    done = run(*arguments)
+    assert done.exit_code == 1
+    assert isinstance(done.exception, GcodejerkError)
+    return str(done.exception)
+
+
+def test_sheet_json_and_figure(tmp_path):
+    pytest.importorskip("matplotlib")
+    sheet, record, figure = tmp_path / "s.txt", tmp_path / "r.json", tmp_path / "f.png"
+    done = run(
+        PLATE, "-m", "vmc", "--controller", "grblhal", "-o", sheet, "--json", record, "--plot",
+        figure,
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    found = json.loads(record.read_text())
+    assert found["controller"] == "grblhal"
+    assert found["rapids"] == {"distinct": 10, "all": 19}
+    assert found["gains"] is True
+    assert found["chosen"]["time"] <= found["today"]["time"]
+    assert found["chosen"]["residual"] < 0.1 * found["today"]["residual"]
+    text = sheet.read_text()
+    for setting in found["settings"]:
+        assert f"{setting['number']}={setting['new']}" in text
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    times = [point["time"] for point in found["curve"]]
+    left = [point["residual"] for point in found["curve"]]
+    assert times == sorted(times)
+    assert left == sorted(left, reverse=True)
+    assert len(found["robustness"]["chosen"]) == len(found["robustness"]["frequency_error"])
+
+
+def test_standard_output_takes_the_sheet_alone():
+    done = run("--lengths", "5:50", "-m", "paper", "--controller", "grbl", "-o", "-")
+    assert done.exit_code == 0
+    assert done.stdout.startswith("; gcodejerk")
+    assert "\n$122=" in done.stdout
+
+
+def test_lengths_and_more_time(tmp_path):
+    done = run("--lengths", "5:50", "-m", "paper", "--controller", "siemens", "--time", "1.2")
+    assert done.exit_code == 0
+    assert "MD32435 Z" in done.stdout
+    assert "-o NAME.siemens-setup.txt" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((PLATE, "-m", "vmc", "--controller", "haas"), "nothing is known that could be set"),
+        ((PLATE, "-m", "vmc", "--controller", "twincat"), "axes.X.rapid.jerk"),
+        ((PLATE, "-m", "vmc", "--controller", "fanuc", "--settings", "x"), "it has: constant-acc"),
+        ((PLATE, "-m", "vmc", "--controller", "none"), "there is no controller"),
+        (("absent.nc", "-m", "vmc"), "absent.nc"),
+    ],
+)
+def test_refusals_name_the_remedy(arguments, said):
+    assert said in refused(*arguments)
+
+
+def test_program_without_rapids_writes_nothing(tmp_path):
+    program, sheet = tmp_path / "p.ngc", tmp_path / "s.txt"
+    program.write_text("G21 G90 G94\nG1 X1 F100\nM2\n")
+    assert "there is no rapid whose way is known" in refused(
+        program, "-m", "vmc", "--controller", "grbl", "-o", sheet
+    )
+    assert not sheet.exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("-m", "vmc"),
+        (PLATE, "--lengths", "1:2", "-m", "vmc"),
+        ("--lengths", "5", "-m", "vmc"),
+        ("--lengths", "9:1", "-m", "vmc"),
+        (PLATE, "-m", "vmc", "--goal", "best"),
+        (PLATE, "-m", "vmc", "--plot", "x.gif"),
+        (PLATE, "-m", "vmc", "-o", "a", "--json", "a"),
+    ],
+)
+def test_wrong_usage(arguments):
+    assert run(*arguments).exit_code == 2

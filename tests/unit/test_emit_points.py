@@ -1,0 +1,305 @@
+"""Motion controllers: what each is written, in which units, and what has to be known first."""
+
+import io
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from gcodejerk import Machine, process, verify
+from gcodejerk.emit import controllers, load_controller
+from gcodejerk.emit.points.base import decimal
+from gcodejerk.emit.points.fanuc15 import records
+from gcodejerk.errors import EmitError, MachineError
+from gcodejerk.planning.records import advancing
+from gcodejerk.verification.rows.files import rows_format
+
+AXIS = "{rapid: {velocity: 500, acceleration: 5000, jerk: 150000}, limit: {jerk: 150000}, modes: [{frequency: 27, damping: 0.02}]}"  # noqa: E501
+EXAMPLE = f"interval: 0.001\npositioning: linear\naxes:\n  X: {AXIS}\n"
+TURNING = AXIS.replace("{rapid", "{wrap: none, rapid").replace("}]", ", participation: 1}]")
+MOVE = b"G21 G90 G94 G17 G40 G49 G80 G54\nG1 X0. F100.\nG0 X300.\nM2\n"
+OPTIONS = {
+    "acs": "{axis_names: {X: '0'}}",
+    "csp": "{counts_per_unit: {X: 1000}}",
+    "elmo": "{counts_per_unit: {X: 1000}}",
+    "fanuc15": "{counts_per_unit: {X: 1000}, axis_names: {X: '1'}, fanuc_distance: general}",
+    "galil": "{counts_per_unit: {X: 1000}, axis_names: {X: A}}",
+    "json": "{}",
+    "pmac": "{confirmed: [pmac-colon], isx90: 1000}",
+    "ros2": "{axis_names: {X: x}}",
+}
+MOTION = sorted(OPTIONS)
+
+
+def machine(controller, options=None, text=EXAMPLE, **also):
+    said = OPTIONS.get(controller, "{}") if options is None else options
+    lines = f"controller: {controller}\n{text}"
+    return Machine.loads(lines + (f"controller_options: {said}\n" if said != "{}" else ""))
+
+
+def written(controller, options=None, program=MOVE, text=EXAMPLE, profile="conventional"):
+    return process(program, machine(controller, options, text), profile=profile)
+
+
+def rows(result, comment):
+    lines = result.output.decode().splitlines()
+    return [line for line in lines if not line.startswith(comment)]
+
+
+def test_galil_is_told_the_worked_example():
+    assert rows(written("galil"), "REM") == [
+        *("PVA=912,82444,34", "PVA=16830,417068,69", "PVA=15673,499512,34"),
+        *("PVA=233170,499512,478", "PVA=15673,417068,34", "PVA=16830,82444,69"),
+        *("PVA=912,0,34", "PVA=0,0,0", "BTA"),
+    ]
+
+
+def test_elmo_is_told_the_worked_example():
+    assert rows(written("elmo"), "#") == [
+        *("X_position,X_velocity,time_ms", "963,85000,34", "17463,415000,66", "33500,500000,34"),
+        *("266500,500000,466", "282537,415000,34", "299037,85000,66", "300000,0,34"),
+    ]
+
+
+def test_pmac_is_told_the_worked_example():
+    found = rows(written("pmac"), "//")
+    assert (found[0], found[-1]) == ("BLOCKSTART", "BLOCKSTOP")
+    numbers = [tuple(map(float, re.findall(r"[0-9.]+", line))) for line in found[1:-1]]
+    wanted = [
+        (33.3335, 0.925935, 83.33375), (66.6665, 17.592560, 416.66625), (33.3335, 33.333375, 500),
+        (466.6665, 266.666625, 500), (33.3335, 282.407440, 416.66625),
+        (66.6665, 299.074065, 83.33375), (33.3335, 300, 0),
+    ]  # fmt: skip
+    assert np.array(numbers) == pytest.approx(np.array(wanted), abs=6e-7)
+
+
+def test_ros2_is_told_the_message():
+    """Of trajectory_msgs/msg/JointTrajectory and JointTrajectoryPoint (common_interfaces, rolling):
+    header, joint_names, points; positions, velocities, accelerations, effort, time_from_start
+    (builtin_interfaces/Duration: int32 sec, uint32 nanosec)."""
+    trajectory = {"header", "joint_names", "points"}
+    point = {"positions", "velocities", "accelerations", "effort", "time_from_start"}
+    documents = list(yaml.safe_load_all(written("ros2").output))
+    assert len(documents) == 1
+    assert set(documents[0]) <= trajectory
+    assert documents[0]["joint_names"] == ["x"]
+    times = []
+    for entry in documents[0]["points"]:
+        assert set(entry) == point - {"accelerations", "effort"}
+        assert all(isinstance(x, float) for x in entry["positions"] + entry["velocities"])
+        duration = entry["time_from_start"]
+        assert set(duration) == {"sec", "nanosec"}
+        assert 0 <= duration["nanosec"] < 10**9
+        times.append(duration["sec"] + 1e-9 * duration["nanosec"])
+    assert times == pytest.approx([1 / 30, 0.1, 4 / 30, 0.6, 19 / 30, 0.7, 22 / 30], abs=2e-9)
+    assert [p["positions"][0] for p in documents[0]["points"]] == pytest.approx(
+        [0.000925926, 0.017592593, 0.033333333, 0.266666667, 0.282407407, 0.299074074, 0.3],
+        abs=2e-9,
+    )
+    assert documents[0]["points"][-1]["velocities"] == [0.0]
+
+
+def test_json_is_one_document_with_the_documented_keys():
+    program = MOVE.replace(b"M2", b"G0 X5\nM2")
+    document = json.loads(written("json", program=program).output)
+    assert set(document) == {
+        *("gcodejerk", "rows", "controller", "machine", "profile", "interpolation", "units"),
+        *("rapids", "sum"),
+    }
+    assert [rapid["line"] for rapid in document["rapids"]] == [3, 4]
+    for rapid in document["rapids"]:
+        assert set(rapid) == {"line", "t", "X", "planned", "written", "residual"}
+        assert len(rapid["t"]) == len(rapid["X"]["position"]) == len(rapid["X"]["velocity"]) == 8
+    empty = json.loads(written("json", program=b"M2\n").output)
+    assert empty["rapids"] == []
+
+
+@pytest.mark.parametrize(
+    ("form", "text"),
+    [("general", "00 64 FF CE 00 00 31"), ("special", "00 C8 FE 9C 00 00 62")],
+)
+def test_fanuc_records_of_the_worked_example(form, text):
+    assert records(np.array([[100, -50, 0]]), form).hex(" ").upper() == text
+
+
+def test_fanuc_special_700_increments():
+    assert records(np.array([[700]]), "special")[:2].hex(" ").upper() == "0A 78"
+
+
+@pytest.mark.parametrize("form", ["general", "special"])
+def test_fanuc_streams_have_no_record_of_zeros_but_the_last(form):
+    options = f"{{counts_per_unit: {{X: 1000}}, axis_names: {{X: '1'}}, fanuc_distance: {form}}}"
+    result = written("fanuc15", options)
+    _, _, data = result.output.partition(b"G05\n")
+    data = data[: data.rindex(b"(SUM")]
+    found = [data[k : k + 3] for k in range(0, len(data), 3)]
+    assert found[-1] == bytes(3)
+    assert all(any(record) for record in found[:-1])
+    if form == "general":
+        steps = [int.from_bytes(record[:2], "big", signed=True) for record in found]
+        assert sum(steps) == 300_000
+        assert bytes.fromhex("01F4F5") in found
+
+
+def test_counts_advance_from_the_middle_outwards():
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        counts = np.cumsum(rng.integers(0, 4, 40)) * rng.choice([-1, 1])
+        moved = np.diff(advancing(counts)) != 0
+        first, last = np.flatnonzero(moved)[[0, -1]]
+        inside = moved[first : last + 1]
+        assert inside.all() or abs(counts[-1] - counts[0]) < len(inside)
+        assert (advancing(counts)[[0, -1]] == counts[[0, -1]]).all()
+
+
+@pytest.mark.parametrize("name", MOTION)
+def test_files_are_told_apart_and_proven(name):
+    result = written(name)
+    assert rows_format(io.BytesIO(result.output)) == name
+    assert result.verification.ok
+    assert verify(MOVE, result.output, machine(name)).rewritten == 1
+
+
+@pytest.mark.parametrize("name", ["acs", "pmac"])
+def test_unverified_lines_are_comments_until_confirmed(name):
+    options = {"acs": "{axis_names: {X: '0'}}", "pmac": "{}"}[name]
+    comment = {"acs": "! ", "pmac": "// "}[name]
+    result = written(name, options)
+    assert rows(result, comment) == []
+    assert b"confirmed" in result.output
+    said = {"acs": "{axis_names: {X: '0'}, confirmed: [acs-pvspline]}", "pmac": None}[name]
+    assert len(rows(written(name, said), comment)) == 9
+
+
+def test_pmac_needs_the_unit_of_time_too():
+    assert rows(written("pmac", "{confirmed: [pmac-colon]}"), "// ") == []
+    fast = rows(written("pmac", "{confirmed: [pmac-colon], isx90: 1}"), "// ")
+    assert fast[3].endswith(":0.5")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "problem"),
+    [
+        ("galil", "{axis_names: {X: A}}", "needs the counts per mm or degree of axis X"),
+        ("galil", "{counts_per_unit: {X: 10}}", "needs the letter of axis X"),
+        ("galil", "{counts_per_unit: {X: 10}, axis_names: {X: J}}", "expected a letter from A"),
+        ("elmo", "{}", "needs the counts"),
+        ("csp", "{}", "needs the counts"),
+        ("acs", "{axis_names: {X: first}}", "expected a whole number"),
+        ("ros2", "{}", "needs the joint name"),
+        ("fanuc15", "{counts_per_unit: {X: 10}, axis_names: {X: '1'}}", "format of distances"),
+        (
+            "fanuc15",
+            "{counts_per_unit: {X: 10}, axis_names: {X: '2'}, fanuc_distance: general}",
+            "expected the places from 1 to 1",
+        ),
+        (
+            "fanuc15",
+            "{counts_per_unit: {X: 1.0e+6}, axis_names: {X: '1'}, fanuc_distance: special}",
+            "increments in a unit time",
+        ),
+    ],
+)
+def test_what_is_not_known_is_asked_for(name, options, problem):
+    with pytest.raises(EmitError, match=problem) as error:
+        written(name, options)
+    assert error.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ("{counts_per_unit: {Q: 3}}", "not a known key"),
+        ("{counts_per_unit: {X: 0}}", "above zero"),
+        ("{confirmed: [pmac-colons]}", "did you mean 'pmac-colon'"),
+        ("{fanuc_distance: both}", "general, special"),
+        ("{axis_names: {X: ''}}", "a name of at most 60"),
+        ("{isx90: -1}", "above zero"),
+    ],
+)
+def test_wrong_options_are_refused_with_their_place(options, problem):
+    with pytest.raises(MachineError, match=problem):
+        machine("pmac", options)
+
+
+def test_two_axes_of_one_name_are_refused():
+    text = EXAMPLE + f"  Y: {AXIS}\n"
+    with pytest.raises(EmitError, match="the same name"):
+        written("ros2", "{axis_names: {X: j, Y: j}}", text=text)
+
+
+def test_a_cycle_that_no_drive_can_be_told_is_refused():
+    text = EXAMPLE.replace("0.001", "0.0009765625")
+    with pytest.raises(EmitError, match="0x60C2"):
+        written("csp", text=text)
+    with pytest.raises(EmitError, match="unit time"):
+        written("fanuc15", text=EXAMPLE.replace("0.001", "0.003"))
+
+
+def test_options_come_back_from_what_is_written():
+    text = "{counts_per_unit: {X: 1000}, axis_names: {X: j/1}, isx90: 10, confirmed: [pmac-colon]}"
+    described = machine("pmac", text)
+    from gcodejerk.machine.file.writer import machine_yaml
+
+    assert Machine.loads(machine_yaml(described)) == described
+
+
+def test_long_segments_are_split_where_the_controller_has_a_longest():
+    slow = EXAMPLE.replace("velocity: 500", "velocity: 20")
+    times = [int(line.split(",")[2]) for line in rows(written("galil", text=slow), "REM")[:-2]]
+    assert max(times) <= 2048
+    assert len(times) > 7
+    first = rows(written("pmac", text=slow), "//")[1:-1]
+    assert max(float(line.split()[0][3:]) for line in first) <= 4095.9998
+
+
+def test_more_segments_than_a_controller_has_leave_the_rapid_alone():
+    text = EXAMPLE.replace("limit: {jerk: 150000}", "limit: {jerk: 1.5e+7}")
+    options = "{counts_per_unit: {X: 1.0e+7}, axis_names: {X: A}}"
+    result = written("galil", options, text=text, profile="optimal")
+    assert [row.reason for row in result.rapids] == ["too long for a stream"]
+
+
+def test_degrees_inches_and_diameters():
+    text = (
+        "interval: 0.001\npositioning: linear\naxes:\n"
+        f"  X: {AXIS.replace('{rapid', '{diameter: true, rapid', 1)}\n"
+        f"  A: {TURNING}\n"
+    )
+    program = b"G20 G90 G94 G7 G17 G40 G49 G80 G54\nG1 X0 A0 F9\nG0 X2\nG0 A-90\nM2\n"
+    options = "{axis_names: {X: x, A: a}}"
+    first, second = yaml.safe_load_all(written("ros2", options, program, text).output)
+    assert first["points"][-1]["positions"][0] == pytest.approx(0.0254)
+    assert second["points"][-1]["positions"][1] == pytest.approx(-np.pi / 2, abs=1e-11)
+    counts = "{counts_per_unit: {X: 1000, A: 100}}"
+    found = rows(written("elmo", counts, program, text), "#")
+    assert [line.split(",")[0] for line in found if line.endswith(",0,34")] == ["25400", "-9000"]
+
+
+def test_every_motion_controller_is_listed_with_its_confidence():
+    for name in MOTION:
+        assert name in controllers()
+        (form,) = load_controller(name).forms
+        assert form.confidence in ("measured", "documented", "unverified")
+        assert load_controller(name).in_form("stream").name == name
+        with pytest.raises(EmitError, match="cannot write --as parameters"):
+            load_controller(name).in_form("parameters")
+
+
+def test_decimals_are_written_without_zeros():
+    assert [decimal(x, 3) for x in (0, 1, -1, 1000, -1250)] == [
+        "0",
+        "0.001",
+        "-0.001",
+        "1",
+        "-1.25",
+    ]
+
+
+def test_programs_of_a_fanuc_are_read_by_the_remote_buffer_s_controller():
+    described = machine("fanuc15")
+    assert described.dialect == "fanuc"
+    assert replace(described, name="x (y)").name == "x (y)"
