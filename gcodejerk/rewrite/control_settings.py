@@ -86,8 +86,7 @@ def plan_settings(
     stops = find_stops(source, program, emitter, machine)
     notes = (
         emitter.acts_on,
-        "taken back as the machine file has it: "
-        + ", ".join(f"{c.setting.key} {c.old}" for c in lines.changed if c.old),
+        "taken back to: " + ", ".join(f"{c.setting.key} {c.old}" for c in lines.changed if c.old),
         *tuning.scheme.notes,
     )
     settings = ControlSettings(tuning, lines.changed, len(stops), notes)

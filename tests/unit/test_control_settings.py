@@ -1,12 +1,15 @@
 """Programs that set their control: where the lines stand, what is refused, what verify finds."""
 
 import io
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from gcodejerk import Machine, process, verify
+from gcodejerk.cli import app
 from gcodejerk.emit import load_controller
 from gcodejerk.emit.program_lines import program_lines
 from gcodejerk.errors import EmitError, ProgramError
@@ -252,3 +255,30 @@ def test_lines_of_the_program_itself_stay_as_they_are():
     for a, b in ((b"G1 X12", b"G1 X13"), (b"G90\r\n", b""), (b"M117", b"M118")):
         assert not verify(program, output.replace(a, b), MACHINES["marlin"]).ok
     assert not verify(program, output, KLIPPER).ok
+
+
+def test_the_commands_write_check_report_and_verify(tmp_path):
+    machine = str(GOLDEN / "settings_twincat" / "machine.yaml")
+    part, report = tmp_path / "part.nc", tmp_path / "r.json"
+    program, output = golden("twincat")
+    part.write_bytes(program)
+    run = CliRunner().invoke
+    options = [str(part), "--machine", machine, "--as", "parameters"]
+    checked = run(app, ["process", *options, "--check"])
+    assert checked.exit_code == 1
+    assert part.read_bytes() == program
+    assert b"G231=" in run(app, ["process", *options, "--diff"]).stdout_bytes
+    done = run(app, ["process", *options, "--report", str(report)])
+    assert "the control is set at 10 places" in done.stdout
+    written = tmp_path / "part.jerk.nc"
+    assert written.read_bytes() == output
+    record = json.loads(report.read_text())
+    assert record["as"] == "parameters"
+    assert {one["number"]: one["old"] for one in record["settings"]} == {
+        "G231": "100", "G233": "100"
+    }  # fmt: skip
+    found = run(app, ["verify", str(part), str(written), "--machine", machine])
+    assert found.exit_code == 0
+    assert "set and restored at 10 places" in found.stdout
+    assert run(app, ["process", *options, "--in-place"]).exit_code == 0
+    assert part.read_bytes() == output
