@@ -48,6 +48,7 @@ class Reason(enum.StrEnum):
     LIMITS = "limits cannot be met"
     NOT_PLAYED = "the control would not play it as planned"
     NOT_BETTER = "no profile within the limits is better"
+    CONTROL_SET = "kept, the control is set instead"
 
 
 REASONS = tuple(Reason)

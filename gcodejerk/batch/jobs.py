@@ -37,6 +37,7 @@ from gcodejerk.planning.designs import known_limits
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line, whole_line
+from gcodejerk.report.tuning_record import settings_record
 from gcodejerk.rewrite.pipeline import Progress, Settings, process_file, silent
 from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import changed_error
@@ -70,6 +71,8 @@ class Done:
     left: int = 0
     written_out: int = 0
     """Blocks of drilling cycles that became explicit moves."""
+    set_at: int = 0
+    """Places at which lines set the control, or take that back."""
     summary: str = ""
     notes: tuple[str, ...] = ()
     diff: bytes = b""
@@ -80,7 +83,7 @@ class Done:
     @property
     def changed(self) -> bool:
         """Whether the output is not the input."""
-        return self.planned > 0 or self.written_out > 0
+        return self.planned > 0 or self.written_out > 0 or self.set_at > 0
 
 
 def run_jobs(
@@ -182,7 +185,7 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             beside = stack.enter_context(tempfile.TemporaryFile())
         result = process_file(source, target, machine, settings, job.input, progress, beside)
         summary = summary_line(job.input, summary_of(result))
-        if job.strict and (result.left or result.read_once):
+        if job.strict and (result.unserved or result.read_once):
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
             report.write(dump(record_of(result, machine, job.output, source, progress)))
@@ -198,7 +201,10 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         summary += f" -> {job.output}" + (f" and {job.beside}" if job.beside else "")
     whole = whole_line(summary_of(result))
     written = 0 if result.expansion is None else result.expansion.written
-    return Done(job.input, result.planned, result.left, written, summary, result.notes, diff, whole)
+    places = 0 if result.settings is None else result.settings.places
+    left = result.left if result.settings is None else result.unserved
+    counts = (result.planned, left, written, places)
+    return Done(job.input, *counts, summary, result.notes, diff, whole)
 
 
 def record_of(
@@ -240,7 +246,8 @@ def record_of(
     if bounds:
         report = progress or silent
         limit = known_limits(result.plans, lambda done, total: report("bounds", done, total))
-    return process_record(result, machine, output, blocks, limit)
+    record = process_record(result, machine, output, blocks, limit)
+    return record if result.settings is None else record | settings_record(result.settings)
 
 
 def _refuse_overwriting(job: Job, machine: Machine) -> None:

@@ -117,7 +117,7 @@ class _Tally:
     def __init__(self, mode: str, quiet: bool, aside: bool, many: bool) -> None:
         self.mode, self.quiet, self.many = mode, quiet, many
         self.out = sys.stderr if aside else sys.stdout
-        self.programs = self.planned = self.left = self.failed = 0
+        self.programs = self.planned = self.left = self.failed = self.set = 0
         self.changed = False
 
     def fail(self, error: str) -> None:
@@ -134,6 +134,7 @@ class _Tally:
         self.programs += 1
         self.planned += done.planned
         self.left += done.left
+        self.set += bool(done.set_at)
         self.changed |= done.changed
         if done.diff:
             sys.stdout.flush()
@@ -153,8 +154,9 @@ class _Tally:
         if self.quiet:
             return
         would = "" if self.mode == "write" else "would be "
+        control = f"control {would}set in {self.set}, " if self.set else ""
         print(
-            f"{self.programs} programs: {self.planned} rapids {would}rewritten, "
+            f"{self.programs} programs: {control}{self.planned} rapids {would}rewritten, "
             f"{self.left} left alone; {self.failed or 'none'} failed",
             file=self.out,
         )
@@ -272,6 +274,12 @@ def verify(
         )
         place = f"{file}:{line}" if line else file
         print(f"{place}: {violation.kind}: {violation.problem}")
+    if found.ok and found.places:
+        print(
+            f"{processed}: is {original} with its control set and restored at {found.places} "
+            "places and nothing else changed"
+        )
+        return
     if found.ok:
         cycles = f"{written} cycles written out, " if expand_cycles else ""
         print(

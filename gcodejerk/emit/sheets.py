@@ -98,6 +98,16 @@ class Sheets:
     """What stands in front of a comment in the control's language, and behind it."""
     upper: bool = False
     """Comments are upper case letters."""
+    program_way: str = ""
+    """The one of its ways that lines of a program can set (`--as parameters`); empty: none."""
+    program_damping: str = ""
+    """What it calls the damping of a shaper, which its lines set with the frequency."""
+    program_sets: str = ""
+    """Regular expression of what in a program sets the same, or keeps what is set for good."""
+    program_inches: bool = False
+    """Its numbers may be inches where a program counts in inches."""
+    acts_on: str = ""
+    """Which moves of a program the settings change."""
     name: str
 
     @abstractmethod

@@ -29,7 +29,7 @@ KNOWN = tuple(
     for reason in (
         Reason.BLOCK_DELETE, Reason.MIXED_AXES, Reason.OTHER_WORDS, Reason.FEED_UNKNOWN,
         Reason.TOO_SHORT, Reason.TOO_LONG, Reason.LIMITS, Reason.NOT_BETTER, Reason.NO_MODE,
-        Reason.NO_BLENDING,
+        Reason.NO_BLENDING, Reason.CONTROL_SET,
     )
 )  # fmt: skip
 """Reasons of rapids that run once, on a straight line from their start to their end."""

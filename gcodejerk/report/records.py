@@ -25,6 +25,7 @@ from gcodejerk.planning.move import Plan
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left, settling_times
 from gcodejerk.reasons import REASONS
+from gcodejerk.rewrite.control_settings import ControlSettings
 from gcodejerk.rewrite.result import Result
 
 Record = dict[str, Any]
@@ -213,7 +214,26 @@ def summary_of(result: Result) -> Record:
     if result.expansion is not None:
         summary["cycles"] = result.expansion.holes
         summary["cycles_expanded"] = result.expansion.written
+    if result.settings is not None:
+        summary |= _of_settings(result.settings)
     return summary
+
+
+def _of_settings(settings: ControlSettings) -> Record:
+    """What the control's own settings gain, and at how many places of the program they stand."""
+    out: Record = {"set_at": settings.places}
+    if settings.tuning is not None and settings.changed:
+        today, chosen = settings.tuning.today, settings.tuning.chosen
+        out |= {
+            "rapid_time": number(chosen.total),
+            "conventional_time": number(today.total),
+            "worst_residual": number(chosen.value),
+            "worst_conventional_residual": number(today.value),
+            "worst_residual_share": number(chosen.value / today.value) if today.value else None,
+            # Those are of streams; what a control leaves rapid by rapid is not known here.
+            **dict.fromkeys(("worst_residual_all", "rapid_time_all", "settling_time")),
+        }
+    return out
 
 
 def process_record(

@@ -15,6 +15,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from gcodejerk.reasons import Reason
+
 if TYPE_CHECKING:
     from gcodejerk.motion.profiles.conditions import Peaks
     from gcodejerk.studies.amplitude_map import Survey
@@ -69,6 +71,8 @@ def summary_line(name: str, summary: Record) -> str:
     rapids = _count(summary["rapids"], "rapid")
     if not summary["rapids"]:
         return f"{name}: 0 rapids found, nothing to do"
+    if summary.get("set_at") is not None:
+        return f"{name}: {rapids}; {_set_line(summary)}"
     parts = [f"{name}: {rapids}, {summary['planned']} rewritten"]
     if summary.get("cycles"):
         of = f" of {summary['cycles']}" if summary["cycles_expanded"] != summary["cycles"] else ""
@@ -87,6 +91,31 @@ def summary_line(name: str, summary: Record) -> str:
         why = ", ".join(f"{count} {reason}" for reason, count in summary["left_by_reason"].items())
         parts.append(f"{summary['left']} left alone ({why})")
     return "; ".join(parts)
+
+
+def _set_line(summary: Record) -> str:
+    """What setting the control gains."""
+    if not summary["set_at"]:
+        return "the control is not set, the program stays as it is"
+    then, now = (
+        summary[key] * UM_PER_MM for key in ("worst_conventional_residual", "worst_residual")
+    )
+    time = [f"{summary[key]:.2f}" for key in ("conventional_time", "rapid_time")]
+    share = (
+        ""
+        if summary["worst_residual_share"] is None
+        else (f"{100.0 * summary['worst_residual_share']:.2g} % of today's ")
+    )
+    others = [
+        f"{count} {reason}"
+        for reason, count in summary["left_by_reason"].items()
+        if reason != Reason.CONTROL_SET
+    ]
+    return (
+        f"the control is set at {summary['set_at']} places: worst residual before a cut "
+        f"{share}({then:.1f} -> {now:.1f} um), rapids {time[0]} -> {time[1]} s"
+        + (f"; not tuned for: {', '.join(others)}" if others else "")
+    )
 
 
 def whole_line(summary: Record) -> str:

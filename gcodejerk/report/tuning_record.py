@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from gcodejerk._version import __version__
-from gcodejerk.emit.sheets import changes
+from gcodejerk.emit.sheets import Change, changes
 from gcodejerk.parameters import Outcome, Tuning
 from gcodejerk.parameters.tuning import SPREAD
 from gcodejerk.report.records import Record, number
+from gcodejerk.rewrite.control_settings import ControlSettings
 
 
 def tuning_record(tuning: Tuning, way: str) -> Record:
@@ -36,29 +39,14 @@ def tuning_record(tuning: Tuning, way: str) -> Record:
         "goal": tuning.goal,
         "band": tuning.machine.design.band,
         "rapids": {"distinct": len(tuning.moves), "all": number(float(tuning.moves.count.sum()))},
-        "today": _outcome(tuning.today),
-        "law_as_today": _outcome(tuning.as_set),
-        "chosen": _outcome(tuning.chosen),
+        "today": outcome_record(tuning.today),
+        "law_as_today": outcome_record(tuning.as_set),
+        "chosen": outcome_record(tuning.chosen),
         "fits": tuning.fits,
         "gains": tuning.gains,
         "proven": tuning.proven,
         "judged": tuning.judged,
-        "settings": [
-            {
-                "number": c.setting.number,
-                "axis": c.setting.axis,
-                "unit": c.unit,
-                "meaning": c.setting.meaning,
-                "old": c.old or None,
-                "new": c.new,
-                "fact": c.setting.mark,
-                "source": c.setting.source,
-                "where": c.setting.where,
-                "restart": c.setting.restart,
-                "live": c.live,
-            }
-            for c in changes(tuning)
-        ],
+        "settings": setting_records(changes(tuning)),
         "curve": [
             {
                 "time": number(point.total),
@@ -80,6 +68,46 @@ def tuning_record(tuning: Tuning, way: str) -> Record:
     }
 
 
-def _outcome(outcome: Outcome) -> Record:
+def setting_records(changed: Iterable[Change]) -> list[Record]:
+    """Old and new number of each setting, and where the fact is from."""
+    return [
+        {
+            "number": c.setting.number,
+            "axis": c.setting.axis,
+            "unit": c.unit,
+            "meaning": c.setting.meaning,
+            "old": c.old or None,
+            "new": c.new,
+            "fact": c.setting.mark,
+            "source": c.setting.source,
+            "where": c.setting.where,
+            "restart": c.setting.restart,
+            "live": c.live,
+        }
+        for c in changed
+    ]
+
+
+def settings_record(settings: ControlSettings) -> Record:
+    """What the report on a program says of the control's settings."""
+    tuning = settings.tuning
+    return {
+        "settings": setting_records(settings.changed),
+        "settings_at": settings.places,
+        "tuning": None
+        if tuning is None
+        else {
+            "law": tuning.scheme.family.name,
+            "goal": tuning.goal,
+            "band": tuning.machine.design.band,
+            "today": outcome_record(tuning.today),
+            "chosen": outcome_record(tuning.chosen),
+            "gains": tuning.gains,
+            "proven": tuning.proven,
+        },
+    }
+
+
+def outcome_record(outcome: Outcome) -> Record:
     """What one way of moving takes and leaves."""
     return {"time": number(outcome.total), "residual": number(outcome.value)}

@@ -20,6 +20,7 @@ from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
+from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
@@ -34,6 +35,7 @@ from gcodejerk.planning.settling import left_alone
 from gcodejerk.planning.stream import Residuals, make_streams
 from gcodejerk.planning.told import RowFormat, in_steps, told_in
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.rewrite.control_settings import PARAMETERS
 from gcodejerk.rewrite.expanded import (
     hunks,
     in_original,
@@ -42,8 +44,9 @@ from gcodejerk.rewrite.expanded import (
 )
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
-from gcodejerk.rewrite.result import Result
+from gcodejerk.rewrite.result import Result, reported_profiles
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
+from gcodejerk.rewrite.set_control import set_control
 from gcodejerk.rewrite.stamp import stamp_text
 from gcodejerk.verification import Verification, require, verify_files
 
@@ -167,7 +170,10 @@ def process_file(
     Result
         Without `output` and `beside`.
     """
-    emitter = load_controller(settings.controller or machine.controller).in_form(settings.form)
+    emitter = load_controller(settings.controller or machine.controller)
+    if settings.form == PARAMETERS:
+        return _set(source, target, machine, settings, name, emitter, progress or silent)
+    emitter = emitter.in_form(settings.form)
     emitter.require(machine)
     if emitter.beside and target is not None and beside is None:
         raise EmitError(
@@ -222,7 +228,7 @@ def _process(
     writer = Rewriter(
         source, target, program, emitter,
         Options(settings.comments, find_dialect(program.dialect)),
-        stamp_text(machine, _chosen(machine, settings, emitter)),
+        stamp_text(machine, _chosen(machine, settings, emitter.name, emitter.form)),
         beside,
         guarded=machine.controller_options.override_guard,
     )  # fmt: skip
@@ -262,6 +268,31 @@ def _process(
             *emitter.notes(program.rapids, plans),
         ),
     )
+
+
+def _set(
+    source: BinaryIO,
+    target: BinaryIO | None,
+    machine: Machine,
+    settings: Settings,
+    name: str,
+    emitter: Controller,
+    report: Progress,
+) -> Result:
+    """Tune the control for a program, and put the lines that set it into it."""
+    sheets = require_way(emitter, emitter.name)
+    if settings.expand_cycles:
+        raise EmitError(
+            "--expand-cycles has nothing to do with --as parameters: no block is rewritten",
+            "leave --expand-cycles out",
+        )
+    program = _read(source, machine, settings, name, emitter, report, None)
+    chosen = _chosen(machine, settings, emitter.name, PARAMETERS)
+    result = set_control(source, target, program, machine, emitter, sheets, chosen)
+    if target is None or not settings.verify:
+        return result
+    found = _verified(source, target, machine, settings, program, result.plans, emitter, None, None)
+    return replace(result, verification=found)
 
 
 def _read(
@@ -326,9 +357,9 @@ def _plan(
     return plans
 
 
-def _chosen(machine: Machine, settings: Settings, emitter: Controller) -> list[str]:
+def _chosen(machine: Machine, settings: Settings, name: str, form: str) -> list[str]:
     """The user's choices that shape the output, for the stamp."""
-    chosen = [emitter.name, emitter.form, settings.profile or machine.design.profile]
+    chosen = [name, form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
     return chosen + ([f"dialect {settings.dialect}"] if settings.dialect is not None else [])
 
@@ -393,7 +424,7 @@ def _verified(
             names=(program.name, f"the output for {program.name}"),
             dialect=program.dialect,
             table=not emitter.in_place,
-            reported=_reported(program, plans) if emitter.play is Play.ALIGNED else None,
+            reported=reported_profiles(program, plans) if emitter.play is Play.ALIGNED else None,
             beside=beside if emitter.beside else None,
         )
         require(lines_in_original(found, lines))
@@ -402,19 +433,6 @@ def _verified(
             raise changed_error(program.name) from None
         raise
     return found
-
-
-def _reported(program: Program, plans: Plans) -> dict[int, Array]:
-    """The profiles as reports say them: durations and jerks along the path, by line."""
-    out = {}
-    for move in np.flatnonzero(plans.planned).tolist():
-        rows = plans.profiles_of(move)
-        if len(rows) == 1:
-            segments = slice(*plans.profiles.first[rows.start : rows.start + 2].tolist())
-            jerk = plans.profiles.jerk[segments] * plans.length[move]
-            line = int(program.rapids.line[move])
-            out[line] = np.stack([plans.profiles.duration[segments], jerk], axis=1)
-    return out
 
 
 def silent(step: str, done: int, total: int) -> None:

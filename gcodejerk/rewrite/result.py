@@ -13,7 +13,8 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left
-from gcodejerk.reasons import CERTAIN, REASONS
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.rewrite.control_settings import ControlSettings
 from gcodejerk.verification import Verification
 
 
@@ -87,6 +88,19 @@ def rapid_results(
     return tuple(out)
 
 
+def reported_profiles(program: Program, plans: Plans) -> dict[int, Array]:
+    """The profiles as reports say them: durations and jerks along the path, by line."""
+    out = {}
+    for move in np.flatnonzero(plans.planned).tolist():
+        rows = plans.profiles_of(move)
+        if len(rows) == 1:
+            segments = slice(*plans.profiles.first[rows.start : rows.start + 2].tolist())
+            jerk = plans.profiles.jerk[segments] * plans.length[move]
+            line = int(program.rapids.line[move])
+            out[line] = np.stack([plans.profiles.duration[segments], jerk], axis=1)
+    return out
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
     """The outcome of one program.
@@ -115,6 +129,9 @@ class Result:
         All that is not the source's, cycles included: see `expanded.hunks`.
     expansion : Expansion or None
         The outcome for the cycles; None where they were not to be written out.
+    settings : ControlSettings or None
+        What the control is set to, where it was to be (form `parameters`); every rapid then stays
+        as it is.
     notes : tuple of str
         What the user has to know: of the program, and of the controller.
     output : bytes or None
@@ -139,6 +156,7 @@ class Result:
     notes: tuple[str, ...]
     output: bytes | None = field(default=None, repr=False)
     beside: bytes | None = field(default=None, repr=False)
+    settings: ControlSettings | None = None
 
     def __repr__(self) -> str:
         return f"<Result {self.program.name}: {self.planned} of {len(self.plans)} rapids rewritten>"
@@ -157,6 +175,12 @@ class Result:
     def left(self) -> int:
         """Number of rapids that were left alone."""
         return len(self.plans) - self.planned
+
+    @property
+    def unserved(self) -> int:
+        """Rapids for which nothing was done: left alone, and the control not set for them."""
+        served = self.plans.reason == REASONS.index(Reason.CONTROL_SET)
+        return self.left - int(np.count_nonzero(served))
 
     @property
     def read_once(self) -> int:

@@ -49,6 +49,7 @@ class Kind(enum.StrEnum):
     SAMPLES = "samples"
     CYCLE = "moves of a cycle"
     READING = "second reading"
+    SETTING = "settings of the control"
     SERIES = "cycle that had to be left to the controller"
 
 
@@ -79,6 +80,8 @@ class Verification:
     confirmed: int = 0
     """Rewritten rapids of which a second reading of the original, which shares nothing with the
     first, says the same; of the others it does not know."""
+    places: int = 0
+    """At which lines set the control, or take that back."""
 
     @property
     def ok(self) -> bool:

@@ -30,6 +30,7 @@ from gcodejerk.verification.rows.files import RowsFile, rows_format
 from gcodejerk.verification.rows.judge import judge_rows
 from gcodejerk.verification.samples import SampleReader
 from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.settings import check_settings, settings_note
 from gcodejerk.verification.table import TableReader
 
 MOST = 100
@@ -189,6 +190,11 @@ def verify_files(
     begin = original.tell()
     program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
+    control = None if table else settings_note(processed)
+    if control is not None:
+        windows = Window(original), Window(processed)
+        kept, places = check_settings(*windows, program, machine, control, found)
+        return Verification(len(program.rapids), 0, kept, found.sorted(), names, places=places)
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
     elif machine.controller == CONTROLLER:

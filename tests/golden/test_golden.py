@@ -2,7 +2,8 @@
 
 A case is a folder with `in.ngc`, `machine.yaml` and `out.ngc` (`out.csv` where the machine's
 controller is `csv`; and `out.ngc.streams` where it writes a file beside); a new folder is a new
-test, one whose name begins with `cycles_` writes drilling cycles out. `pytest --update-golden`
+test, one whose name begins with `cycles_` writes drilling cycles out, one with `settings_` sets the
+control. `pytest --update-golden`
 writes the outputs anew.
 The intervals are long, so that a move is a dozen points that a reader can follow by eye.
 """
@@ -18,6 +19,13 @@ HERE = Path(__file__).parent
 CASES = sorted(path.parent.name for path in HERE.glob("*/in.ngc"))
 
 
+def form_of(case):
+    """The form that a case is written in."""
+    if case.startswith("settings_"):
+        return "parameters"
+    return "position" if case == "hal_position" else "stream"
+
+
 def made(case):
     """The machine, the program and what becomes of it."""
     machine = Machine.load(HERE / case / "machine.yaml")
@@ -28,7 +36,7 @@ def made(case):
         process(
             program,
             machine,
-            form="position" if case == "hal_position" else "stream",
+            form=form_of(case),
             name=f"{case}/in.ngc",
             expand_cycles=case.startswith("cycles_"),
         ),
@@ -69,7 +77,7 @@ def test_golden_outputs_are_not_processed_again(case):
     golden = HERE / case / "out.ngc"
     machine = Machine.load(HERE / case / "machine.yaml")
     with pytest.raises(ProgramError, match="processed by gcodejerk before"):
-        process(golden.read_bytes(), machine)
+        process(golden.read_bytes(), machine, form=form_of(case))
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -71,7 +71,7 @@ ROOMS = {
     findings
  <- bytes
  <- physics | second_reading
- <- cycles | table samples | rows | reported
+ <- cycles | table samples settings | rows | reported
  <- proof
 """),
 }

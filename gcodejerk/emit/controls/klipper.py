@@ -33,6 +33,10 @@ class KlipperController(Sheets, GcodeController):
     )
     sheet_suffix = ".klipper.cfg.txt"
     remark = ("# ", "")
+    program_way = "shaper"
+    program_damping = "DAMPING_RATIO"
+    program_sets = r"SET_VELOCITY_LIMIT|SET_INPUT_SHAPER|M0*204(?!\d)|SAVE_CONFIG|RESTART"
+    acts_on = "ACCEL and shapers act on all moves of the program, cuts too"
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:
         """The acceleration of all moves, and a shaper for each axis."""
@@ -59,6 +63,7 @@ class KlipperController(Sheets, GcodeController):
                 out.append(
                     f"SET_INPUT_SHAPER SHAPER_TYPE_{axis}={own['SHAPER_TYPE']} "
                     f"SHAPER_FREQ_{axis}={own['SHAPER_FREQ']} "
-                    f"DAMPING_RATIO_{axis}={damping[AXES.index(axis)]:g}"
+                    f"DAMPING_RATIO_{axis}="
+                    + own.get("DAMPING_RATIO", f"{damping[AXES.index(axis)]:g}")
                 )
         return out

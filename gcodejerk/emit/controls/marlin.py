@@ -33,6 +33,11 @@ class MarlinController(Sheets, GcodeController):
         Form("parameters", "documented", "M204 T, and M593 (ZV) or M493 (FT motion)"),
     )
     sheet_suffix = ".marlin.g"
+    program_way = "m593"
+    program_damping = "M593 D"
+    program_sets = r"M0*(?:20[14]|593|493|50[0-2])(?!\d)"
+    program_inches = True
+    acts_on = "M204 T acts on travel (G0) alone, M593 on all moves of the program"
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:
         """ZV by M593, or FT motion's shapers by M493."""
@@ -59,7 +64,7 @@ class MarlinController(Sheets, GcodeController):
         damping = no_shaper(machine)["filter_damping"]
         for axis in machine.axis_names:
             own = {s.number: n for s, n in numbers if s.axis == axis}
-            zeta = f"{damping[AXES.index(axis)]:g}"
+            zeta = own.get("M593 D", f"{damping[AXES.index(axis)]:g}")
             if "M593 F" in own:
                 off = own["M593 kind"] == OFF
                 out.append(f"M593 {axis} F0" if off else f"M593 {axis} F{own['M593 F']} D{zeta}")

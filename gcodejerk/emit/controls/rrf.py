@@ -28,6 +28,11 @@ class RrfController(SettingsOnly):
     name = "rrf"
     forms = (Form("parameters", "documented", "M204 T and M593: one shaper for all axes"),)
     sheet_suffix = ".rrf.g"
+    program_way = "shaper"
+    program_damping = "M593 S"
+    program_sets = r"M0*(?:20[14]|593|50[0-2])(?!\d)"
+    program_inches = True
+    acts_on = "M204 T acts on travel (G0) alone, M593 on all moves of the program"
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:
         """The acceleration of travel moves, and one shaper for all axes."""
@@ -55,6 +60,6 @@ class RrfController(SettingsOnly):
         if by.get("M593 P") == OFF:
             out.append('M593 P"none"')
         elif "M593 P" in by:
-            damping = float(no_shaper(machine)["filter_damping"].max())
-            out.append(f'M593 P"{by["M593 P"]}" F{by["M593 F"]} S{damping:g}')
+            damping = by.get("M593 S", f"{float(no_shaper(machine)['filter_damping'].max()):g}")
+            out.append(f'M593 P"{by["M593 P"]}" F{by["M593 F"]} S{damping}')
         return out

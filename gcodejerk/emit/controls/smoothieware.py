@@ -19,6 +19,10 @@ class SmoothiewareController(SettingsOnly):
     name = "smoothieware"
     forms = (Form("parameters", "documented", "M204 X Y Z: acceleration, there is no jerk"),)
     sheet_suffix = ".smoothieware.g"
+    program_way = "acceleration"
+    program_sets = r"M0*(?:204|50[0-2])(?!\d)"
+    program_inches = True
+    acts_on = "M204 acts on all moves of the program, cuts too"
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:
         """Accelerations of the axes."""

@@ -43,6 +43,12 @@ class TwincatController(SettingsOnly):
     )
     sheet_suffix = ".twincat.nc"
     remark = ("(", ")")
+    program_way = "program"
+    program_sets = r"G23[13](?!\d)|SLOPE|MACHINE *DATA"
+    acts_on = (
+        "G231 and G233 act on G0 alone; they need the slope of trapezoids or sine squares that "
+        "today's jerk stands for: the program does not choose one"
+    )
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:
         """Percentages from the program, or the numbers of each axis."""

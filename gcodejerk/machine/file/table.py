@@ -263,7 +263,7 @@ _PROGRAM = Section(
 
 _CONTROLLER_PARAMETER = Section(
     (
-        Key("number", Text(r"\S+", "the number or name of a setting"),
+        Key("number", Text(r"\S+( \S+)*", "the number or name of a setting"),
             "As the control calls it: 1620, MD32431, $120.", required=True, example="1620"),
         Key("axis", Choice(tuple(AXES)),
             "The axis that it belongs to. Left out: all of them.", example="X"),

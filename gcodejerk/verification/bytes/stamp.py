@@ -24,6 +24,8 @@ from gcodejerk.nc import DIALECTS
 WITHIN = 1 << 17
 """A stamp that stands farther from the top is not looked for. [bytes]"""
 FORM = "stream"
+PARAMETERS = "parameters"
+"""The form in which a program sets its control."""
 FORMS = {"linuxcnc-hal": ("adaptive-feed", "position")}
 """Of controllers that have others than FORM."""
 EXPANDED = "expand-cycles"
@@ -102,7 +104,7 @@ def _choices(
     for dialect, expand, name, profile in product(
         (None, *DIALECTS, "auto"), (False, True), names, profiles
     ):
-        for form in FORMS.get(name, (FORM,)):
+        for form in (*FORMS.get(name, (FORM,)), PARAMETERS):
             found = choices_hash(settings_hash, name, profile, expand, dialect, form)
             out.setdefault(found, (name, profile, dialect, expand))
     return out
