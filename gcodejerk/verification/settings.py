@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator
 from typing import BinaryIO
 
-from gcodejerk.machine import Machine
+from gcodejerk.machine import Axis, Machine
 from gcodejerk.nc import Dialect, Program, find_dialect
 from gcodejerk.verification.bytes.settings_form import CONTROLS, PATH, Control, Key, Values
 from gcodejerk.verification.bytes.source import Window
@@ -332,13 +332,17 @@ def _old(key: Key, control: Control, machine: Machine) -> str | None:
     if number in ("G231", "G233"):
         return "100"
     if number and number == control.acceleration:
-        return f"{_today(machine, axis):.0f}"
+        own = [a.rapid.acceleration for a in _moved(control, machine, axis)]
+        return f"{min(own) if control.shared else max(own):.0f}"
     return None
 
 
-def _today(machine: Machine, axis: str) -> float:
-    """Acceleration of today's rapids, of one axis or the largest [mm/s^2]."""
-    return max(a.rapid.acceleration for a in machine.axes if axis in (PATH, a.name))
+def _moved(control: Control, machine: Machine, axis: str) -> list[Axis]:
+    """The axes that an acceleration is of: its own, or all; Klipper's Z has another."""
+    if control.shared:
+        sharing = [a for a in machine.axes if not a.rotary and a.name != "Z"]
+        return sharing or list(machine.axes)
+    return [a for a in machine.axes if axis in (PATH, a.name)]
 
 
 def _same(text: str, wanted: str) -> bool:
@@ -358,8 +362,11 @@ def _beyond(values: Values, control: Control, machine: Machine) -> list[str]:
         if axis and axis not in names:
             out.append(f"{number} {axis}: the machine has no such axis")
         elif number == control.acceleration and number:
-            own = [a for a in machine.axes if axis in (PATH, a.name)]
-            most = max(max(a.limit.acceleration, a.rapid.acceleration) for a in own)
+            own = [
+                max(a.limit.acceleration, a.rapid.acceleration)
+                for a in _moved(control, machine, axis)
+            ]
+            most = min(own) if control.shared else max(own)
             if not 0.0 < float(text) <= most + 1.0:
                 out.append(f"{number} {axis}= {text} is beyond the acceleration limit {most:g}")
         elif number == control.frequency and number and not 0.1 <= float(text) <= 1000.0:

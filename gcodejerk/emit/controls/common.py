@@ -141,9 +141,31 @@ def path_acceleration(machine: Machine) -> dict[str, float]:
     return {"acceleration": max(axis.rapid.acceleration for axis in machine.axes)}
 
 
+def shared_acceleration(machine: Machine, today: dict[str, Array]) -> dict[str, float]:
+    """The one acceleration of Klipper: it keeps none of an axis but Z's (max_z_accel).
+
+    Parameters
+    ----------
+    machine : Machine
+        Its axes.
+    today : dict of str to ndarray, shape (9,)
+        Quantities of the axes: those that share it lose their own.
+
+    Returns
+    -------
+    dict of str to float
+        That of the path today: the least of the axes that share it. [mm/s^2]
+    """
+    sharing = [a for a in machine.axes if not a.rotary and a.name != "Z"] or list(machine.axes)
+    for axis in sharing:
+        today["acceleration"][AXES.index(axis.name)] = np.inf
+    return {"acceleration": min(axis.rapid.acceleration for axis in sharing)}
+
+
 def shaped_scheme(
     name: str, machine: Machine, title: str, first: Setting, kinds: Mapping[str, str],
     facts: tuple[str, str, str, str], called: tuple[str, str], axes: str = SHAPED,
+    shared: bool = False,
 ) -> Scheme:  # fmt: skip
     """An acceleration along the path, and a shaper for each axis.
 
@@ -155,6 +177,10 @@ def shaped_scheme(
         The control's word for each of our kinds of shapers.
     called : tuple of str
         What the control calls kind and frequency.
+    axes : str
+        That have shapers.
+    shared : bool
+        The acceleration along the path is all that holds for the axes, but for Z.
     """
     settings: list[Setting] = [first]
     groups = []
@@ -164,9 +190,10 @@ def shaped_scheme(
             settings += shaper_of(words, axis, facts, called, (0.1, 5.0, 500.0))
             groups.append((0, len(settings) - 2, len(settings) - 1))
     fixed = today_of(machine, "velocity", "acceleration") | no_shaper(machine)
+    path = shared_acceleration(machine, fixed) if shared else path_acceleration(machine)
     return Scheme(
         name, title, FAMILIES["trapezoidal"], fixed, tuple(settings), tuple(groups) or ((0,),),
-        path_acceleration(machine), tuple(kinds),
+        path, tuple(kinds),
         notes=("a rapid needs the highest F: these firmwares move G0 at F",),
         cannot=("a jerk limit",),
     )  # fmt: skip

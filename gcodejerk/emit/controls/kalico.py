@@ -12,7 +12,7 @@ from gcodejerk.emit.controls.common import (
     SettingsOnly,
     acceleration,
     no_shaper,
-    path_acceleration,
+    shared_acceleration,
 )
 from gcodejerk.emit.sheets import today_of
 from gcodejerk.machine import Machine
@@ -39,10 +39,11 @@ class KalicoController(SettingsOnly):
                     500.0, *facts),
         )  # fmt: skip
         fixed = today_of(machine, "velocity", "acceleration")
+        path = shared_acceleration(machine, fixed)
         fixed["notch"] = np.full(len(AXES), 2.0 * float(no_shaper(machine)["filter_for"].max()))
         scheme = Scheme(
             self.name, "notch frequency", FAMILIES["notch-ramp"], fixed, settings, ((0, 1),),
-            path_acceleration(machine), cannot=("two modes", "a notch of each axis"),
+            path, cannot=("two modes", "a notch of each axis"),
         )  # fmt: skip
         return {"notch": scheme}
 

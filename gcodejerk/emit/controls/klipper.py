@@ -49,7 +49,7 @@ class KlipperController(Sheets, GcodeController):
         }
         called = ("SHAPER_TYPE", "SHAPER_FREQ")
         return {"shaper": shaped_scheme(self.name, machine, "acceleration and input shapers", first,
-                                  kinds, facts, called)}  # fmt: skip
+                                  kinds, facts, called, shared=True)}  # fmt: skip
 
     def lines(self, machine: Machine, numbers: Sequence[tuple[Setting, str]]) -> list[str]:
         """Klipper's own commands."""

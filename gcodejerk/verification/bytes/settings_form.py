@@ -30,6 +30,8 @@ class Control:
     frequency: str = ""
     damping: str = ""
     """Of a shaper."""
+    shared: bool = False
+    """The acceleration along the path is all that holds for the axes, but for Z."""
 
 
 def _text(match: re.Match[bytes], group: int) -> str:
@@ -76,7 +78,7 @@ CONTROLS = {
             (re.compile(rb"SET_INPUT_SHAPER SHAPER_TYPE_([XYZ])=([0-9a-z_]+) SHAPER_FREQ_\1=" + _N
                         + rb" DAMPING_RATIO_\1=" + _N), _shaper(_KLIPPER, (1, 2, 3, 4))),
         ),
-        "ACCEL", *_KLIPPER,
+        "ACCEL", *_KLIPPER, shared=True,
     ),
     "marlin": Control(
         (
