@@ -50,6 +50,11 @@ def parameters(
         typer.Option(metavar="SHARE", min=0.1, max=10.0,
                      help="time of all rapids together, of today's"),
     ] = 1.0,
+    tried: Annotated[
+        list[str] | None,
+        typer.Option("--try", metavar="KEY=NUMBER", help="also show what these numbers would do, "
+                     "for example --try '1620 X=130'; may be repeated"),
+    ] = None,
     output: Annotated[
         str | None,
         typer.Option("-o", "--output", metavar="FILE", help="write the setup sheet; - is standard "
@@ -82,6 +87,7 @@ def parameters(
         raise typer.BadParameter(f"--goal {goal}: choose {' or '.join(GOALS)}")
     if plot is not None and Path(plot).suffix.lower() not in FIGURES:
         raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
+    own = _numbers(tried or [])
     written = [name for name in (output, as_json, plot) if name is not None]
     if len(set(written)) < len(written):
         raise typer.BadParameter("-o, --json and --plot are different files")
@@ -95,6 +101,7 @@ def parameters(
     with progress(False) as show:
         moves, of = _moves(files or [], lengths, described, dialect)
         scheme = emitter.scheme(described, settings)
+        scheme.checked(own)
         found = tune(
             scheme, moves, described, goal=goal, time=time,
             progress=None if show is None else lambda done, total: show("searching", done, total),
@@ -113,7 +120,7 @@ def parameters(
     if "-" in written:
         return
     screen = console()
-    for table in tuning_tables(found):
+    for table in tuning_tables(found, own):
         screen.print(table)
     for note in tuning_notes(found):
         print(note)
@@ -155,6 +162,20 @@ def _moves(
             parts.append(program_moves(program.rapids, source, machine))
     name = Path(found[0].path).name if len(found) == 1 else f"{len(found)} programs"
     return joined_moves(parts, machine), name
+
+
+def _numbers(tried: list[str]) -> dict[str, float]:
+    """`1620 X=130` as numbers by their keys."""
+    out = {}
+    for text in tried:
+        key, equals, number = text.rpartition("=")
+        try:
+            out[key.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals or not key.strip():
+            raise typer.BadParameter(f"--try {text}: give a setting and its number, KEY=NUMBER")
+    return out
 
 
 def _range(text: str) -> tuple[float, float]:

@@ -10,6 +10,7 @@ take more time for all rapids together than that, unless the user says so.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,6 +141,12 @@ class Tuning:
     def gains(self) -> bool:
         """Whether the choice leaves less than today, in the time that it may take."""
         return self.fits and self.chosen.value < self.today.value
+
+    def outcome(self, numbers: Mapping[str, float]) -> Outcome:
+        """What numbers of the user's take and leave, the others as today; as `Scheme.checked`."""
+        start = np.where(np.isnan(self.before), self.written, self.before)
+        row = self.scheme.checked(numbers)
+        return _at(self.judge, np.where(np.isnan(row), start, row), self.goal)
 
     def number(self, key: str) -> float:
         """The chosen number of a setting, by its key; ValueError where there is none."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rich.table import Table
 
 from gcodejerk.emit.sheets import GOAL_TEXT, changes
@@ -9,32 +11,41 @@ from gcodejerk.parameters import MARKS, Tuning
 from gcodejerk.report.tables import UM_PER_MM, bare_table
 
 
-def tuning_tables(tuning: Tuning) -> list[Table]:
+def tuning_tables(tuning: Tuning, tried: Mapping[str, float] | None = None) -> list[Table]:
     """Outcomes, settings, and the curve of time, as tables.
 
     Parameters
     ----------
     tuning : Tuning
         Of `parameters.tune`.
+    tried : mapping of str to float, optional
+        Numbers of the user's, by the keys of their settings; PlanError where one cannot be set.
 
     Returns
     -------
     list of Table
     """
-    return [_outcomes(tuning), _settings(tuning), *([_curve(tuning)] if tuning.curve else [])]
+    return [
+        _outcomes(tuning, tried or {}),
+        _settings(tuning),
+        *([_curve(tuning)] if tuning.curve else []),
+    ]
 
 
-def _outcomes(tuning: Tuning) -> Table:
-    """Today, the control's law with today's numbers, and the choice."""
+def _outcomes(tuning: Tuning, tried: Mapping[str, float]) -> Table:
+    """Today, the control's law with today's numbers, with those that are tried, and the choice."""
     table = bare_table(
         ("", "left"), ("all rapids\n[s]", "right"), ("residual\n[um]", "right"),
         ("of today's", "right"),
     )  # fmt: skip
-    rows = (
+    rows = [
         ("today, as the machine file has it", tuning.today),
         (f"{tuning.scheme.controller}, settings as today", tuning.as_set),
         (f"{tuning.scheme.controller}, new settings", tuning.chosen),
-    )
+    ]
+    if tried:
+        said = ", ".join(f"{key} = {number:g}" for key, number in tried.items())
+        rows.insert(2, (f"{tuning.scheme.controller}, {said}", tuning.outcome(tried)))
     for name, one in rows:
         share = one.value / tuning.today.value if tuning.today.value else 0.0
         table.add_row(

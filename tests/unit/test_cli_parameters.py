@@ -64,9 +64,24 @@ def test_lengths_and_more_time(tmp_path):
     assert "-o NAME.siemens-setup.txt" in done.stdout
 
 
+def test_numbers_of_the_users_are_tried():
+    done = run(PLATE, "-m", "vmc", "--controller", "fanuc", "--try", "1620 X=160", "--try",
+               "1621 X=33")  # fmt: skip
+    assert done.exit_code == 0
+    assert "fanuc, 1620 X = 160, 1621 X = 33" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (
+            (PLATE, "-m", "vmc", "--controller", "fanuc", "--try", "1620 X=160.5"),
+            "1620 X = 160.5 cannot be set: 1 to 4000 ms in steps of 1",
+        ),
+        (
+            (PLATE, "-m", "vmc", "--controller", "fanuc", "--try", "1620 X=9000"),
+            "the nearest is 4000",
+        ),
         ((PLATE, "-m", "vmc", "--controller", "haas"), "nothing is known that could be set"),
         ((PLATE, "-m", "vmc", "--controller", "twincat"), "axes.X.rapid.jerk"),
         ((PLATE, "-m", "vmc", "--controller", "fanuc", "--settings", "x"), "it has: constant-acc"),
@@ -95,6 +110,7 @@ def test_program_without_rapids_writes_nothing(tmp_path):
         ("--lengths", "5", "-m", "vmc"),
         ("--lengths", "9:1", "-m", "vmc"),
         (PLATE, "-m", "vmc", "--goal", "best"),
+        (PLATE, "-m", "vmc", "--try", "1620"),
         (PLATE, "-m", "vmc", "--plot", "x.gif"),
         (PLATE, "-m", "vmc", "-o", "a", "--json", "a"),
     ],
