@@ -20,7 +20,7 @@ from gcodejerk.motion.families.filtered import averaged_profiles, filtered
 from gcodejerk.motion.families.filters import KINDS, length, transfer
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
-drawn = settings(deadline=None, phases=PHASES, max_examples=100)
+drawn = settings(deadline=None, phases=PHASES, max_examples=40)
 slow = settings(deadline=None, phases=PHASES, max_examples=15)
 
 frequency = st.floats(3.1, 197.0)

@@ -50,7 +50,7 @@ def made(controller, positioning="linear"):
 
 
 @pytest.mark.parametrize("controller", sorted(set(CONTROLLERS) - {"csv"}))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(data=st.data())
 def test_any_changed_byte_is_found(controller, data):
     machine, output = made(controller)
@@ -63,7 +63,7 @@ def test_any_changed_byte_is_found(controller, data):
 
 
 @pytest.mark.parametrize("controller", sorted(set(CONTROLLERS) - {"csv"}))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(data=st.data())
 def test_a_cut_file_is_found(controller, data):
     machine, output = made(controller)
@@ -72,7 +72,7 @@ def test_a_cut_file_is_found(controller, data):
 
 
 @pytest.mark.parametrize("positioning", ["linear", "independent"])
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_a_changed_number_of_a_table_is_found(positioning, data):
     """A table has no sum: what is found is what the numbers mean."""
@@ -89,7 +89,7 @@ def test_a_changed_number_of_a_table_is_found(positioning, data):
 
 
 @pytest.mark.parametrize("positioning", ["linear", "independent"])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(data=st.data())
 def test_rows_that_are_dropped_swapped_or_doubled_are_found(positioning, data):
     machine, output = made("csv", positioning)
