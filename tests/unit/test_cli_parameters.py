@@ -25,24 +25,27 @@ def refused(*arguments):
     return str(done.exception)
 
 
-def test_sheet_json_and_figure(tmp_path):
+def test_figure(tmp_path):
     pytest.importorskip("matplotlib")
-    sheet, record, figure = tmp_path / "s.txt", tmp_path / "r.json", tmp_path / "f.png"
-    done = run(
-        PLATE, "-m", "vmc", "--controller", "grblhal", "-o", sheet, "--json", record, "--plot",
-        figure,
-    )  # fmt: skip
+    figure = tmp_path / "f.png"
+    done = run("--lengths", "5:50", "-m", "paper", "--controller", "grblhal", "--plot", figure)
+    assert done.exit_code == 0, done.output
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_sheet_and_json(tmp_path):
+    sheet, record = tmp_path / "s.txt", tmp_path / "r.json"
+    done = run(PLATE, "-m", "vmc", "--controller", "grbl", "-o", sheet, "--json", record)
     assert done.exit_code == 0, done.output
     found = json.loads(record.read_text())
-    assert found["controller"] == "grblhal"
+    assert found["controller"] == "grbl"
     assert found["rapids"] == {"distinct": 10, "all": 19}
     assert found["gains"] is True
     assert found["chosen"]["time"] <= found["today"]["time"]
-    assert found["chosen"]["residual"] < 0.1 * found["today"]["residual"]
+    assert found["chosen"]["residual"] < 0.5 * found["today"]["residual"]
     text = sheet.read_text()
     for setting in found["settings"]:
         assert f"{setting['number']}={setting['new']}" in text
-    assert figure.read_bytes().startswith(b"\x89PNG")
     times = [point["time"] for point in found["curve"]]
     left = [point["residual"] for point in found["curve"]]
     assert times == sorted(times)
@@ -65,10 +68,10 @@ def test_lengths_and_more_time(tmp_path):
 
 
 def test_numbers_of_the_users_are_tried():
-    done = run(PLATE, "-m", "vmc", "--controller", "fanuc", "--try", "1620 X=160", "--try",
-               "1621 X=33")  # fmt: skip
+    done = run("--lengths", "5:50", "-m", "paper", "--controller", "fanuc", "--try", "1620 Z=160",
+               "--try", "1621 Z=33")  # fmt: skip
     assert done.exit_code == 0
-    assert "fanuc, 1620 X = 160, 1621 X = 33" in done.stdout
+    assert "fanuc, 1620 Z = 160, 1621 Z = 33" in done.stdout
 
 
 @pytest.mark.parametrize(
