@@ -164,11 +164,17 @@ class Controller(ABC):
 
     def row_format(self, machine: Machine) -> RowFormat:
         """Ticks and steps of rows, for a controller that plays cubics (`Play.CUBIC`)."""
-        raise NotImplementedError(f"controller {self.name} writes no rows")
+        raise self._lacks("rows")
 
     def render_rows(self, rows: Rows, rapids: Rapids, blocks: Sequence[bytes]) -> list[bytes]:
         """Text of each move of a batch of rows, for such a controller."""
-        raise NotImplementedError(f"controller {self.name} writes no rows")
+        raise self._lacks("rows")
+
+    def _lacks(self, what: str) -> EmitError:
+        """What is said where something is asked of a controller that it does not write."""
+        return EmitError(
+            f"controller {self.name} writes no {what}", "`gcodejerk controllers` shows what it does"
+        )
 
     @abstractmethod
     def render(
@@ -199,6 +205,25 @@ class Controller(ABC):
         list of bytes
             b texts, each with its line end.
         """
+
+
+class WithoutStreams(Controller):
+    """A controller that takes no streams: it is told rows, or only has settings."""
+
+    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
+        """There are none."""
+        raise self._lacks("streams")
+
+    def render(
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        blocks: Sequence[bytes],
+        newline: bytes,
+        options: Options,
+    ) -> list[bytes]:
+        """There are none."""
+        raise self._lacks("streams")
 
 
 @cache
@@ -256,6 +281,17 @@ def load_controller(name: str) -> Controller:
         raise EmitError(
             f"{_named(name, entry)} {lacks}",
             f"give its class name = {name!r} and at least one Form",
+        )
+    kind = type(made)
+    missing = [
+        method
+        for method in ("row_format", "render_rows")
+        if made.play is Play.CUBIC and getattr(kind, method) is getattr(Controller, method)
+    ]
+    if missing:
+        raise EmitError(
+            f"{_named(name, entry)} plays cubics and has no {' and no '.join(missing)}",
+            "define them, or give its class another play",
         )
     return made
 

@@ -13,6 +13,7 @@ from gcodejerk.emit.base import Controller, Form
 from gcodejerk.emit.gcode import GcodeController
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
+from gcodejerk.planning.lines import Play
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 
@@ -59,6 +60,10 @@ def test_a_foreign_emitter_is_loaded_through_its_entry_point(monkeypatch):
         (type("Nameless", (Foreign,), {"name": ""}), r"calls itself ''"),
         (type("Formless", (Foreign,), {"forms": ()}), r"has no forms"),
         (type("Mute", (Controller,), {}), r"cannot be loaded: TypeError: .*abstract.*render"),
+        (
+            type("Rowless", (Foreign,), {"play": Play.CUBIC}),
+            r"plays cubics and has no row_format and no render_rows",
+        ),
     ],
 )
 def test_what_an_emitter_lacks_is_told_when_it_is_loaded(monkeypatch, make, problem):

@@ -8,15 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Controller, Form, Options
+from gcodejerk.emit.base import Form, WithoutStreams
 from gcodejerk.emit.sheets import Sheets, axis_settings, today_of
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.families import FAMILIES
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.parameters import Relation, Scheme, Setting, proportional
-from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.plans import Modes
 
 
@@ -25,27 +23,8 @@ def unmeasured(note: str) -> Form:
     return Form("stream", "unverified", f"{note}; watch a first run without a workpiece")
 
 
-class SettingsOnly(Sheets, Controller):
+class SettingsOnly(Sheets, WithoutStreams):
     """A control that we write settings for, and no points."""
-
-    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
-        """There are no points."""
-        raise EmitError(
-            f"controller {self.name} takes no points from us", "see `gcodejerk controllers`"
-        )
-
-    def render(
-        self,
-        batch: Batch,
-        rapids: Rapids,
-        blocks: Sequence[bytes],
-        newline: bytes,
-        options: Options,
-    ) -> list[bytes]:
-        """There are no points."""
-        raise EmitError(
-            f"controller {self.name} takes no points from us", "see `gcodejerk controllers`"
-        )
 
 
 def require_jerk(machine: Machine, name: str) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Controller, Options
+from gcodejerk.emit.base import Controller, Options, WithoutStreams
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
@@ -25,7 +25,6 @@ from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.pvt import Rows
-from gcodejerk.planning.told import RowFormat
 
 Array = NDArray[np.float64]
 
@@ -36,11 +35,10 @@ UM_PER_MM = 1e3
 MS_PER_S = 1e3
 
 
-class PointsController(Controller):
-    """A controller that is told rows of position, velocity and time: a file of its own."""
+class PointsFile(Controller):
+    """A controller whose points are a file of its own: its head, its comments, its sum."""
 
     in_place = False
-    play = Play.CUBIC
     comment = "# "
     """In front of a comment."""
     facts: tuple[str, ...] = ()
@@ -51,21 +49,6 @@ class PointsController(Controller):
     def in_form(self, form: str) -> Controller:
         """The emitter for one of its forms; `stream`, which says nothing else, is the first."""
         return self if form == "stream" else super().in_form(form)
-
-    def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
-        """Rows have steps of their own (`row_format`)."""
-        raise NotImplementedError
-
-    def render(
-        self,
-        batch: Batch,
-        rapids: Rapids,
-        blocks: Sequence[bytes],
-        newline: bytes,
-        options: Options,
-    ) -> list[bytes]:
-        """Rows are no streams (`render_rows`)."""
-        raise NotImplementedError
 
     def header(self, machine: Machine) -> bytes:
         """Head of the file."""
@@ -104,6 +87,16 @@ class PointsController(Controller):
         short = [part for line in lines for part in textwrap.wrap(line, width) or [""]]
         return "".join(f"{self.comment}{line}\n" for line in short).encode("ascii", "replace")
 
+    def footer(self, digest: str) -> bytes:
+        """The sum of all in front."""
+        return self.commented([f"sum {digest}"])
+
+
+class PointsController(WithoutStreams, PointsFile):
+    """A controller that is told rows of position, velocity and time."""
+
+    play = Play.CUBIC
+
     def render_rows(self, rows: Rows, rapids: Rapids, blocks: Sequence[bytes]) -> list[bytes]:
         """A title and the rows of each move."""
         return [self.title(rows, k, rapids) + self.lines(rows, k, rapids) for k in range(len(rows))]
@@ -123,16 +116,12 @@ class PointsController(Controller):
         lines.append(f"leaves {own} um, today's rapid {today} um")
         return self.commented(lines)
 
-    def footer(self, digest: str) -> bytes:
-        """The sum of all in front."""
-        return self.commented([f"sum {digest}"])
-
     @abstractmethod
     def lines(self, rows: Rows, index: int, rapids: Rapids) -> bytes:
         """The rows of one move."""
 
 
-class CyclicController(PointsController):
+class CyclicController(PointsFile):
     """A controller that is given a position in every cycle: whole counts, one interval apart."""
 
     play = Play.TABLE
@@ -180,14 +169,6 @@ class CyclicController(PointsController):
     @abstractmethod
     def points(self, machine: Machine, axes: list[int], counts: NDArray[np.int64]) -> bytes:
         """The counts (k, axes) of a move as text."""
-
-    def row_format(self, machine: Machine) -> RowFormat:
-        """Points are no rows."""
-        raise NotImplementedError
-
-    def lines(self, rows: Rows, index: int, rapids: Rapids) -> bytes:
-        """Points are no rows."""
-        raise NotImplementedError
 
 
 def in_band(plans: Plans, move: int, worst: float) -> list[str]:
