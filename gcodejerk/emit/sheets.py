@@ -63,31 +63,6 @@ class Change:
     live: bool
     stated: bool
 
-    @property
-    def axis_number(self) -> int:
-        """The axis counted from 1, in the order of `AXES`: Fanuc's P."""
-        return AXES.index(self.setting.axis) + 1
-
-
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """Where a table of settings comes from.
-
-    Attributes
-    ----------
-    mark, source : str
-        As those of a `Setting`.
-    where : str
-        How it is set.
-    restart : str
-        Whether the control has to be started anew.
-    """
-
-    mark: str
-    source: str
-    where: str
-    restart: str
-
 
 class Sheets:
     """What a controller has that can be tuned. A controller class derives from it, too."""

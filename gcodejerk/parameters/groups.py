@@ -135,15 +135,15 @@ class Groups:
         fronts = []
         for group in self.groups:
             index = concerned(self.judge.scheme, self.judge.moves, group)
-            own = self.judge.moves.take(index)
-            part = self.judge.take(index[representatives(own)[0]])
-            today = float(self.times[index] @ own.count) * _share_of(part.moves, own)
+            some = index[representatives(self.judge.moves.take(index))[0]]
+            part = self.judge.take(some)
+            today = float(self.times[some] @ part.moves.count)
             found = [self._search(part, self.start, group, t * today) for t in TIMES.tolist()]
             fronts.append([one for one in found if one is not None])
         return fronts
 
     def _balanced(self, budget: float) -> tuple[Array, bool] | None:
-        """Time moved between the axes until all leave alike, then the rest of it used."""
+        """Time moved between the axes until all leave alike, then to the one that leaves most."""
         if not all(self._fronts):
             return None
         values = sorted({one.value for front in self._fronts for one in front})
@@ -225,8 +225,3 @@ class Groups:
         one = Judge(self.judge.scheme, Rows.of(moves, self.machine))
         peaks = one.peaks(written)
         return peaks[0] * share.sum(axis=1), peaks[1] * share.sum(axis=1)
-
-
-def _share_of(some: Moves, moves: Moves) -> float:
-    """How many of the moves some of them are, each as often as it occurs."""
-    return float(some.count.sum() / moves.count.sum())

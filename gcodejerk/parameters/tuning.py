@@ -226,8 +226,10 @@ def tune(
     today, today_off = _today(machine, moves, goal)
     judge = Judge(scheme, rows.in_band(machine.design.band, RAMPS))
     before = scheme.today()
-    start = _filled(scheme, before, machine)
-    work = Groups(judge, machine, start, _ranges(scheme, machine), today.times, goal)
+    ranges = _ranges(scheme, machine)
+    # What today's rapid has none of is as gentle as it may be.
+    start = np.where(np.isnan(before), ranges[:, 1], before)
+    work = Groups(judge, machine, start, ranges, today.times, goal)
     shares = sorted({time, *(SHARES if curve else ())})
     found: dict[float, tuple[Array, bool] | None] = {}
     for done, share in enumerate(sorted(shares, key=lambda s: s != time)):
@@ -295,12 +297,6 @@ def _at(judge: Judge, written: Array, goal: str) -> Outcome:
     """What the control's law does with settings."""
     row = written[np.newaxis]
     return _outcome(judge.times(row)[0], judge.worst(row)[0], judge.moves, goal)
-
-
-def _filled(scheme: Scheme, before: Array, machine: Machine) -> Array:
-    """Today's settings; what today's rapid has none of is as gentle as it may be."""
-    ranges = _ranges(scheme, machine)
-    return np.asarray(np.where(np.isnan(before), ranges[:, 1], before))
 
 
 def _tidy(scheme: Scheme, written: Array, before: Array) -> Array:
