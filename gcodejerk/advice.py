@@ -24,7 +24,7 @@ ABSOLUTE = (
 """Of every figure in um (residues of the closed loop: the servo's gain is in the participation)."""
 NO_MODES = (
     "the machine file has no modes: nothing is known to vibrate, so nothing can be gained, and "
-    "every rapid is left alone"
+    "every rapid is left alone; `gcodejerk machine test-program` writes a program to record it with"
 )
 
 

@@ -17,9 +17,17 @@ import typer
 
 from gcodejerk._version import __version__
 from gcodejerk.batch.signals import exit_on
+from gcodejerk.cli.controllers import controllers
 from gcodejerk.cli.hosts import install
-from gcodejerk.cli.machines import controllers, machine_check, machine_schema
+from gcodejerk.cli.machines import (
+    machine_check,
+    machine_list,
+    machine_schema,
+    machine_show,
+    machine_test_program,
+)
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
+from gcodejerk.cli.new_machine import machine_new
 from gcodejerk.cli.programs import inspect, process, verify
 from gcodejerk.cli.tuning import parameters
 from gcodejerk.errors import GcodejerkError
@@ -27,12 +35,13 @@ from gcodejerk.errors import GcodejerkError
 app = typer.Typer(
     help="Rapids that do not shake the machine: re-times the G0 moves of an NC program.",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-machine_app = typer.Typer(help="Check machine files.", no_args_is_help=True, rich_markup_mode=None)
+machine_app = typer.Typer(
+    help="Make, check and show machine files.", no_args_is_help=True, rich_markup_mode=None
+)
 app.add_typer(machine_app, name="machine")
 
 app.command("process")(process)
@@ -44,7 +53,11 @@ app.command("compare")(compare)
 app.command("parameters")(parameters)
 app.command("controllers")(controllers)
 app.command("install")(install)
+machine_app.command("new")(machine_new)
 machine_app.command("check")(machine_check)
+machine_app.command("list")(machine_list)
+machine_app.command("show")(machine_show)
+machine_app.command("test-program")(machine_test_program)
 machine_app.command("schema")(machine_schema)
 
 

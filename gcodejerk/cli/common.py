@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +16,17 @@ if TYPE_CHECKING:
     from gcodejerk.machine import Machine
 
 MachineOption = Annotated[
-    str,
+    str | None,
     typer.Option(
-        "--machine", "-m", metavar="M", help="machine file, or the name of a shipped machine"
+        "--machine",
+        "-m",
+        metavar="M",
+        envvar="GCODEJERK_MACHINE",
+        help="machine file, or the name of a shipped machine; by default the gcodejerk.yaml in "
+        "the program's folder or above it",
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="print JSON, for other programs")]
 ProfileOption = Annotated[
     str | None,
     typer.Option(
@@ -31,19 +37,50 @@ ProfileOption = Annotated[
 ]
 
 
-def load_machine(name: str, program: str | None) -> Machine:
-    """The machine that the user named: a shipped one, or a file, also beside the program."""
+def load_machine(name: str | None, programs: Sequence[str] = ()) -> Machine:
+    """The machine that the user named, or the one that stands for the programs' folders.
+
+    A name is that of a shipped machine, or of a file, also beside the first program.
+    """
     from gcodejerk.machine import Machine, find_machine
 
-    beside = None
-    if program is not None and program != "-":
-        beside = (Path(program) if Path(program).is_dir() else Path(program).parent) / name
-    if beside is not None and not Path(name).exists() and beside.is_file():
-        return Machine.load(beside)
+    if name is None:
+        return Machine.load(_found(programs))
+    first = programs[0] if programs else "-"
+    if first != "-":
+        beside = (Path(first) if Path(first).is_dir() else Path(first).parent) / name
+        if not Path(name).exists() and beside.is_file():
+            return Machine.load(beside)
     found = find_machine(name)
     described = Machine.load(found)
     # A shipped machine is called by its file's name, wherever it is installed.
     return described if str(found) == name else replace(described, source=found.name)
+
+
+def _found(programs: Sequence[str]) -> Path:
+    """The one machine file that stands for all programs; said on standard error."""
+    from gcodejerk.machine.find import BESIDE, machine_above
+
+    folders = [
+        "." if one == "-" else one if Path(one).is_dir() else os.path.dirname(one) or "."
+        for one in programs
+    ] or ["."]
+    found = {folder: machine_above(folder) for folder in dict.fromkeys(folders)}
+    missing = [folder for folder, path in found.items() if path is None]
+    if missing:
+        raise typer.BadParameter(
+            f"no machine: state --machine M or GCODEJERK_MACHINE, or put a {BESIDE} into "
+            f"{missing[0]} or a folder above it; `gcodejerk machine new` makes one of what your "
+            "control has, `gcodejerk machine list` shows those that are shipped"
+        )
+    paths = list(dict.fromkeys(path for path in found.values() if path is not None))
+    if len(paths) > 1:
+        raise typer.BadParameter(
+            f"these programs belong to different machines, {paths[0]} and {paths[1]}: state "
+            "--machine M, or process them one after the other"
+        )
+    print(f"machine: {paths[0]}", file=sys.stderr)
+    return paths[0]
 
 
 def console() -> Any:

@@ -1,25 +1,34 @@
-"""The commands about machine files and controllers: `machine check`, `machine schema` and so on."""
+"""The commands about machine files: `machine check`, `list`, `show`, `schema`, `test-program`."""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcodejerk.cli.common import console, load_machine
-from gcodejerk.errors import GcodejerkError
+from gcodejerk.cli.common import JsonOption, MachineOption, console, load_machine
+
+if TYPE_CHECKING:
+    from gcodejerk.identification import Excitation
+    from gcodejerk.machine import Machine
+
+DEFAULT_ROOM, DEFAULT_LENGTHS, DEFAULT_REPEATS, DEFAULT_DWELL = 50.0, 4, 3, 2.0
 
 
 def machine_check(
     machine: Annotated[
         str, typer.Argument(metavar="M", help="machine file, or the name of a shipped machine")
     ],
+    as_json: JsonOption = False,
 ) -> None:
     """Validate a machine file; every problem with its line and column."""
-    described = load_machine(machine, None)
+    described = load_machine(machine)
     axes = ", ".join(f"{axis.name} ({len(axis.modes)})" for axis in described.axes)
     structure = f", and {len(described.modes)} of the structure" if described.modes else ""
+    if as_json:
+        print(json.dumps(_summary(described), indent=1, ensure_ascii=False))
+        return
     for warning in described.warnings:
         place, text = str(warning.place), str(warning)
         print(text.replace(place, f"{place}: warning", 1))
@@ -35,20 +44,107 @@ def machine_schema() -> None:
     print(json.dumps(schema(), indent=1))
 
 
-def controllers() -> None:
-    """Show what each controller's emitter can write, and how far its facts can be trusted."""
-    from gcodejerk.emit import controllers as installed
-    from gcodejerk.emit import load_controller
-    from gcodejerk.report.tables import controllers_table
+def machine_list(as_json: JsonOption = False) -> None:
+    """List the shipped machines."""
+    from gcodejerk.machine import Machine
+    from gcodejerk.machine.find import shipped_machines
+    from gcodejerk.report.tables import machines_table
 
-    rows: list[tuple[str, str, str, str]] = []
-    for name in sorted(installed()):
-        try:
-            forms = load_controller(name).forms
-        except GcodejerkError as error:
-            rows.append((name, "-", "broken", str(error)))
-            continue
-        rows += [
-            (name if k == 0 else "", f.name, f.confidence, f.note) for k, f in enumerate(forms)
+    found = {name: Machine.load(path) for name, path in shipped_machines().items()}
+    if as_json:
+        rows = [{"machine": name} | _summary(one) for name, one in found.items()]
+        print(json.dumps(rows, indent=1, ensure_ascii=False))
+        return
+    console().print(machines_table(found))
+
+
+def machine_show(
+    machine: Annotated[str, typer.Argument(metavar="M", help="name of a machine, or a file")],
+    as_json: JsonOption = False,
+) -> None:
+    """Print a machine file as it is, with its comments: a place to begin your own."""
+    from gcodejerk.machine import find_machine
+    from gcodejerk.machine.file.document import read_text
+
+    if as_json:
+        print(json.dumps(_summary(load_machine(machine)), indent=1, ensure_ascii=False))
+        return
+    print(read_text(find_machine(machine)), end="")
+
+
+def machine_test_program(
+    machine: MachineOption = None,
+    axis: Annotated[
+        list[str] | None,
+        typer.Option("--axis", metavar="AXIS", help="only this axis; may be given again"),
+    ] = None,
+    room: Annotated[
+        float, typer.Option(metavar="L", min=0.0, help="room to the plus side [mm or deg]")
+    ] = DEFAULT_ROOM,
+    lengths: Annotated[
+        int, typer.Option(min=1, max=20, help="how many lengths for each axis")
+    ] = DEFAULT_LENGTHS,
+    repeats: Annotated[
+        int, typer.Option(min=1, max=100, help="there and back of each length")
+    ] = DEFAULT_REPEATS,
+    dwell: Annotated[
+        float, typer.Option(metavar="S", min=0.1, max=60.0, help="behind every rapid")
+    ] = DEFAULT_DWELL,
+    output: Annotated[
+        str, typer.Option("-o", "--output", metavar="FILE", help="- is standard output")
+    ] = "-",
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print the lengths in place of the program")
+    ] = False,
+) -> None:
+    """Write a program of rapids and dwells, to record the machine's vibration with."""
+    from gcodejerk.batch.files import new_file
+    from gcodejerk.identification import excitation, rapids_program
+
+    described = load_machine(machine)
+    chosen = [name.upper() for name in axis or ()] or [
+        one.name for one in described.axes if not one.rotary
+    ]
+    rapids = [
+        excitation(described, described.axis(name).name, room, lengths)
+        for name in dict.fromkeys(chosen)
+    ]
+    if as_json:
+        rows = [
+            {
+                "axis": one.axis,
+                "length": one.length,
+                "conventional_time": one.time,
+                "coverage": one.least,
+            }
+            for one in rapids
         ]
-    console().print(controllers_table(rows))
+        print(json.dumps({"machine": described.source, "rapids": rows}, indent=1))
+        return
+    text = rapids_program(described, rapids, repeats, dwell)
+    with new_file(output) as file:
+        file.write(text.encode("ascii", "replace"))
+    if output != "-":
+        print(
+            f"{output}: {', '.join(_said(one) for one in rapids)}; {repeats} times there and back"
+        )
+
+
+def _said(one: Excitation) -> str:
+    return f"{one.axis} {' '.join(f'{length:g}' for length in one.length)}"
+
+
+def _summary(machine: Machine) -> dict[str, object]:
+    """What a list of machines says of one."""
+    return {
+        "file": machine.source,
+        "name": machine.name,
+        "controller": machine.controller,
+        "dialect": machine.dialect,
+        "interval": machine.interval,
+        "positioning": machine.positioning,
+        "axes": {axis.name: len(axis.modes) for axis in machine.axes},
+        "spectra": [axis.name for axis in machine.axes if axis.spectrum is not None],
+        "structure_modes": len(machine.modes),
+        "warnings": [str(warning) for warning in machine.warnings],
+    }

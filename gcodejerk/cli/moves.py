@@ -26,7 +26,7 @@ def plan(
     moves: Annotated[
         list[str], typer.Argument(metavar="AXIS=LENGTH...", help="for example Z=1 or X=20 Y=-5")
     ],
-    machine: MachineOption,
+    machine: MachineOption = None,
     time: Annotated[
         float | None, typer.Option(metavar="S", help="T_SUM; the conventional time by default")
     ] = None,
@@ -56,7 +56,7 @@ def plan(
     from gcodejerk.report.records import conventional_motion, dump, move_record, stream_csv
     from gcodejerk.report.tables import move_limit, move_tables
 
-    described = load_machine(machine, None)
+    described = load_machine(machine)
     emitter = load_controller(described.controller)
     # LinuxCNC follows the profile between the points: judged at every interval, like a table.
     held = emitter.play is Play.HELD
@@ -92,9 +92,9 @@ def plan(
 
 
 def map_amplitudes(
-    machine: MachineOption,
     axis: Annotated[str, typer.Option(metavar="AXIS", help="the axis that moves")],
     length: Annotated[float, typer.Option(metavar="L", help="how far it moves [mm or deg]")],
+    machine: MachineOption = None,
     mode: Annotated[
         str | None,
         typer.Option(
@@ -147,7 +147,7 @@ def map_amplitudes(
         raise typer.BadParameter(
             f"-o {output}: --conditions draws {', '.join(FIGURES)}; a .csv is of one condition"
         )
-    described = load_machine(machine, None)
+    described = load_machine(machine)
     survey = _survey(described, axis, length, (condition or "III").upper(), mode, suffix == TABLE)
     if output is None:
         from gcodejerk.report.tables import map_tables
@@ -173,7 +173,7 @@ def compare(
     moves: Annotated[
         list[str], typer.Argument(metavar="AXIS=LENGTH...", help="for example Z=1 or X=20 Y=-5")
     ],
-    machine: MachineOption,
+    machine: MachineOption = None,
     time: Annotated[
         float | None,
         typer.Option(
@@ -208,7 +208,7 @@ def compare(
     if as_json is not None and as_json == plot:
         raise typer.BadParameter("--json and --plot are two files")
     displacement = _displacement(moves)
-    described = load_machine(machine, None)
+    described = load_machine(machine)
     with progress(False) as show:
         found = compare_move(
             displacement,

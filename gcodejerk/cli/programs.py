@@ -24,7 +24,7 @@ def process(
             metavar="FILE...", help="programs, and folders of programs; - is standard input"
         ),
     ],
-    machine: MachineOption,
+    machine: MachineOption = None,
     output: Annotated[
         str | None,
         typer.Option("-o", "--output", metavar="OUT", help="output file; - is standard output"),
@@ -95,7 +95,7 @@ def process(
         force=force,
         expand_cycles=expand_cycles,
     )
-    described = load_machine(machine, files[0])
+    described = load_machine(machine, files)
     mode = "check" if check else "diff" if diff else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
     aside = diff or any(job.output == "-" for job in batch)
@@ -164,7 +164,7 @@ class _Tally:
 
 def inspect(
     file: Annotated[str, typer.Argument(metavar="FILE", help="a program; - is standard input")],
-    machine: MachineOption,
+    machine: MachineOption = None,
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
     expand_cycles: Annotated[
@@ -178,7 +178,7 @@ def inspect(
     from gcodejerk.report.tables import rapids_table, summary_line, whole_line
     from gcodejerk.rewrite.pipeline import Settings, process_file
 
-    described = load_machine(machine, file)
+    described = load_machine(machine, [file])
     settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
     with open_input(file) as source, progress(as_json) as show:
         result = process_file(source, None, described, settings, file, show)
@@ -200,7 +200,7 @@ def verify(
         str,
         typer.Argument(metavar="PROCESSED", help="the rewritten program, or its table or rows"),
     ],
-    machine: MachineOption,
+    machine: MachineOption = None,
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
     controller: Annotated[
@@ -227,7 +227,7 @@ def verify(
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
-    described = load_machine(machine, original)
+    described = load_machine(machine, [original])
     if report is not None and expand_cycles:
         raise typer.BadParameter("--report: its lines are the original's, before its cycles")
     no_cycles = "--expand-cycles: a table of streams has no cycles written out"

@@ -20,7 +20,7 @@ LENGTHS = 60
 
 
 def parameters(
-    machine: MachineOption,
+    machine: MachineOption = None,
     files: Annotated[
         list[str] | None,
         typer.Argument(
@@ -91,7 +91,7 @@ def parameters(
     written = [name for name in (output, as_json, plot) if name is not None]
     if len(set(written)) < len(written):
         raise typer.BadParameter("-o, --json and --plot are different files")
-    described = load_machine(machine, files[0] if files else None)
+    described = load_machine(machine, files or ())
     emitter = load_controller(controller or described.controller)
     if not isinstance(emitter, Sheets):
         raise EmitError(

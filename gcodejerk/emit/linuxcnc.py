@@ -38,12 +38,11 @@ from gcodejerk.emit.guard import guarded, in_structures
 from gcodejerk.emit.linuxcnc_settings import LinuxcncSettings
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
-from gcodejerk.machine import LINUXCNC, Machine
+from gcodejerk.machine import LINUXCNC, STREAM_HEADROOM, Machine
 from gcodejerk.nc import Dialect, Program, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.straight import HEADROOM
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
@@ -154,7 +153,7 @@ def _too_slow(plans: Plans) -> list[str]:
     raised = []
     for axis in plans.machine.axes:
         stated = plans.machine.controller_options.max_acceleration
-        today, needed = axis.rapid.acceleration, HEADROOM * axis.limit.acceleration
+        today, needed = axis.rapid.acceleration, STREAM_HEADROOM * axis.limit.acceleration
         today = stated.get(axis.name, today)
         moves = plans.planned & (plans.displacement[:, AXES.index(axis.name)] != 0.0)
         if axis.planner == LINUXCNC and today < needed * (1.0 - 1e-6) and moves.any():

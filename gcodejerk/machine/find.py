@@ -8,6 +8,8 @@ from gcodejerk.errors import MachineError
 from gcodejerk.machine.problems import nearest
 
 SUFFIX = ".yaml"
+BESIDE = "gcodejerk.yaml"
+"""What a machine file is called that stands for all programs in its folder and below."""
 
 
 def shipped_machines() -> dict[str, Path]:
@@ -65,3 +67,23 @@ def find_machine(name_or_path: str | Path) -> Path:
         f"no machine is called {text!r}, {known}{hint}",
         f"for a file of your own give its path and suffix, for example ./{text or 'mill'}.yaml",
     )
+
+
+def machine_above(folder: str | Path) -> Path | None:
+    """The machine file that stands for a folder: `gcodejerk.yaml` in it, or in one above it.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to begin; the folder of the program, not the one in which a command was started.
+
+    Returns
+    -------
+    Path or None
+        The nearest one.
+    """
+    begin = Path(folder).resolve()
+    for one in (begin, *begin.parents):
+        if (one / BESIDE).is_file():
+            return one / BESIDE
+    return None

@@ -44,6 +44,8 @@ FILTERS = (
     *("klipper-ei", "2hump_ei", "3hump_ei", "ei2", "ei3"),
 )
 """What may act behind the planner; the first two are set by a time, the others by a mode."""
+STREAM_HEADROOM = 1.05
+"""MAX_ACCELERATION of LinuxCNC over what streams use, to be played as planned."""
 LONE_SHARE = 0.5
 """Share of MAX_ACCELERATION that LinuxCNC 2.9 gives a lone G0.
 

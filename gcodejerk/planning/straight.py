@@ -11,14 +11,15 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.machine import STREAM_HEADROOM
 from gcodejerk.motion import Grid, Profiles, sample_profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.sampling import Counts
 from gcodejerk.motion.servo.knots import END_PERIODS
 from gcodejerk.planning.batch import Sampler
 
-HEADROOM, USED = 1.05, 0.99
-"""MAX_ACCELERATION over what profiles use at least, and the share of it that speeds may use."""
+USED = 0.99
+"""Share of `STREAM_HEADROOM` times what profiles use that speeds may use."""
 FULLEST = 1.5
 """The same at most, where the machine file does not say it."""
 FEWEST = 2.0
@@ -98,12 +99,12 @@ class StraightMoves:
             if axis.name in LINEAR:
                 k = LINEAR.index(axis.name)
                 limit[k], velocity[k] = axis.limit.acceleration, axis.limit.velocity
-                most[k] = options.max_acceleration.get(axis.name, HEADROOM * limit[k])
+                most[k] = options.max_acceleration.get(axis.name, STREAM_HEADROOM * limit[k])
                 full[k] = options.max_acceleration.get(axis.name, FULLEST * limit[k])
         every = Grid.every(count, 1, sampler.interval)
         unit, speed = sample_profiles(profiles, every.knots, sampler.interval)
         peak = profiles.peak_acceleration * length
-        possible &= HEADROOM * peak <= _along(most, direction) * (1.0 + 1e-6)
+        possible &= STREAM_HEADROOM * peak <= _along(most, direction) * (1.0 + 1e-6)
         return cls(
             sampler=sampler,
             profiles=profiles,
@@ -114,7 +115,7 @@ class StraightMoves:
             length=length,
             direction=direction,
             velocity=_along(velocity, direction),
-            most=USED * _along(np.minimum(most, HEADROOM * limit), direction),
+            most=USED * _along(np.minimum(most, STREAM_HEADROOM * limit), direction),
             full=_along(full, direction),
             step=step,
         )

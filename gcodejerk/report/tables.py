@@ -7,7 +7,7 @@ um.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -18,6 +18,7 @@ from rich.text import Text
 from gcodejerk.reasons import Reason
 
 if TYPE_CHECKING:
+    from gcodejerk.machine import Machine
     from gcodejerk.motion.profiles.conditions import Peaks
     from gcodejerk.studies.amplitude_map import Survey
 
@@ -304,13 +305,24 @@ def _peaks(peaks: Peaks, infinite: str) -> tuple[str, str, str]:
     )
 
 
+def machines_table(machines: Mapping[str, Machine]) -> Table:
+    """Machine files by name: what each is, and what it has."""
+    table = bare_table(("machine", "left"), ("axes", "left"), ("modes", "right"), ("what", "left"))
+    for name, one in machines.items():
+        modes = len(one.all_modes())
+        table.add_row(name, "".join(one.axis_names), str(modes), one.name)
+    return table
+
+
 def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
     """Emitters: name, what each can write, and how far its facts can be trusted."""
     table = bare_table(
         ("controller", "left"), ("form", "left"), ("confidence", "left"), ("note", "left")
     )
-    for row in rows:
-        table.add_row(*row)
+    last = ""
+    for name, *rest in rows:
+        table.add_row(name if name != last else "", *rest)
+        last = name
     return table
 
 

@@ -159,7 +159,7 @@ def test_csv_has_one_row_per_interval(run, folder):
         (["process", "part.nc", "-m", "vmc", "--report", "r.html"], "is a .json file"),
         (["process", "-", "-m", "vmc", "--in-place"], "needs a file"),
         (["process", "-m", "vmc"], "Missing argument"),
-        (["process", "part.nc"], "Missing option"),
+        (["process", "part.nc"], "no machine: state --machine"),
         (["plan", "-m", "vmc", "Z"], "AXIS=LENGTH"),
         (["plan", "-m", "vmc", "Z=1", "Z=2"], "twice"),
         (["nonsense"], "No such command"),

@@ -39,7 +39,7 @@ ROOMS = {
     _version axes errors units reasons start advice
  <- nc | machine | motion
  <- cycles | planning
- <- studies | parameters | verification | testing
+ <- studies | parameters | verification | testing | identification
  <- emit
  <- rewrite
  <- report
@@ -57,7 +57,7 @@ ROOMS = {
     parts problems reading
  <- spectrum find
  <- file
- <- model
+ <- model | sources
 """),
     "nc": order("""
     dialects

@@ -11,6 +11,7 @@ from typing import Any
 
 from gcodejerk.errors import MachineError
 from gcodejerk.machine.file.checker import Checker, KeyPath, dotted
+from gcodejerk.machine.parts import STREAM_HEADROOM
 
 LONGEST_BUILD_UP = 0.5
 """Time in which the jerk builds the acceleration up, at most [s]."""
@@ -77,11 +78,13 @@ def plausibility_warnings(values: dict[str, Any], checker: Checker) -> list[Mach
         In the order of the axes.
     """
     slips = _Slips(checker, values["interval"])
+    # Streams for LinuxCNC need that much room below MAX_ACCELERATION, which `rapid` is.
+    share = 1.0 / STREAM_HEADROOM if values.get("controller", "linuxcnc") == "linuxcnc" else 1.0
     for name, axis in values["axes"].items():
         rotary = name in checker.rotary
         for which in ("rapid", "limit"):
             slips.limits(("axes", name, which), axis.get(which, {}), axis["rapid"], rotary)
-        slips.below(("axes", name, "limit"), axis.get("limit", {}), axis["rapid"])
+        slips.below(("axes", name, "limit"), axis.get("limit", {}), axis["rapid"], share)
         slips.resolution(("axes", name, "resolution"), axis["resolution"], rotary)
         for k, mode in axis.get("modes", {}).items():
             slips.mode(("axes", name, "modes", k), mode)
@@ -150,10 +153,15 @@ class _Slips:
                 "least increments of controls are 0.001 or finer",
             )
 
-    def below(self, path: KeyPath, limit: dict[str, Any], rapid: dict[str, Any]) -> None:
-        """A designed rapid that may do less than today's."""
+    def below(
+        self, path: KeyPath, limit: dict[str, Any], rapid: dict[str, Any], share: float
+    ) -> None:
+        """A designed rapid that may do less than today's (of its acceleration, than a share)."""
         for quantity in ("velocity", "acceleration", "jerk"):
-            if quantity in limit and quantity in rapid and limit[quantity] < rapid[quantity]:
+            if quantity not in limit or quantity not in rapid:
+                continue
+            least = (share if quantity == "acceleration" else 1.0) * rapid[quantity]
+            if limit[quantity] < least * (1.0 - 1e-6):
                 self._warn(
                     (*path, quantity),
                     f"{limit[quantity]:g}, below rapid.{quantity} {rapid[quantity]:g}",

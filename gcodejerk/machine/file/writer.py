@@ -43,15 +43,15 @@ def machine_yaml(machine: Description) -> str:
     """
     design, program = machine.design, machine.program
     offsets = {name: _flow(values) for name, values in program.offsets.items()}
-    lengths = {f"H{number}": _number(value) for number, value in program.tool_lengths.items()}
+    lengths = {f"H{number}": number_text(value) for number, value in program.tool_lengths.items()}
     return "\n".join(
         [
             f"schema: {SCHEMA_VERSION}",
-            f"name: {_text(machine.name)}",
-            f"controller: {_text(machine.controller)}",
-            f"dialect: {_text(machine.dialect)}",
+            f"name: {quoted(machine.name)}",
+            f"controller: {quoted(machine.controller)}",
+            f"dialect: {quoted(machine.dialect)}",
             "units: mm",
-            f"interval: {_number(machine.interval)}",
+            f"interval: {number_text(machine.interval)}",
             f"positioning: {machine.positioning}",
             *([f"spindle: {machine.spindle}"] if machine.spindle is not None else []),
             "axes:",
@@ -59,17 +59,17 @@ def machine_yaml(machine: Description) -> str:
             *_modes(machine.modes, ""),
             "design:",
             f"  profile: {design.profile}",
-            f"  band: {_number(design.band)}",
-            f"  guard: {_number(design.guard)}",
-            f"  tolerance: {_number(design.tolerance)}",
-            f"  minimum_length: {_number(design.minimum_length)}",
-            f"  max_extension: {_number(design.max_extension)}",
+            f"  band: {number_text(design.band)}",
+            f"  guard: {number_text(design.guard)}",
+            f"  tolerance: {number_text(design.tolerance)}",
+            f"  minimum_length: {number_text(design.minimum_length)}",
+            f"  max_extension: {number_text(design.max_extension)}",
             *_controller_options(machine.controller_options),
             *_controller_parameters(machine.controller_parameters),
             "program:",
             f"  start: {_flow(program.start)}",
             f"  offsets: {_braces(offsets | lengths)}",
-            f"  startup: {_text(program.startup)}",
+            f"  startup: {quoted(program.startup)}",
             *(
                 [f"  decimal_point: {program.decimal_point}"]
                 if program.decimal_point is not None
@@ -91,13 +91,13 @@ def _controller_options(options: ControllerOptions) -> list[str]:
     texts = {
         "version": str(options.version),
         "planner_type": str(options.planner_type),
-        "servo_period": "" if options.servo_period is None else _number(options.servo_period),
+        "servo_period": "" if options.servo_period is None else number_text(options.servo_period),
         "optimization_depth": str(options.optimization_depth),
         "max_acceleration": _flow(options.max_acceleration),
         "override_guard": str(options.override_guard).lower(),
         "counts_per_unit": _flow(options.counts_per_unit),
-        "axis_names": _braces({axis: _text(name) for axis, name in options.axis_names.items()}),
-        "isx90": "" if options.isx90 is None else _number(options.isx90),
+        "axis_names": _braces({axis: quoted(name) for axis, name in options.axis_names.items()}),
+        "isx90": "" if options.isx90 is None else number_text(options.isx90),
         "fanuc_distance": str(options.fanuc_distance),
         "confirmed": f"[{', '.join(options.confirmed)}]",
     }
@@ -111,11 +111,11 @@ def _controller_parameters(confirmed: tuple[ControllerParameter, ...]) -> list[s
     lines = ["controller_parameters:"] if confirmed else []
     for one in confirmed:
         texts = {
-            "number": _text(one.number),
+            "number": quoted(one.number),
             "axis": one.axis,
-            "unit": None if one.unit is None else _text(one.unit),
-            "meaning": _text(one.meaning) if one.meaning else None,
-            "old": None if one.old is None else _text(one.old),
+            "unit": None if one.unit is None else quoted(one.unit),
+            "meaning": quoted(one.meaning) if one.meaning else None,
+            "old": None if one.old is None else quoted(one.old),
         }
         inner = ", ".join(f"{key}: {text}" for key, text in texts.items() if text is not None)
         lines.append(f"  - {{{inner}}}")
@@ -150,14 +150,14 @@ def _axis(axis: Axis) -> list[str]:
         f"  {axis.name}:",
         f"    type: {'rotary' if axis.rotary else 'linear'}",
         f"    diameter: {'true' if axis.diameter else 'false'}",
-        f"    resolution: {_number(axis.resolution)}",
+        f"    resolution: {number_text(axis.resolution)}",
         f"    rapid: {_rapid(axis)}",
         f"    limit: {_limits(axis.limit)}",
     ]
     if axis.rotary and axis.wrap is not None:
         lines.append(f"    wrap: {axis.wrap}")
     if axis.travel is not None:
-        lines.append(f"    travel: [{', '.join(map(_number, axis.travel))}]")
+        lines.append(f"    travel: [{', '.join(map(number_text, axis.travel))}]")
     if axis.spectrum is not None:
         return [*lines, f"    spectrum: {_spectrum(axis.spectrum)}"]
     return lines + _modes(axis.modes, "    ", axis.name)
@@ -167,7 +167,7 @@ def _spectrum(spectrum: Spectrum) -> str:
     values = {
         # Always in quotes: a file may be called 1e3.
         "file": json.dumps(spectrum.source, ensure_ascii=False),
-        "participation": _number(spectrum.participation),
+        "participation": number_text(spectrum.participation),
     }
     return _braces(values)
 
@@ -179,10 +179,10 @@ def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> lis
     lines = [f"{indent}modes:"]
     for mode in modes:
         values = {
-            "name": _text(mode.name),
-            "frequency": _number(mode.frequency),
-            "damping": _number(mode.damping),
-            "participation": _number(mode.participation_of(axis))
+            "name": quoted(mode.name),
+            "frequency": number_text(mode.frequency),
+            "damping": number_text(mode.damping),
+            "participation": number_text(mode.participation_of(axis))
             if axis
             else _flow(dict(mode.participation)),
         }
@@ -192,16 +192,16 @@ def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> lis
 
 def _rapid(axis: Axis) -> str:
     """What the control's own rapids are set to; what its planner does not need is not there."""
-    own = {name: _number(value) for name, value in axis.law}
+    own = {name: number_text(value) for name, value in axis.law}
     behind = {} if axis.filter is None else {"filter": _filter(axis.filter)}
     return _limits(axis.rapid, {"planner": axis.planner} | own | behind)
 
 
 def _filter(behind: Filter) -> str:
     if behind.kind in AVERAGES:
-        return _braces({"type": behind.kind, "time": _number(behind.time)})
+        return _braces({"type": behind.kind, "time": number_text(behind.time)})
     shaped = {"frequency": behind.frequency, "damping": behind.damping}
-    return _braces({"type": behind.kind} | {k: _number(x) for k, x in shaped.items()})
+    return _braces({"type": behind.kind} | {k: number_text(x) for k, x in shaped.items()})
 
 
 def _limits(limits: Limits, more: Mapping[str, str] | None = None) -> str:
@@ -209,23 +209,23 @@ def _limits(limits: Limits, more: Mapping[str, str] | None = None) -> str:
     values = {"velocity": limits.velocity, "acceleration": limits.acceleration}
     if math.isfinite(limits.jerk):
         values["jerk"] = limits.jerk
-    return _braces({key: _number(value) for key, value in values.items()} | dict(more or {}))
+    return _braces({key: number_text(value) for key, value in values.items()} | dict(more or {}))
 
 
 def _flow(values: Mapping[str, float]) -> str:
-    return _braces({key: _number(value) for key, value in values.items()})
+    return _braces({key: number_text(value) for key, value in values.items()})
 
 
 def _braces(values: dict[str, str]) -> str:
     return "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
     """Shortest text that reads back as the same number, also for readers of YAML 1.1."""
     return re.sub(r"^(-?\d+)e", r"\1.0e", repr(float(value)))
 
 
-def _text(text: str) -> str:
+def quoted(text: str) -> str:
     """Double-quoted scalar, which JSON and YAML write alike; simple words go without quotes."""
     if re.fullmatch(r"(?!(true|false|yes|no|on|off|null)$)[a-z][a-z0-9_-]*", text):
         return text

@@ -1,0 +1,180 @@
+"""The command `machine new`: a machine file from what people have, or from a few questions."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from gcodejerk.machine.sources import Draft
+
+_NAMED = "linuxcnc, fanuc, haas, siemens, heidenhain, grbl, mach, marlin, klipper, csv, ..."
+
+
+def machine_new(
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[FILE...]",
+            help="LinuxCNC INI, grbl $$ dump, FluidNC YAML, Klipper printer.cfg and "
+            "resonances_x.csv, Marlin M503, RepRapFirmware config.g, Fanuc parameters; without "
+            "any, a few questions",
+        ),
+    ] = None,
+    output: Annotated[
+        str, typer.Option("-o", "--output", metavar="FILE", help="- is standard output")
+    ] = "-",
+    name: Annotated[str | None, typer.Option(help="what reports call the machine")] = None,
+    controller: Annotated[
+        str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
+    ] = None,
+    dialect: Annotated[str | None, typer.Option(help="how programs are read")] = None,
+    positioning: Annotated[
+        str | None, typer.Option(help="linear: G0 is straight; independent: each axis on its own")
+    ] = None,
+    interval: Annotated[
+        str | None, typer.Option(metavar="T", help="of commands, with its unit, as in 1ms")
+    ] = None,
+    axis: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--axis", metavar="WORDS",
+            help="'X velocity=36m/min acceleration=0.4g travel=-500:50', also jerk, resolution, "
+            "wrap; may be given again",
+        ),
+    ] = None,
+    mode: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--mode", metavar="WORDS", help="'Z frequency=30 damping=0.02 participation=1'"
+        ),
+    ] = None,
+    headroom: Annotated[
+        float | None,
+        typer.Option(
+            min=1.0, max=10.0, metavar="K",
+            help="the drives can accelerate K times as much as rapids do today",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace the output file")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print the file with what was assumed, as JSON")
+    ] = False,
+) -> None:  # fmt: skip
+    """Make a commented machine file from a control's own configuration, or from answers."""
+    from gcodejerk.batch.files import new_file
+    from gcodejerk.errors import MachineError
+    from gcodejerk.machine import Machine
+    from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
+    from gcodejerk.machine.sources.draft import Fact
+    from gcodejerk.machine.sources.quantity import quantity
+
+    if output != "-" and os.path.lexists(output) and not force:
+        raise MachineError(
+            f"{output} is there already", "give another name, or --force to replace it"
+        )
+    folder = Path(output).parent if output != "-" else Path()
+    asked = not files and not axis
+    if asked and not sys.stdin.isatty():
+        raise typer.BadParameter(
+            "name a control's configuration, or state axes: --axis 'X velocity=36m/min "
+            "acceleration=0.4g'; questions are asked at a terminal only"
+        )
+    draft = draft_of(files or (), folder)
+    draft.name = name or draft.name
+    draft.controller = controller or draft.controller
+    draft.dialect = dialect
+    if positioning is not None:
+        draft.positioning = positioning, "as stated"
+    if interval is not None:
+        draft.interval = Fact(quantity(interval, "time", "interval"), f"as stated, {interval}")
+    for words in axis or ():
+        stated_axis(draft, words)
+    if asked:
+        _ask(draft)
+    for words in mode or ():
+        stated_mode(draft, words)
+    draft.settle(headroom)
+    text = text_of(draft)
+    # What is not a machine file never leaves.
+    Machine.loads(text, output if output != "-" else str(folder / "new.yaml"))
+    if as_json:
+        record = {
+            "file": output, "kind": draft.kind, "controller": draft.controller,
+            "axes": [one.name for one in draft.ordered()], "modes_known": draft.known,
+            "assumed": [line.strip() for line in text.splitlines() if "ASSUMED:" in line],
+            "notes": draft.notes, "text": text,
+        }  # fmt: skip
+    if output != "-" or not as_json:
+        with new_file(output) as file:
+            file.write(text.encode())
+    if as_json:
+        print(json.dumps(record, indent=1, ensure_ascii=False))
+    _say(draft, text, output)
+
+
+def _say(draft: Draft, text: str, output: str) -> None:
+    """What the user has to look at next, on standard error."""
+    assumed = text.count("ASSUMED:") - 1
+    shown = output if output != "-" else "the machine file"
+    print(f"{shown}: {_axes(draft)}; {assumed} values ASSUMED: look at them", file=sys.stderr)
+    for note in draft.notes:
+        print(f"note: {note}", file=sys.stderr)
+    if not draft.known:
+        named = shlex.quote(output) if output != "-" else "FILE"
+        print(
+            "next: nobody has said how it vibrates, so every rapid is left alone; record it with\n"
+            f"  gcodejerk machine test-program --machine {named} -o ring.ngc\n"
+            "and write what rings as modes (the file's end shows how)",
+            file=sys.stderr,
+        )
+
+
+def _axes(draft: Draft) -> str:
+    source = f" from {', '.join(draft.sources)}" if draft.sources else ""
+    return f"axes {' '.join(one.name for one in draft.ordered())}{source}"
+
+
+def _ask(draft: Draft) -> None:
+    """The questions; every answer has a unit, and an empty one to an optional question is no."""
+    from gcodejerk.errors import MachineError
+    from gcodejerk.machine.sources import stated_axis, stated_mode
+
+    def ask(question: str, default: str | None = None) -> str:
+        # On standard error: standard output may be the file.
+        answer = typer.prompt(question, default=default, show_default=bool(default), err=True)
+        return str(answer).strip()
+
+    draft.name = ask("What is the machine called", draft.name or "My machine")
+    draft.controller = ask(f"Which control ({_NAMED})", "linuxcnc")
+    for letter in ask("Its axes", "X Y Z").replace(" ", "").upper():
+        while True:
+            words = [letter]
+            words.append(f"velocity={_joined(ask(f'{letter}: rapid speed, as in 36 m/min'))}")
+            words.append(f"acceleration={_joined(ask(f'{letter}: acceleration, as in 0.4 g'))}")
+            if jerk := ask(f"{letter}: jerk limit, as in 50 m/s^3 (empty: it has none)", ""):
+                words.append(f"jerk={_joined(jerk)}")
+            if travel := ask(f"{letter}: travel, as in -500:50 mm (empty: not known)", ""):
+                words.append(f"travel={_joined(travel)}")
+            try:
+                stated_axis(draft, " ".join(words))
+                break
+            except MachineError as error:
+                print(error, file=sys.stderr)
+        while frequency := ask(f"{letter}: a frequency at which it rings, Hz (empty: none)", ""):
+            damping = ask("   its damping ratio (empty: 0.03, assumed)", "")
+            extra = f" damping={damping}" if damping else ""
+            try:
+                stated_mode(draft, f"{letter} frequency={_joined(frequency)}{extra}")
+            except MachineError as error:
+                print(error, file=sys.stderr)
+
+
+def _joined(answer: str) -> str:
+    return answer.replace(" ", "")

@@ -1,0 +1,166 @@
+"""Klipper and Kalico: printer.cfg with what it includes and what SAVE_CONFIG put at its end.
+
+Facts (Klipper, Config_Reference.md, toolhead.py): max_velocity [mm/s] and max_accel [mm/s^2] are of
+the tool head, whichever axes move; max_z_velocity and max_z_accel bound Z; a trapezoid without jerk
+limit. [input_shaper] acts behind it, per axis: mzv where nothing is said.
+Lines that begin with `#*#` are SAVE_CONFIG's and count.
+"""
+
+from __future__ import annotations
+
+import configparser
+import glob
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from gcodejerk.errors import MachineError, Place
+from gcodejerk.machine.reading import read_file
+from gcodejerk.machine.sources.draft import Draft, Fact
+
+KIND = "Klipper printer.cfg"
+MOST_BYTES, MOST_DEPTH = 1 << 20, 8
+DEFAULT_SHAPER = "mzv"
+STRAIGHT = ("cartesian", "corexy", "corexz", "hybrid_corexy", "hybrid_corexz", "delta", "limited_")
+_SAVED = re.compile(r"^#\*# ?", re.MULTILINE)
+_INCLUDE = re.compile(r"\s*\[include\s+([^\]]+)\]", re.IGNORECASE)
+
+
+def is_klipper(text: str) -> bool:
+    """Whether it is a printer.cfg."""
+    return re.search(r"^\s*\[(printer|stepper_[xyz])\]", text, re.MULTILINE) is not None
+
+
+def read_klipper(path: Path, text: str) -> Draft:
+    """What a printer.cfg says.
+
+    Parameters
+    ----------
+    path : Path
+        The file; includes are looked for beside it.
+    text : str
+        Its text.
+
+    Returns
+    -------
+    Draft
+        The machine so far.
+
+    Raises
+    ------
+    MachineError
+        It cannot be read as a configuration, or a value is no number.
+    """
+    notes: list[str] = []
+    config = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#"))
+    try:
+        for part in _parts(path, text, notes, 0):
+            config.read_string(part, path.name)
+    except configparser.Error as error:
+        raise MachineError(
+            f"{path.name} is not as Klipper reads it: {str(error).splitlines()[0]}", "mend the file"
+        ) from None
+    values = _Config(config, path)
+    draft = Draft(KIND, controller="klipper", name="Klipper printer", notes=notes)
+    draft.positioning = "linear", "Klipper's G0 is a straight line"
+    draft.planner = "trapezoidal", "Klipper has no jerk limit"
+    kinematics = values.text("printer", "kinematics") or "none"
+    if not kinematics.startswith(STRAIGHT):
+        draft.notes.append(
+            f"kinematics {kinematics}: the tool head's limits are taken; watch a first run"
+        )
+    speed = values.fact("printer", "max_velocity")
+    acceleration = values.fact("printer", "max_accel")
+    for letter in "XYZ":
+        axis = draft.axis(letter)
+        axis.velocity = (
+            values.fact("printer", "max_z_velocity") if letter == "Z" else None
+        ) or speed
+        axis.acceleration = (
+            values.fact("printer", "max_z_accel") if letter == "Z" else None
+        ) or acceleration
+        low = values.number(f"stepper_{letter.lower()}", "position_min") or 0.0
+        high = values.number(f"stepper_{letter.lower()}", "position_max")
+        if high is not None and low < high and kinematics != "delta":
+            axis.travel, axis.travel_origin = (
+                (low, high),
+                "position_min (0 unless said), position_max",
+            )
+    _shapers(draft, values)
+    if config.has_section("printer") and config.has_option("printer", "unified_planner"):
+        draft.controller = "kalico"
+    return draft
+
+
+def _shapers(draft: Draft, values: _Config) -> None:
+    """Input shaping of today, which a machine file cannot hold: Z has none, rapids are straight."""
+    found = []
+    for letter in "XY":
+        key = letter.lower()
+        frequency = values.number("input_shaper", f"shaper_freq_{key}")
+        if frequency:
+            own = values.text("input_shaper", f"shaper_type_{key}")
+            kind = own or values.text("input_shaper", "shaper_type") or DEFAULT_SHAPER
+            found.append(f"{letter} {kind} at {frequency:g} Hz")
+    if found:
+        draft.notes.append(
+            f"[input_shaper] is on today ({', '.join(found)}). A machine file has one filter for "
+            "straight rapids of all axes, so it is left out: what this file calls today's "
+            "vibration is that without it"
+        )
+
+
+def _parts(path: Path, text: str, notes: list[str], depth: int) -> Iterator[str]:
+    """Texts in the order in which they count: includes first, where they stand; the saved last."""
+    if depth > MOST_DEPTH:
+        raise MachineError(
+            f"{path.name} is included more than {MOST_DEPTH} deep", "does a file include itself?"
+        )
+    own, saved = [], []
+    for number, line in enumerate(text.splitlines(), 1):
+        if match := _INCLUDE.match(line):
+            named = match[1].strip()
+            files = sorted(glob.glob(str(path.parent / named)))
+            if not files:
+                notes.append(f"{Place(path.name, number)}: {named} was not found, and not read")
+            for name in files:
+                try:
+                    data = read_file(Path(name), MOST_BYTES)
+                except OSError as error:
+                    notes.append(f"{Place(path.name, number)}: {named}: {error}")
+                    continue
+                yield from _parts(Path(name), data.decode("utf-8", "replace"), notes, depth + 1)
+        elif line.startswith("#*#"):
+            saved.append(_SAVED.sub("", line))
+        else:
+            own.append(line)
+    yield "\n".join(own)
+    first = next((k for k, line in enumerate(saved) if line.startswith("[")), len(saved))
+    yield "\n".join(saved[first:])
+
+
+class _Config:
+    """Values as numbers, with what messages need."""
+
+    def __init__(self, config: configparser.RawConfigParser, path: Path) -> None:
+        self.config, self.path = config, path
+
+    def text(self, section: str, key: str) -> str | None:
+        """A value as it is written."""
+        return self.config.get(section, key, fallback=None)
+
+    def number(self, section: str, key: str) -> float | None:
+        """A value as a number."""
+        text = self.text(section, key)
+        try:
+            return None if text is None else float(text)
+        except ValueError:
+            raise MachineError(
+                f"{self.path.name}: [{section}] {key} is {text!r}, expected a number",
+                "mend the file",
+            ) from None
+
+    def fact(self, section: str, key: str) -> Fact | None:
+        """A number with its origin."""
+        value = self.number(section, key)
+        return Fact(value, f"[{section}] {key}") if value and value > 0.0 else None

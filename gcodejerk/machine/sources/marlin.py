@@ -1,0 +1,140 @@
+"""Marlin and RepRapFirmware: the answer to M503, or config.g.
+
+Facts (Marlin's M503 report and G-code index; RepRapFirmware's G-code dictionary): M201 largest
+acceleration of an axis [mm/s^2], M203 largest speed ([mm/s] in Marlin, [mm/min] in
+RepRapFirmware), M204 T acceleration of travel moves, M208 travel (S0 the upper ends, S1 the lower
+ones; RepRapFirmware 3 also X0:200), M593 input shaping. M149 and G20 change units of what a report
+says: under inches it is refused.
+"""
+
+from __future__ import annotations
+
+import re
+
+from gcodejerk.errors import MachineError, Place
+from gcodejerk.machine.sources.draft import Draft, Fact
+from gcodejerk.units import SECONDS_PER_MINUTE
+
+MARLIN, RRF = "Marlin M503", "RepRapFirmware config.g"
+LETTERS = "XYZABC"
+_CODE = re.compile(
+    r"^\s*(?:echo:)?\s*(?:Recv:\s*)?(?:echo:)?\s*(M\d+|G2[01])\b([^;\n(]*)", re.I | re.M
+)
+_WORD = re.compile(r'([A-Za-z])\s*("[^"]*"|[+-]?[\d.:+-]+)')
+_OF_RRF = re.compile(r"^\s*M(550|569|584|669|566|586|552|115)\b|\bM593\s+P\"", re.I | re.M)
+_SHAPERS_OF_RRF = {"zvd", "zvdd", "zvddd", "mzv", "ei2", "ei3"}
+
+Found = dict[str, list[tuple[dict[str, str], int]]]
+
+
+def is_marlin(text: str) -> bool:
+    """Whether speeds and accelerations are set in it."""
+    codes = {match[1].upper() for match in _CODE.finditer(text)}
+    return {"M201", "M203"} <= codes
+
+
+def read_marlin(text: str, name: str) -> Draft:
+    """What a report or a config.g says; what comes twice counts as it came last.
+
+    Raises
+    ------
+    MachineError
+        A word is no number, or the units are inches.
+    """
+    found: Found = {}
+    for match in _CODE.finditer(text):
+        line = text.count("\n", 0, match.start(1)) + 1
+        words = {letter.upper(): value for letter, value in _WORD.findall(match[2])}
+        found.setdefault(match[1].upper(), []).append((words, line))
+    rrf = _OF_RRF.search(text) is not None
+    if "G20" in found and not rrf:
+        raise MachineError(
+            "the report is in inches", "send M149 and G21, then M503 again",
+            Place(name, found["G20"][0][1]),
+        )  # fmt: skip
+    draft = Draft(RRF if rrf else MARLIN, controller="rrf" if rrf else "marlin")
+    draft.name = "RepRapFirmware machine" if rrf else "Marlin machine"
+    draft.positioning = "linear", "its G0 is a straight line"
+    draft.planner = "trapezoidal", "it has no jerk limit (its jerk is a step of the speed)"
+    per = SECONDS_PER_MINUTE if rrf else 1.0
+    shared = _last(found, "M204", "T", name)
+    for letter in LETTERS:
+        speed, own = _last(found, "M203", letter, name), _last(found, "M201", letter, name)
+        if speed is None and own is None:
+            continue
+        axis = draft.axis(letter)
+        if speed is not None:
+            unit = "mm/min" if rrf else "mm/s"
+            axis.velocity = Fact(speed[0] / per, f"M203 {letter}{speed[0]:g} {unit} ({speed[1]})")
+        if own is not None:
+            axis.acceleration = Fact(own[0], f"M201 {letter}{own[0]:g} ({own[1]})")
+        if shared is not None and axis.acceleration and shared[0] < axis.acceleration.value:
+            axis.acceleration = Fact(shared[0], f"M204 T{shared[0]:g} ({shared[1]}), of all travel")
+        _travel(draft, letter, found, name)
+    _shaper(draft, found, name)
+    if not rrf:
+        draft.notes.append("an M503 report has no travel: add travel to each axis")
+    return draft
+
+
+def _number(text: str, what: str, place: Place) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise MachineError(
+            f"{what} is {text!r}, expected a number", "mend the line", place
+        ) from None
+
+
+def _last(found: Found, code: str, letter: str, name: str) -> tuple[float, str] | None:
+    """The last value of a word, with its place."""
+    for words, line in reversed(found.get(code, [])):
+        if letter in words:
+            place = Place(name, line)
+            return _number(words[letter], f"{letter} of {code}", place), str(place)
+    return None
+
+
+def _travel(draft: Draft, letter: str, found: Found, name: str) -> None:
+    low = high = None
+    origin = ""
+    for words, line in found.get("M208", []):
+        if letter not in words:
+            continue
+        place = Place(name, line)
+        origin = f"M208 ({place})"
+        ends = [_number(part, f"{letter} of M208", place) for part in words[letter].split(":")]
+        if len(ends) == 2:
+            low, high = ends
+        elif words.get("S") == "1":
+            low = ends[0]
+        else:
+            high = ends[0]
+    axis = draft.axis(letter)
+    if low is not None and high is not None and low < high:
+        axis.travel, axis.travel_origin = (low, high), origin
+
+
+def _shaper(draft: Draft, found: Found, name: str) -> None:
+    """Input shaping, where it is one for all axes; else a note."""
+    settings = [
+        words for words, _ in found.get("M593", []) if words.get("F", "0") not in {"0", "0.00"}
+    ]
+    if not settings:
+        return
+    if draft.kind == RRF:
+        words = settings[-1]
+        kind = words.get("P", '"none"').strip('"').lower()
+        damping = _last(found, "M593", "S", name)
+        frequency = _last(found, "M593", "F", name)
+        if kind in _SHAPERS_OF_RRF and frequency is not None:
+            shaped: dict[str, str | float] = {
+                "type": kind, "frequency": frequency[0], "damping": damping[0] if damping else 0.1,
+            }  # fmt: skip
+            for axis in draft.axes.values():
+                axis.filter = shaped, f"M593 ({frequency[1]})"
+        return
+    draft.notes.append(
+        "M593 shapes X and Y today; a machine file has one filter for straight rapids of all axes, "
+        "so it is left out, and what this file calls today's vibration is that without it"
+    )
