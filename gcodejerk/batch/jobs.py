@@ -15,9 +15,11 @@ import tempfile
 import traceback
 from collections.abc import Generator
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import BinaryIO
+
+import numpy as np
 
 from gcodejerk.batch.files import (
     STANDARD,
@@ -30,10 +32,12 @@ from gcodejerk.batch.files import (
     same_file,
     version,
 )
+from gcodejerk.batch.originals import keep
 from gcodejerk.batch.workers import map_jobs
 from gcodejerk.errors import EmitError, GcodejerkError
 from gcodejerk.machine import Machine
 from gcodejerk.planning.designs import known_limits
+from gcodejerk.reasons import REASONS
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line, whole_line
@@ -41,6 +45,9 @@ from gcodejerk.report.tuning_record import settings_record
 from gcodejerk.rewrite.pipeline import Progress, Settings, process_file, silent
 from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import changed_error
+
+FIRST_LINES = 12
+"""Of rapids that were left alone, for each reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +66,8 @@ class Job:
     """Are made where they are missing."""
     beside: str | None = None
     """What belongs to the output, for controllers that write such a file."""
+    backup: bool = False
+    """The original is kept where it is replaced."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +88,22 @@ class Done:
     whole: str = ""
     """What the whole program leaves and lasts, where that is known."""
     error: str | None = None
+    output: str | None = None
+    figures: Record = field(default_factory=dict)
+    """Summary of the report."""
+    left_at: tuple[tuple[str, tuple[int, ...], int], ...] = ()
+    """Reason, the first lines of rapids that were left alone for it, and how many there are."""
+
+    def record(self) -> Record:
+        """The same, for other programs."""
+        return {
+            "input": self.input,
+            "output": self.output,
+            "error": self.error,
+            "changed": self.changed,
+            "summary": self.figures or None,
+            "notes": list(self.notes),
+        }
 
     @property
     def changed(self) -> bool:
@@ -195,16 +220,38 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         if job.mode == "write" and not settings.force:
             _refuse_foreign_beside(job)
         diff = difference(source, target, result) if job.mode == "diff" else b""
+        if job.backup and job.mode == "write" and not same_content(job.input, target):
+            keep(job.input, source)
         if job.in_place and version(job.input) != before:
             raise changed_error(job.input)  # an edit of the user's would be lost
     if job.mode == "write" and job.output != STANDARD:
         summary += f" -> {job.output}" + (f" and {job.beside}" if job.beside else "")
-    whole = whole_line(summary_of(result))
+    figures = summary_of(result)
+    whole = whole_line(figures)
     written = 0 if result.expansion is None else result.expansion.written
     places = 0 if result.settings is None else result.settings.places
     left = result.left if result.settings is None else result.unserved
     counts = (result.planned, left, written, places)
-    return Done(job.input, *counts, summary, result.notes, diff, whole)
+    return Done(
+        job.input, *counts, summary, result.notes, diff, whole,
+        output=job.output if job.mode == "write" else None,
+        figures=figures,
+        left_at=_left_at(result),
+    )  # fmt: skip
+
+
+def _left_at(result: Result) -> tuple[tuple[str, tuple[int, ...], int], ...]:
+    """Where rapids were left alone, by reason, the most frequent first."""
+    reason, line = result.plans.reason, result.program.rapids.line
+    codes, counts = np.unique(reason[~result.plans.planned], return_counts=True)
+    return tuple(
+        (
+            str(REASONS[codes[k]]),
+            tuple(line[np.flatnonzero(reason == codes[k])[:FIRST_LINES]].tolist()),
+            int(counts[k]),
+        )
+        for k in np.argsort(-counts, kind="stable").tolist()
+    )
 
 
 def record_of(

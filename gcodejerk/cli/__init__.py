@@ -1,6 +1,7 @@
 """The command line: arguments, files, printing, exit codes. It decides nothing.
 
-Exit status: 0 done, 1 refused or failed (with a message, and nothing half-written), 2 wrong usage.
+Exit status: 0 done, 1 refused or failed (with a message, and nothing half-written), 2 wrong usage,
+3 from `process --check` where something would change.
 Heavy modules are imported inside the commands, so that `--help` answers at once. The commands stand
 in one module per group; this one puts them together and owns what becomes of an error.
 """

@@ -3,18 +3,44 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+import textwrap
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
 
+
+def _machines() -> list[str]:
+    """Names that a shell may complete."""
+    from gcodejerk.machine.find import shipped_machines
+
+    return list(shipped_machines())
+
+
+def _controllers() -> list[str]:
+    from gcodejerk.emit import controllers
+
+    return sorted(controllers())
+
+
+def _profiles() -> list[str]:
+    from gcodejerk.machine.file.table import PROFILES
+
+    return list(PROFILES)
+
+
+ControllerOption = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="see `gcodejerk controllers`", autocompletion=_controllers),
+]
 MachineOption = Annotated[
     str | None,
     typer.Option(
@@ -22,6 +48,7 @@ MachineOption = Annotated[
         "-m",
         metavar="M",
         envvar="GCODEJERK_MACHINE",
+        autocompletion=_machines,
         help="machine file, or the name of a shipped machine; by default the gcodejerk.yaml in "
         "the program's folder or above it",
     ),
@@ -31,6 +58,7 @@ ProfileOption = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
+        autocompletion=_profiles,
         help="condition3 (default), symmetric, cascade, optimal, shortest, conventional, "
         "condition1 or 2",
     ),
@@ -92,31 +120,69 @@ def console() -> Any:
     return Console(highlight=False, width=120)
 
 
+class Bar:
+    """A progress bar on standard error: called by whoever works, cleared by whoever prints."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            TaskProgressColumn,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
+        # Results are ours to print: rich would send them to standard error, with the bar.
+        self.live = Progress(
+            TextColumn("{task.description:>10}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+            redirect_stdout=False,
+            redirect_stderr=False,
+        )
+        self.task = self.live.add_task("", total=None)
+
+    def __call__(self, step: str, done: int, total: int) -> None:
+        """Show how far a step is."""
+        if not self.live.live.is_started:
+            self.live.start()
+        self.live.update(self.task, description=step, completed=done, total=max(total, 1))
+
+    def clear(self) -> None:
+        """Take it from the screen until it is called again."""
+        if self.live.live.is_started:
+            self.live.stop()
+
+
 @contextmanager
-def progress(silent: bool) -> Iterator[Callable[[str, int, int], None] | None]:
+def progress(silent: bool) -> Iterator[Bar | None]:
     """A progress bar on standard error, if that is a terminal."""
     if silent or not sys.stderr.isatty():
         yield None
         return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    bar = Bar()
+    try:
+        yield bar
+    finally:
+        bar.clear()
 
-    columns = (
-        TextColumn("{task.description:>10}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
 
-        def show(step: str, done: int, total: int) -> None:
-            bar.update(task, description=step, completed=done, total=max(total, 1))
-
-        yield show
+def say(text: str, file: TextIO | None = None) -> None:
+    """Print a line; to a terminal, broken between words, what follows indented."""
+    out = file or sys.stdout
+    if not out.isatty():
+        print(text, file=out)
+        return
+    width = shutil.get_terminal_size().columns
+    indent = text[: len(text) - len(text.lstrip())]
+    print(
+        textwrap.fill(
+            text.strip(), width, initial_indent=indent, subsequent_indent=f"{indent}  ",
+            break_long_words=False, break_on_hyphens=False,
+        ),
+        file=out,
+    )  # fmt: skip

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
+from gcodejerk.cli.common import (
+    JsonOption,
+    MachineOption,
+    ProfileOption,
+    console,
+    load_machine,
+    progress,
+)
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
@@ -128,6 +136,7 @@ def map_amplitudes(
     longest: Annotated[
         float | None, typer.Option(metavar="S", help="where T_SUM ends on the map")
     ] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Map what is left of vibration over T1 and T_SUM, for one move of one axis."""
     from gcodejerk.batch.files import new_file
@@ -149,6 +158,12 @@ def map_amplitudes(
         )
     described = load_machine(machine)
     survey = _survey(described, axis, length, (condition or "III").upper(), mode, suffix == TABLE)
+    if as_json:
+        from gcodejerk.report.map_record import map_record
+
+        print(json.dumps(map_record(survey), indent=1, ensure_ascii=False, allow_nan=False))
+    if output is None and as_json:
+        return
     if output is None:
         from gcodejerk.report.tables import map_tables
 

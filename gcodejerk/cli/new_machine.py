@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gcodejerk.cli.common import ControllerOption
+
 if TYPE_CHECKING:
     from gcodejerk.machine.sources import Draft
 
@@ -31,9 +33,7 @@ def machine_new(
         str, typer.Option("-o", "--output", metavar="FILE", help="- is standard output")
     ] = "-",
     name: Annotated[str | None, typer.Option(help="what reports call the machine")] = None,
-    controller: Annotated[
-        str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
-    ] = None,
+    controller: ControllerOption = None,
     dialect: Annotated[str | None, typer.Option(help="how programs are read")] = None,
     positioning: Annotated[
         str | None, typer.Option(help="linear: G0 is straight; independent: each axis on its own")

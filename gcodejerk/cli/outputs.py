@@ -28,6 +28,7 @@ class Outputs:
     output_dir: str | None
     in_place: bool
     report: str | None
+    backup: bool = False
 
     @property
     def report_dir(self) -> str | None:
@@ -40,6 +41,8 @@ class Outputs:
             raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
         if "-" in files and len(files) > 1:
             raise typer.BadParameter("standard input (-) is one program: give it alone")
+        if self.backup and not self.in_place:
+            raise typer.BadParameter("--backup is of --in-place: elsewhere the original stays")
         if self.in_place and "-" in files:
             raise typer.BadParameter("--in-place needs a file, not standard input")
 
@@ -83,6 +86,7 @@ class Outputs:
                 report=report,
                 mode=mode,
                 in_place=self.in_place,
+                backup=self.backup,
                 strict=strict,
                 beside=output + beside if beside else None,
                 new_folders=(

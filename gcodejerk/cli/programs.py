@@ -11,10 +11,24 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcodejerk.cli.common import MachineOption, ProfileOption, console, load_machine, progress
+from gcodejerk.cli.common import (
+    ControllerOption,
+    JsonOption,
+    MachineOption,
+    ProfileOption,
+    console,
+    load_machine,
+    progress,
+    say,
+)
+from gcodejerk.errors import GcodejerkError
 
 if TYPE_CHECKING:
     from gcodejerk.batch.jobs import Done
+    from gcodejerk.verification.findings import Verification
+
+WOULD_CHANGE = 3
+"""Exit status of --check."""
 
 
 def process(
@@ -36,9 +50,7 @@ def process(
         ),
     ] = None,
     in_place: Annotated[bool, typer.Option("--in-place", help="replace each program")] = False,
-    controller: Annotated[
-        str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
-    ] = None,
+    controller: ControllerOption = None,
     form: Annotated[str, typer.Option("--as", help="one of the controller's forms")] = "stream",
     profile: ProfileOption = None,
     dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
@@ -57,7 +69,7 @@ def process(
         ),
     ] = False,
     check: Annotated[
-        bool, typer.Option("--check", help="write nothing; exit 1 if anything would change")
+        bool, typer.Option("--check", help="write nothing; exit 3 if anything would change")
     ] = False,
     diff: Annotated[
         bool, typer.Option("--diff", help="write nothing; print what would change")
@@ -72,6 +84,18 @@ def process(
         bool,
         typer.Option("--force", help="accept a program processed before; replace any output file"),
     ] = False,
+    backup: Annotated[
+        bool, typer.Option("--backup", help="with --in-place: keep the original as FILE.orig")
+    ] = False,
+    revert: Annotated[
+        bool, typer.Option("--revert", help="put the originals that --backup kept back")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print a line of JSON for each program")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("-v", "--verbose", help="print where rapids were left alone, and why")
+    ] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors and notes")] = False,
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
@@ -80,8 +104,11 @@ def process(
     from gcodejerk.cli.outputs import Outputs
     from gcodejerk.rewrite.pipeline import Settings
 
-    outputs = Outputs(output, output_dir, in_place, report)
+    outputs = Outputs(output, output_dir, in_place, report, backup)
     outputs.check(files)
+    if revert:
+        _revert(files)
+        return
     found, problems = find_inputs(files, output_dir)
     many = len(found) + len(problems) > 1
     outputs.check_single(many or any(map(os.path.isdir, files)))
@@ -99,23 +126,45 @@ def process(
     mode = "check" if check else "diff" if diff else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
     aside = diff or any(job.output == "-" for job in batch)
-    tally = _Tally(mode, quiet, aside=aside, many=many)
+    tally = _Tally(mode, quiet, aside=aside, many=many, as_json=as_json, verbose=verbose)
     for problem in problems:
         tally.fail(str(problem))
     with progress(quiet) as show, closing(run_jobs(batch, described, settings, jobs, show)) as runs:
         for done in runs:
+            if show is not None:
+                show.clear()
             tally.add(done)
-    if many:
+    if many and not as_json:
         tally.finish()
-    if tally.failed or (check and tally.changed):
+    if tally.failed:
+        raise typer.Exit(1)
+    if check and tally.changed:
+        raise typer.Exit(WOULD_CHANGE)
+
+
+def _revert(files: list[str]) -> None:
+    """Put originals back in the place of what was made of them."""
+    from gcodejerk.batch.originals import put_back
+
+    failed = False
+    for name in files:
+        try:
+            print(f"{name}: the original is back, from {put_back(name)}")
+        except GcodejerkError as error:
+            failed = True
+            print(error, file=sys.stderr)
+    if failed:
         raise typer.Exit(1)
 
 
 class _Tally:
     """Prints the outcome of each program, and counts."""
 
-    def __init__(self, mode: str, quiet: bool, aside: bool, many: bool) -> None:
+    def __init__(
+        self, mode: str, quiet: bool, *, aside: bool, many: bool, as_json: bool, verbose: bool
+    ) -> None:
         self.mode, self.quiet, self.many = mode, quiet, many
+        self.as_json, self.verbose = as_json, verbose
         self.out = sys.stderr if aside else sys.stdout
         self.programs = self.planned = self.left = self.failed = self.set = 0
         self.changed = False
@@ -128,6 +177,8 @@ class _Tally:
 
     def add(self, done: Done) -> None:
         """Tell and count one program."""
+        if self.as_json:
+            print(json.dumps(done.record(), ensure_ascii=False, allow_nan=False), file=self.out)
         if done.error is not None:
             self.fail(done.error)
             return
@@ -140,14 +191,20 @@ class _Tally:
             sys.stdout.flush()
             sys.stdout.buffer.write(done.diff)
         for note in done.notes:  # -q or not: they are about what the machine will do
-            print(f"{done.input}: note: {note}", file=sys.stderr)
+            say(f"{done.input}: note: {note}", sys.stderr)
+        if self.as_json:
+            return
         if self.mode == "check" and done.changed:
             print(f"{done.input}: would be changed")
         elif not self.quiet:
-            print(done.summary, file=self.out)
+            say(done.summary, self.out)
             # Of many programs each has one line.
             if done.whole and not self.many:
-                print(done.whole, file=self.out)
+                say(done.whole, self.out)
+        if self.verbose:
+            for reason, lines, count in done.left_at:
+                more = f" and {count - len(lines)} more" if count > len(lines) else ""
+                say(f"  {reason}: line {', '.join(map(str, lines))}{more}", self.out)
 
     def finish(self) -> None:
         """Print the line for the whole run."""
@@ -188,10 +245,10 @@ def inspect(
         return
     console().print(rapids_table(record))
     for note in record["notes"]:
-        print(f"note: {note}")
-    print(summary_line(file, record["summary"]).replace(" rewritten", " would be rewritten"))
+        say(f"note: {note}")
+    say(summary_line(file, record["summary"]).replace(" rewritten", " would be rewritten"))
     if whole := whole_line(record["summary"]):
-        print(whole)
+        say(whole)
 
 
 def verify(
@@ -214,6 +271,8 @@ def verify(
         typer.Option(metavar="FILE.json", help="hold streams for LinuxCNC to its profiles, too"),
     ] = None,
     most: Annotated[int, typer.Option(min=1, help="stop after so many violations")] = 100,
+    as_json: JsonOption = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="exit status alone")] = False,
 ) -> None:
     """Prove that a program is the original with only its rapids re-timed; list what it is not."""
     from gcodejerk.batch.files import open_input
@@ -268,6 +327,12 @@ def verify(
                 one, other, described, names=names, dialect=dialect, most=most, table=table,
                 beside=beside, reported=reported,
             )  # fmt: skip
+    if as_json:
+        print(json.dumps(_findings(found, original, processed), indent=1, ensure_ascii=False))
+    if as_json or quiet:
+        if not found.ok:
+            raise typer.Exit(1)
+        return
     for violation in found.violations:
         file, line = (
             (processed, violation.line) if violation.line else (original, violation.original_line)
@@ -292,6 +357,27 @@ def verify(
     more = " or more" if len(found.violations) >= most else ""
     print(f"{processed}: {len(found.violations)}{more} violations: do not run it")
     raise typer.Exit(1)
+
+
+def _findings(found: Verification, original: str, processed: str) -> dict[str, object]:
+    """What a verification found, for other programs."""
+    return {
+        "original": original,
+        "processed": processed,
+        "ok": found.ok,
+        "rapids": found.rapids,
+        "rewritten": found.rewritten,
+        "confirmed": found.confirmed,
+        "violations": [
+            {
+                "kind": str(one.kind),
+                "line": one.line,
+                "original_line": one.original_line,
+                "problem": one.problem,
+            }
+            for one in found.violations
+        ],
+    }
 
 
 def _read_once(count: int) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcodejerk.cli.common import MachineOption, console, load_machine, progress
+from gcodejerk.cli.common import ControllerOption, MachineOption, console, load_machine, progress
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
@@ -27,9 +27,7 @@ def parameters(
             metavar="[FILE...]", help="programs and folders whose rapids it is tuned for"
         ),
     ] = None,
-    controller: Annotated[
-        str | None, typer.Option(metavar="NAME", help="see `gcodejerk controllers`")
-    ] = None,
+    controller: ControllerOption = None,
     settings: Annotated[
         str | None,
         typer.Option("--settings", metavar="NAME", help="which of the control's settings, if it "

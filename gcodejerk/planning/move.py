@@ -16,11 +16,15 @@ from gcodejerk.machine import Machine
 from gcodejerk.motion import profiles_response
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.planning.batch import Batch, NumberFormat
+from gcodejerk.planning.conventional import least_time
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import make_streams
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+
+MEANT_IN_MS = 100.0
+"""A time in s that is so many times what today's rapid takes was meant in ms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,7 +181,7 @@ def plan_move(
     (0.04, 0.0006, 'condition3')
     """
     row = displacement_row(displacement, machine)
-    check_time(time)
+    check_time(time, row, machine)
     plans = plan_moves(row, machine, profile, time=time, T1=T1)
     batches = _streams(plans, stride, play)
     if batches and (stride, play) != (1, Play.TABLE):
@@ -251,9 +255,15 @@ def displacement_row(displacement: Mapping[str, float], machine: Machine) -> Arr
     return row
 
 
-def check_time(time: float | None) -> None:
-    """Refuse a T_SUM [s] that is none."""
+def check_time(time: float | None, row: Array, machine: Machine) -> None:
+    """Refuse a T_SUM [s] that is none, or that is likely to be meant in ms."""
     if time is not None and not (np.isfinite(time) and time > 0.0):
         raise PlanError(
             f"the time is {time:g} s, expected more than zero", "for example --time 0.040"
+        )
+    least = float(least_time(row, machine)[0])
+    if time is not None and time >= 1.0 and 0.0 < MEANT_IN_MS * least < time:
+        raise PlanError(
+            f"the time is {time:g} s, and a rapid of this length takes {least:.3g} s",
+            f"did you mean {time:g} ms? Times are in seconds: --time {time * 1e-3:.6g}",
         )

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from textwrap import wrap
 
-from rich.table import Table
 from rich.text import Text
 
 from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.planning.arrival import BANDS
 from gcodejerk.report.compare_record import axis_peaks
-from gcodejerk.report.tables import MS_PER_S, UM_PER_MM, bare_table
+from gcodejerk.report.screen import ScreenTable
+from gcodejerk.report.tables import MS_PER_S, UM_PER_MM
 from gcodejerk.studies.comparison import DESIGNED, NEEDS_SOLVER, Candidate, Comparison
 
 NEVER = "never"
@@ -26,7 +26,7 @@ WIDTH = 118
 """Of a terminal that a line of notes may fill."""
 
 
-def compare_table(comparison: Comparison) -> Table:
+def compare_table(comparison: Comparison) -> ScreenTable:
     """Times, peaks and residuals, a row for each candidate.
 
     Parameters
@@ -36,11 +36,11 @@ def compare_table(comparison: Comparison) -> Table:
 
     Returns
     -------
-    Table
+    ScreenTable
     """
     unit, small = _units(comparison)
     axis = comparison.longest
-    table = bare_table(
+    table = ScreenTable(
         ("profile", "left"),
         ("time\n[ms]", "right"),
         ("settled\n[ms]", "right"),
@@ -50,14 +50,21 @@ def compare_table(comparison: Comparison) -> Table:
         (f"residual\n[{small}]", "right"),
         *((f"+-{100 * band:.0f} %\n[{small}]", "right") for band in BANDS),
         (f"limit\n[{small}]", "right"),
+        drop=(
+            f"jerk\n[{unit}/s^3]",
+            f"{axis} velocity\n[{unit}/s]",
+            f"+-{100 * BANDS[0]:.0f} %\n[{small}]",
+            f"acceleration\n[{unit}/s^2]",
+            f"limit\n[{small}]",
+        ),
     )
     best = _Best(comparison)
     first_law = comparison.families[0] if comparison.families else None
     for candidate in (*comparison.candidates, *comparison.families):
         if candidate is first_law:
             for name in comparison.absent:
-                table.add_row(f"{name} **", *[UNKNOWN] * (len(table.columns) - 1))
-            table.add_row(*[""] * len(table.columns))
+                table.add_row(f"{name} **", *[UNKNOWN] * (len(table.titles) - 1))
+            table.add_row(*[""] * len(table.titles))
         peak = axis_peaks(comparison, candidate)[axis]
         table.add_row(
             candidate.name + ("" if candidate.within_limits else " *"),

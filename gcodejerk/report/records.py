@@ -211,6 +211,8 @@ def summary_of(result: Result) -> Record:
     )
     summary = {"blocks": result.program.blocks} | records.summary()
     summary["read_once"] = result.read_once
+    inch = result.program.rapids.inch
+    summary["inch"] = bool(len(inch)) and bool(inch.all())
     if result.expansion is not None:
         summary["cycles"] = result.expansion.holes
         summary["cycles_expanded"] = result.expansion.written

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rich import box
-from rich.markup import escape
-from rich.table import Table
 from rich.text import Text
 
 from gcodejerk.reasons import Reason
+from gcodejerk.report.screen import ScreenTable
+from gcodejerk.units import MM_PER_INCH
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from gcodejerk.studies.amplitude_map import Survey
 
 UM_PER_MM = 1000.0
+ROTARY = "ABC"
 MS_PER_S = 1000.0
 MOST_SEGMENTS = 9
 """More are counted, not listed."""
 Record = dict[str, Any]
 
 
-def rapids_table(record: Record) -> Table:
+def rapids_table(record: Record) -> ScreenTable:
     """All rapids of a program: line, from, to, length, times, residual, and why one is left alone.
 
     Parameters
@@ -39,29 +40,33 @@ def rapids_table(record: Record) -> Table:
 
     Returns
     -------
-    Table
+    ScreenTable
     """
-    table = bare_table(
+    unit = _Unit.of(record["summary"])
+    length = f"length\n[{unit.length}]"
+    table = ScreenTable(
         ("line", "right"),
         ("from", "left"),
         ("to", "left"),
-        ("length\n[mm]", "right"),
+        (length, "right"),
         ("conventional\n[ms]", "right"),
         ("planned\n[ms]", "right"),
-        ("residual [um]\nnow -> planned", "right"),
+        (f"residual [{unit.residual}]\nnow -> planned", "right"),
         ("status", "left"),
+        wrap=("status",),
+        drop=("conventional\n[ms]", "from", length, "to", "planned\n[ms]"),
     )
     for row in record["rapids"]:
         planned = row["status"] == "planned"
         status = row["profile"] if planned else f"left alone: {row['reason']}"
         table.add_row(
             str(row["line"]),
-            _position(row["start"]),
-            _position(row["end"]),
-            _number(row["length"], ".3f"),
+            _position(row["start"], unit),
+            _position(row["end"], unit),
+            "" if row["length"] is None else f"{row['length'] / unit.mm:{unit.digits}}",
             _ms(row["conventional_time"], ".1f"),
             _ms(row["time"], ".0f"),
-            _worst(row["residual"]) if planned else "",
+            _worst(row["residual"], unit) if planned else "",
             Text(status, style="" if planned else "yellow"),
         )
     return table
@@ -79,10 +84,12 @@ def summary_line(name: str, summary: Record) -> str:
         of = f" of {summary['cycles']}" if summary["cycles_expanded"] != summary["cycles"] else ""
         parts.append(f"{summary['cycles_expanded']}{of} cycles written out")
     if summary["planned"] and summary["worst_conventional_residual"]:
-        now = summary["worst_conventional_residual"] * UM_PER_MM
-        then = summary["worst_residual"] * UM_PER_MM
+        unit = _Unit.of(summary)
+        now, then = (
+            unit.small(summary[key]) for key in ("worst_conventional_residual", "worst_residual")
+        )
         share = 100.0 * summary["worst_residual_share"]
-        parts.append(f"worst residual {share:.2g} % of today's ({now:.1f} -> {then:.1f} um)")
+        parts.append(f"worst residual {share:.2g} % of today's ({now} -> {then} {unit.residual})")
     if summary["extended"]:
         extra = (summary["rapid_time"] - summary["conventional_time"]) * MS_PER_S
         parts.append(f"{summary['extended']} longer than today, {extra:.0f} ms in all")
@@ -123,8 +130,9 @@ def whole_line(summary: Record) -> str:
     """One line on the whole program: what stays, and the time that a shop pays for."""
     if not summary["planned"] or summary["worst_residual_all"] is None:
         return ""
+    unit = _Unit.of(summary)
     worst = [
-        f"{summary[key] * UM_PER_MM:.1f}"
+        unit.small(summary[key])
         for key in ("worst_conventional_residual_all", "worst_residual_all")
     ]
     motion = [f"{summary[key]:.2f}" for key in ("conventional_time_all", "rapid_time_all")]
@@ -134,13 +142,13 @@ def whole_line(summary: Record) -> str:
     ]
     unknown = f", {summary['left_unknown']} not known" if summary["left_unknown"] else ""
     return (
-        f"  all rapids, those left alone too{unknown}: worst {worst[0]} -> {worst[1]} um; "
-        f"in motion {motion[0]} -> {motion[1]} s; then until all is within "
-        f"{summary['tolerance'] * UM_PER_MM:g} um {waiting[0]} -> {waiting[1]} s"
+        f"  all rapids, those left alone too{unknown}: worst {worst[0]} -> {worst[1]} "
+        f"{unit.residual}; in motion {motion[0]} -> {motion[1]} s; then until all is within "
+        f"{summary['tolerance'] * unit.per_mm:.3g} {unit.residual} {waiting[0]} -> {waiting[1]} s"
     )
 
 
-def move_tables(record: Record, conventional: Record) -> list[Table]:
+def move_tables(record: Record, conventional: Record) -> list[ScreenTable]:
     """One planned move beside the conventional one: times and peaks, then residuals.
 
     Parameters
@@ -151,10 +159,10 @@ def move_tables(record: Record, conventional: Record) -> list[Table]:
 
     Returns
     -------
-    list of Table
+    list of ScreenTable
     """
     row, usual = record["rapids"][0], conventional
-    table = bare_table(
+    table = ScreenTable(
         ("profile", "left"),
         ("T_SUM\n[ms]", "right"),
         ("segments\n[ms]", "left"),
@@ -162,6 +170,8 @@ def move_tables(record: Record, conventional: Record) -> list[Table]:
         ("velocity\n[mm/s]", "right"),
         ("acceleration\n[mm/s^2]", "right"),
         ("jerk\n[mm/s^3]", "right"),
+        wrap=("segments\n[ms]",),
+        drop=("jerk\n[mm/s^3]", "velocity\n[mm/s]", "segments\n[ms]"),
     )
     for name, motion in ((row["profile"], row), ("conventional today", usual)):
         for k, (axis, peak) in enumerate(motion["peak"].items()):
@@ -205,9 +215,9 @@ def _segments(segments: Sequence[Record]) -> str:
     return " / ".join(f"{t:.4g}" for t in times)
 
 
-def _residual_table(residual: Sequence[Record]) -> Table:
+def _residual_table(residual: Sequence[Record]) -> ScreenTable:
     """What each mode keeps: of the profiles, and of the streams as sampled and written."""
-    table = bare_table(
+    table = ScreenTable(
         ("axis", "left"),
         ("mode", "left"),
         ("frequency\n[Hz]", "right"),
@@ -215,6 +225,12 @@ def _residual_table(residual: Sequence[Record]) -> Table:
         ("profile [mm/s^2]\ntoday -> planned", "right"),
         ("stream [mm/s^2]\ntoday -> planned", "right"),
         ("stream [um]\ntoday -> planned", "right"),
+        wrap=("mode",),
+        drop=(
+            "profile [mm/s^2]\ntoday -> planned",
+            "damping\n[-]",
+            "stream [mm/s^2]\ntoday -> planned",
+        ),
     )
     for entry in residual:
         pairs = (
@@ -236,7 +252,7 @@ def _residual_table(residual: Sequence[Record]) -> Table:
     return table
 
 
-def map_tables(survey: Survey) -> list[Table]:
+def map_tables(survey: Survey) -> list[ScreenTable]:
     """A survey in figures: the profile it would choose, and what each mode keeps of it.
 
     Parameters
@@ -246,18 +262,19 @@ def map_tables(survey: Survey) -> list[Table]:
 
     Returns
     -------
-    list of Table
+    list of ScreenTable
         One of the profile beside the limits, one of the modes; the first alone says so where no
         time is long enough for the limits.
     """
     chosen, unit = survey.choose(), survey.unit
-    move = bare_table(
+    move = ScreenTable(
         (f"{survey.axis.name} {survey.length:g} {unit}", "left"),
         ("T_SUM\n[ms]", "right"),
         ("T1\n[ms]", "right"),
         (f"velocity\n[{unit}/s]", "right"),
         (f"acceleration\n[{unit}/s^2]", "right"),
         (f"jerk\n[{unit}/s^3]", "right"),
+        drop=(f"jerk\n[{unit}/s^3]", f"velocity\n[{unit}/s]"),
     )
     move.add_row("limit", "", "", *_peaks(survey.limit, "none"))
     usual = _peaks(survey.conventional_peaks, "step")
@@ -271,13 +288,16 @@ def map_tables(survey: Survey) -> list[Table]:
         f"{chosen.T1 * MS_PER_S:.4g}",
         *_peaks(survey.peaks(chosen), "step"),
     )
-    modes = bare_table(
+    amplitude = f"amplitude [{unit}/s^2]\ntoday -> best"
+    modes = ScreenTable(
         ("mode", "left"),
         ("frequency\n[Hz]", "right"),
         ("damping\n[-]", "right"),
-        (f"amplitude [{unit}/s^2]\ntoday -> best", "right"),
+        (amplitude, "right"),
         (f"displacement [{'um' if unit == 'mm' else 'deg/1000'}]\ntoday -> best", "right"),
         ("next null [ms]\nT_SUM (T1)", "right"),
+        wrap=("mode",),
+        drop=("damping\n[-]", amplitude, "next null [ms]\nT_SUM (T1)"),
     )
     for mode in survey.counted_modes:
         now = survey.conventional_amplitude(mode)
@@ -305,20 +325,23 @@ def _peaks(peaks: Peaks, infinite: str) -> tuple[str, str, str]:
     )
 
 
-def machines_table(machines: Mapping[str, Machine]) -> Table:
+def machines_table(machines: Mapping[str, Machine]) -> ScreenTable:
     """Machine files by name: what each is, and what it has."""
-    table = bare_table(("machine", "left"), ("axes", "left"), ("modes", "right"), ("what", "left"))
+    table = ScreenTable(
+        ("machine", "left"), ("axes", "left"), ("modes", "right"), ("what", "left"), wrap=("what",)
+    )
     for name, one in machines.items():
         modes = len(one.all_modes())
         table.add_row(name, "".join(one.axis_names), str(modes), one.name)
     return table
 
 
-def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
+def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> ScreenTable:
     """Emitters: name, what each can write, and how far its facts can be trusted."""
-    table = bare_table(
-        ("controller", "left"), ("form", "left"), ("confidence", "left"), ("note", "left")
-    )
+    table = ScreenTable(
+        ("controller", "left"), ("form", "left"), ("confidence", "left"), ("note", "left"),
+        wrap=("note",), drop=("confidence",),
+    )  # fmt: skip
     last = ""
     for name, *rest in rows:
         table.add_row(name if name != last else "", *rest)
@@ -326,18 +349,39 @@ def controllers_table(rows: Sequence[tuple[str, str, str, str]]) -> Table:
     return table
 
 
-def bare_table(*columns: tuple[str, str]) -> Table:
-    """A table without frame, its head underlined."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
-    for name, justify in columns:
-        # Unescaped, a unit in brackets is taken for a style and vanishes.
-        table.add_column(escape(name), justify=justify, overflow="fold")  # type: ignore[arg-type]
-    return table
+@dataclass(frozen=True, slots=True)
+class _Unit:
+    """Units in which a program is shown: those in which it is written."""
+
+    length: str
+    mm: float
+    """In one of them."""
+    digits: str
+    residual: str
+    per_mm: float
+    """Of the unit of residuals."""
+    decimals: int
+
+    @classmethod
+    def of(cls, summary: Record) -> _Unit:
+        """Inches where all rapids are in inches."""
+        return _INCH if summary.get("inch") else _METRIC
+
+    def small(self, length: float) -> str:
+        """A residual of so many mm."""
+        return f"{length * self.per_mm:.{self.decimals}f}"
 
 
-def _position(position: dict[str, float | None]) -> str:
+_METRIC = _Unit("mm", 1.0, ".3f", "um", UM_PER_MM, 1)
+_INCH = _Unit("inch", MM_PER_INCH, ".4f", "thou", UM_PER_MM / MM_PER_INCH, 2)
+
+
+def _position(position: dict[str, float | None], unit: _Unit) -> str:
     """`X1.5 Z?` with a question mark for what is unknown."""
-    return " ".join(f"{axis}{'?' if x is None else f'{x:.6g}'}" for axis, x in position.items())
+    return " ".join(
+        f"{axis}?" if x is None else f"{axis}{x / (1.0 if axis in ROTARY else unit.mm):.6g}"
+        for axis, x in position.items()
+    )
 
 
 def _number(value: float | None, form: str) -> str:
@@ -348,12 +392,14 @@ def _ms(value: float | None, form: str) -> str:
     return "" if value is None else f"{value * MS_PER_S:{form}}"
 
 
-def _worst(residual: Sequence[Record]) -> str:
+def _worst(residual: Sequence[Record], unit: _Unit) -> str:
     """The largest residual displacement now and as planned."""
     if not residual:
         return "no modes"
-    now = max(entry["conventional_displacement"] for entry in residual) * UM_PER_MM
-    then = max(entry["displacement"] for entry in residual) * UM_PER_MM
+    now, then = (
+        max(entry[key] for entry in residual) * unit.per_mm
+        for key in ("conventional_displacement", "displacement")
+    )
     return f"{now:.2f} -> {then:.2f}"
 
 

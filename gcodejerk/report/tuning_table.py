@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rich.table import Table
-
 from gcodejerk.emit.sheets import GOAL_TEXT, changes
 from gcodejerk.parameters import MARKS, Tuning
-from gcodejerk.report.tables import UM_PER_MM, bare_table
+from gcodejerk.report.screen import ScreenTable
+from gcodejerk.report.tables import UM_PER_MM
 
 
-def tuning_tables(tuning: Tuning, tried: Mapping[str, float] | None = None) -> list[Table]:
+def tuning_tables(tuning: Tuning, tried: Mapping[str, float] | None = None) -> list[ScreenTable]:
     """Outcomes, settings, and the curve of time, as tables.
 
     Parameters
@@ -23,7 +22,7 @@ def tuning_tables(tuning: Tuning, tried: Mapping[str, float] | None = None) -> l
 
     Returns
     -------
-    list of Table
+    list of ScreenTable
     """
     return [
         _outcomes(tuning, tried or {}),
@@ -32,11 +31,11 @@ def tuning_tables(tuning: Tuning, tried: Mapping[str, float] | None = None) -> l
     ]
 
 
-def _outcomes(tuning: Tuning, tried: Mapping[str, float]) -> Table:
+def _outcomes(tuning: Tuning, tried: Mapping[str, float]) -> ScreenTable:
     """Today, the control's law with today's numbers, with those that are tried, and the choice."""
-    table = bare_table(
+    table = ScreenTable(
         ("", "left"), ("all rapids\n[s]", "right"), ("residual\n[um]", "right"),
-        ("of today's", "right"),
+        ("of today's", "right"), wrap=("",),
     )  # fmt: skip
     rows = [
         ("today, as the machine file has it", tuning.today),
@@ -54,11 +53,11 @@ def _outcomes(tuning: Tuning, tried: Mapping[str, float]) -> Table:
     return table
 
 
-def _settings(tuning: Tuning) -> Table:
+def _settings(tuning: Tuning) -> ScreenTable:
     """Old and new numbers."""
-    table = bare_table(
+    table = ScreenTable(
         ("setting", "left"), ("unit", "left"), ("today", "right"), ("new", "right"),
-        ("facts", "left"),
+        ("facts", "left"), wrap=("facts",), drop=("unit", "facts"),
     )  # fmt: skip
     for change in changes(tuning):
         mark = change.setting.mark
@@ -68,11 +67,11 @@ def _settings(tuning: Tuning) -> Table:
     return table
 
 
-def _curve(tuning: Tuning) -> Table:
+def _curve(tuning: Tuning) -> ScreenTable:
     """What less and more time would buy."""
-    table = bare_table(
+    table = ScreenTable(
         ("time\n[s]", "right"), ("of today's", "right"), ("residual\n[um]", "right"),
-        ("settings", "left"),
+        ("settings", "left"), wrap=("settings",),
     )  # fmt: skip
     settings = tuning.scheme.settings
     for point in tuning.curve:

@@ -8,13 +8,15 @@ no file and draws nothing; `report.map_figure` and `report.map_csv` do.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import Axis, Machine, Mode
+from gcodejerk.machine import Axis, Machine, Mode, Spectrum
 from gcodejerk.motion import (
     Profiles,
     mode_poles,
@@ -35,6 +37,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.task import Task
 
+Number = TypeVar("Number", float, Array)
 ALL = "all"
 """In place of a mode: the worst displacement over all of them."""
 SEARCH = 2001
@@ -77,6 +80,9 @@ class Survey:
         Every mode that the axis excites.
     mode : Mode or None
         The one whose amplitude is mapped; None: the worst displacement over all.
+    spectrum : Spectrum or None
+        What was measured in place of modes; the one mode is then its peak, and amplitudes are the
+        weighted mean of its lines.
     """
 
     machine: Machine
@@ -85,6 +91,7 @@ class Survey:
     condition: Condition
     modes: tuple[Mode, ...]
     mode: Mode | None
+    spectrum: Spectrum | None = None
 
     @classmethod
     def of(
@@ -123,13 +130,21 @@ class Survey:
                 "for example --length 1",
             )
         modes = tuple(m for _, m in machine.all_modes() if m.participation_of(described.name))
+        spectrum = described.spectrum
+        if spectrum is not None and not modes:
+            modes = (_peak_of(described.name, spectrum),)
+        elif spectrum is not None:
+            raise PlanError(
+                f"axis {described.name} has a spectrum and drives modes of the structure, too",
+                "a map is of modes, or of a spectrum: take one of them out of a copy of the file",
+            )
         if not modes:
             raise PlanError(
                 f"axis {described.name} of {machine.source} excites no mode: nothing to map",
                 f"describe its modes in the machine file (axes.{described.name}.modes)",
             )
         found = None if mode == ALL else _find_mode(modes, mode, described.name)
-        return cls(machine, described, abs(length), Condition.of(condition), modes, found)
+        return cls(machine, described, abs(length), Condition.of(condition), modes, found, spectrum)
 
     @property
     def unit(self) -> str:
@@ -171,9 +186,9 @@ class Survey:
     def values(self, T1: Array, T_SUM: Array) -> Array:
         """The map over two axes [s]: amplitude of the mode [mm/s^2], or displacement [mm]."""
         if self.mode is not None:
-            return amplitude_map(
-                self.length, T1, T_SUM, self.mode.frequency, self.mode.damping, self.condition
-            )
+            return self._amplitudes(self.mode, T1, T_SUM)
+        if self.spectrum is not None:
+            return self.displacement(self.modes[0], self._amplitudes(self.modes[0], T1, T_SUM))
         return displacement_map(
             self.length,
             T1,
@@ -196,21 +211,33 @@ class Survey:
 
     def amplitude(self, mode: Mode, T1: float, T_SUM: float) -> float:
         """What one mode keeps of a profile, for participation 1 [mm/s^2]."""
-        return float(
-            amplitude_map(
-                self.length, T1, T_SUM, mode.frequency, mode.damping, self.condition
-            ).item()
-        )
+        return float(self._amplitudes(mode, T1, T_SUM).item())
 
-    def displacement(self, mode: Mode, amplitude: float) -> float:
+    def _amplitudes(self, mode: Mode, T1: float | Array, T_SUM: float | Array) -> Array:
+        """Amplitudes over T1 and T_SUM, for participation 1 [mm/s^2]: of the mode, or measured."""
+        if self.spectrum is None:
+            return amplitude_map(
+                self.length, T1, T_SUM, mode.frequency, mode.damping, self.condition
+            )
+        square: Array = np.zeros(())
+        for frequency, damping, weight in self.spectrum.oscillators():
+            one = amplitude_map(self.length, T1, T_SUM, frequency, damping, self.condition)
+            square = square + weight * one**2
+        return np.sqrt(square)
+
+    def displacement(self, mode: Mode, amplitude: Number) -> Number:
         """What an amplitude [mm/s^2] of a mode is at the tool, participation included [mm]."""
         return self._weight(mode) * amplitude / (2.0 * np.pi * mode.frequency) ** 2
 
     def conventional_amplitude(self, mode: Mode) -> float:
         """What one mode keeps of the controller's own G0, for participation 1 [mm/s^2]."""
-        poles = mode_poles([mode.frequency], [mode.damping])
-        unit = residual_displacement(profiles_response(self._conventional(), poles), poles)
-        return float(unit[0, 0] * self.length * (2.0 * np.pi * mode.frequency) ** 2)
+        one = [(mode.frequency, mode.damping, 1.0)]
+        parts = np.array(one if self.spectrum is None else self.spectrum.oscillators())
+        frequency, damping, weight = parts.T
+        poles = mode_poles(frequency, damping)
+        unit = residual_displacement(profiles_response(self._conventional(), poles), poles)[0]
+        amplitude = unit * self.length * (2.0 * np.pi * frequency) ** 2
+        return float(np.sqrt((weight * amplitude**2).sum()))
 
     @property
     def conventional_value(self) -> float:
@@ -400,6 +427,13 @@ class Survey:
             return False
         T1 = np.linspace(interval, 0.5 * count * interval - interval, SEARCH)
         return bool(self._within(T1, count * interval).any())
+
+
+def _peak_of(axis: str, spectrum: Spectrum) -> Mode:
+    """The peak of a spectrum as a mode: its frequency, and the damping of the line there."""
+    _, zeta, _ = min(spectrum.oscillators(), key=lambda one: abs(one[0] - spectrum.peak))
+    participation = ((axis, spectrum.participation),)
+    return Mode(f"peak of {PurePath(spectrum.source).name}", spectrum.peak, zeta, participation)
 
 
 def _find_mode(modes: tuple[Mode, ...], wanted: str, axis: str) -> Mode:

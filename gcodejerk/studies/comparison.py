@@ -213,7 +213,7 @@ def compare_move(
     (False, 0.05667)
     """
     row = displacement_row(displacement, machine)
-    check_time(time)
+    check_time(time, row, machine)
     row = np.where(np.abs(row) > STANDSTILL, row, 0.0)
     if not row.any():
         raise PlanError("no axis moves: nothing to compare", "for example Z=1")
