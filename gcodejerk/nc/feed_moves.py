@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections.abc import Iterator
 from typing import BinaryIO
 
@@ -23,6 +24,7 @@ STEP = math.radians(10.0)
 """Of an arc, from one point to the next."""
 _PLANES = ((0, 1, "I", "J"), (2, 0, "K", "I"), (1, 2, "J", "K"))
 """Two axes and the words of the centre along them: G17, G18, G19."""
+_SELECTED = re.compile(rb"G1([789])(?![0-9.])", re.IGNORECASE)
 Point = tuple[float, ...]
 
 
@@ -60,22 +62,25 @@ def feed_moves(
     language = find_dialect(dialect)
     texts = io.BytesIO(data)
     before: Point = (math.nan, math.nan, math.nan)
+    plane = 0
     for _, positions, motion in trace(io.BytesIO(data), dialect=language, start=start):
         text = texts.readline()
+        for digit in _SELECTED.findall(text):
+            plane = int(digit) - 7
         after = positions[:3]
         arc = motion in (CLOCKWISE, COUNTER_CLOCKWISE)
         moves = motion == STRAIGHT and any(a != b for a, b in zip(before, after, strict=True))
         if arc:
-            points = _arc(before, after, text, language, motion == CLOCKWISE)
+            points = _arc(before, after, text, language, plane, motion == CLOCKWISE)
             if points:
                 yield before, points
-        elif moves and before != after:
+        elif moves and not all(map(math.isnan, after)):
             yield before, (after,)
         before = after
 
 
 def _arc(
-    begin: Point, end: Point, text: bytes, dialect: Dialect, clockwise: bool
+    begin: Point, end: Point, text: bytes, dialect: Dialect, plane: int, clockwise: bool
 ) -> tuple[Point, ...]:
     """Points of an arc; its end alone where its centre is not understood, none where it is none."""
     words = {
@@ -86,15 +91,13 @@ def _arc(
     if not words:
         return ()
     chord = (end,) if begin != end else ()
-    for a, b, i, j in _PLANES:
-        if i not in words and j not in words and "R" not in words:
-            continue
-        if any(map(math.isnan, (begin[a], begin[b], end[a], end[b]))):
-            return chord
-        centre = _centre((begin[a], begin[b]), (end[a], end[b]), words, (i, j), clockwise)
-        if centre is not None:
-            return _points(begin, end, (a, b), centre, clockwise)
-    return chord
+    a, b, i, j = _PLANES[plane]
+    if any(map(math.isnan, (begin[a], begin[b], end[a], end[b]))):
+        return chord
+    if i not in words and j not in words and "R" not in words:
+        return chord
+    centre = _centre((begin[a], begin[b]), (end[a], end[b]), words, (i, j), clockwise)
+    return chord if centre is None else _points(begin, end, (a, b), centre, clockwise)
 
 
 def _centre(

@@ -62,7 +62,7 @@ class Figures:
     waited, waits : ndarray, shape (n,)
         Until all modes are within the tolerance, likewise; may be infinite. [s]
     mode : ndarray of int, shape (n,)
-        Mode that today's rapid leaves most of; 0 where that is not known.
+        Mode that more is left of than of any other, before or after; 0 where that is not known.
     time, usual : ndarray, shape (n,)
         How long it lasts as written, and today. [s]
     """
@@ -98,13 +98,13 @@ class Figures:
             after=np.where(unknown, np.nan, after.max(axis=1)),
             waited=np.where(known, settling_times(now, modes, tolerance), np.nan),
             waits=np.where(unknown, np.nan, settling_times(then, modes, tolerance)),
-            mode=np.where(known, np.nan_to_num(before).argmax(axis=1), 0).astype(np.int64),
+            mode=np.nan_to_num(np.fmax(before, after)).argmax(axis=1).astype(np.int64),
             time=np.where(planned, plans.times, np.where(unknown, np.nan, rest.time)),
             usual=np.where(usual > 0.0, usual, np.nan),
         )
 
 
-def chosen_rapids(figures: Figures, most: int = MOST_RAPIDS) -> Rows:
+def chosen_rapids(figures: Figures, most: int) -> Rows:
     """The rapids that a page shows, in the order of the file: all, or those that leave the most."""
     leaves = np.where(np.isnan(figures.after), figures.before, figures.after)
     if len(leaves) <= most:

@@ -22,6 +22,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc.feed_moves import feed_moves
 from gcodejerk.report.page import SUFFIX, headline
 from gcodejerk.report.page.columns import (
+    MOST_RAPIDS,
     Figures,
     chosen_rapids,
     mode_columns,
@@ -89,7 +90,7 @@ def page_html(
     unit = headline.Unit.of(result)
     summary = summary_of(result)
     figures = Figures.of(result)
-    rows = chosen_rapids(figures)
+    rows = chosen_rapids(figures, MOST_RAPIDS)
     feed, cut = _feed(result, machine, source)
     data = {
         "unit": {
@@ -218,11 +219,12 @@ def _proof(result: Result) -> str:
     if not found.rewritten:
         return "The output was read back and verified."
     text = (
-        f"The output was read back and verified: {found.confirmed} of {found.rewritten} rewritten "
-        "rapids confirmed by a second reading of the program"
+        f"The output was read back and verified: {headline.grouped(found.confirmed)} "
+        f"of {headline.number_of(found.rewritten, 'rewritten rapid')} confirmed by a second "
+        "reading of the program"
     )
     rest = found.rewritten - found.confirmed
-    return f"{text}; {rest} rest on one reading alone." if rest else f"{text}."
+    return f"{text}; {headline.grouped(rest)} rest on one reading alone." if rest else f"{text}."
 
 
 def _policy(style: str, scripts: tuple[str, ...]) -> str:

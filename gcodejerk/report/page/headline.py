@@ -46,27 +46,31 @@ class Unit:
 
 
 def figure(value: float) -> str:
-    """A number with three significant digits, and never an exponent.
+    r"""A number with three significant digits, and never an exponent.
 
     Examples
     --------
-    >>> [figure(x) for x in (469.02, 35.7, 0.04321, 12345.6, 0.0)]
-    ['469', '35.7', '0.0432', '12 346', '0']
+    >>> [figure(x) for x in (469.02, 35.7, 0.04321, 999.6, 0.0)]
+    ['469', '35.7', '0.0432', '1\u202f000', '0']
     """
     size = abs(value)
     if size == 0.0:
         return "0"
     if size >= WHOLE - 0.5:
-        return f"{value:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+        return grouped(round(value))
     decimals = min(max(2 - math.floor(math.log10(size * (1.0 + 1e-12))), 0), 6)
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if decimals else text
 
 
+def grouped(count: int) -> str:
+    """A whole number with its thousands apart."""
+    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
 def number_of(count: int, noun: str) -> str:
     """A count with its noun."""
-    grouped = f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
-    return f"{grouped} {noun}" + ("" if count == 1 else "s")
+    return f"{grouped(count)} {noun}" + ("" if count == 1 else "s")
 
 
 def file_size(size: int) -> str:
@@ -75,7 +79,7 @@ def file_size(size: int) -> str:
     Examples
     --------
     >>> file_size(812), file_size(48_210), file_size(2_500_000)
-    ('812 bytes', '48.2 kB', '2.50 MB')
+    ('812 bytes', '48.2 kB', '2.5 MB')
     """
     if size < BYTES_PER_KB:
         return f"{size} bytes"
@@ -100,7 +104,7 @@ def sentence(summary: Record, unit: Unit) -> str:
             f"None of the {number_of(count, 'rapid')} was rewritten: the program stays as it was, "
             "and below stands why and what helps."
         )
-    text = f"{planned:,} of {number_of(count, 'rapid')} ".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    text = f"{grouped(planned)} of {number_of(count, 'rapid')} "
     text += "was rewritten" if planned == 1 else "were rewritten"
     text += _extra(summary)
     if summary["worst_conventional_residual"] is None:
@@ -109,7 +113,7 @@ def sentence(summary: Record, unit: Unit) -> str:
     text += _change(summary, unit, "worst_conventional_residual", "worst_residual")
     saved = _saved(summary)
     if saved is not None and saved > 0.0:
-        text += f", and the machine is still {figure(saved)} s sooner in all"
+        text += f", and {figure(saved)} s of waiting for it to settle are saved"
     return text + "."
 
 
@@ -118,7 +122,8 @@ def _extra(summary: Record) -> str:
     more = 1e3 * (summary["rapid_time"] - summary["conventional_time"])
     if abs(more) < 0.5 * max(summary["planned"], 1):
         return " in the same time"
-    return f" ({figure(abs(more))} ms {'longer' if more > 0 else 'shorter'} in all)"
+    size = f"{figure(abs(more))} ms" if abs(more) < 1e3 else f"{figure(1e-3 * abs(more))} s"
+    return f" ({size} {'longer' if more > 0 else 'shorter'} in all)"
 
 
 def _change(summary: Record, unit: Unit, before: str, after: str) -> str:
@@ -130,7 +135,7 @@ def _change(summary: Record, unit: Unit, before: str, after: str) -> str:
     if verb == "stays":
         return f"stays at {unit.vibration(now)} {unit.small}"
     text = f"{verb} from {unit.vibration(now)} to {unit.vibration(then)} {unit.small}"
-    return text + (f", {figure(100.0 * then / now)} % of today's" if now else "")
+    return text + (f" ({100.0 * then / now:.2g} % of today's)" if now else "")
 
 
 def _saved(summary: Record) -> float | None:
@@ -176,6 +181,8 @@ def _vibration(summary: Record, unit: Unit, set_anew: bool) -> tuple[str, str, s
     else:
         now = then = summary["worst_conventional_residual_all"]
         says = "of the rapids of which it is known; nothing was rewritten"
+    if not summary["rapids"]:
+        return name, "none", "", "there are no rapids"
     if now is None or then is None:
         return name, "not known", "", "nothing that vibrates is known of these rapids"
     everything = summary["worst_residual_all"]
@@ -200,6 +207,10 @@ def _waiting(summary: Record, unit: Unit, set_anew: bool) -> tuple[str, str, str
     waited, waits = summary["conventional_settling_time"], summary["settling_time"]
     if waited is None or waits is None:
         return name, "without end", "", f"a mode without damping never comes within {within}"
+    if not summary["rapids"]:
+        return name, "none", "", "there are no rapids"
+    if not summary["planned"] and summary["worst_residual_all"] is None:
+        return name, "not known", "", "nothing that vibrates is known of these rapids"
     says = f"until what is known is within {within}, all rapids together"
     saved = waited - waits
     if saved >= 0.0005:
@@ -215,7 +226,7 @@ def _size(sizes: tuple[int, int]) -> tuple[str, str, str, str]:
     if source == written:
         return "File size", file_size(source), "", "unchanged"
     share = written / source if source else math.inf
-    many = f"{figure(share)} times as large" if share >= 1.1 else "hardly changed"
+    many = f"{figure(float(f'{share:.2g}'))} times as large" if share >= 1.1 else "hardly changed"
     many = many if share > 0.9 else "a file of its own"
     return "File size", file_size(source), file_size(written), many
 
@@ -236,7 +247,7 @@ def reasons_html(result: Result) -> str:
         told = EXPLAINED[reason]
         out.append(
             f'<tr><th scope="row">{escaped(str(reason))}<small>{with_code(told.means)}</small>'
-            f'</th><td class="n">{count}</td><td>{with_code(told.remedy)}</td>'
+            f'</th><td class="n">{grouped(count)}</td><td>{with_code(told.remedy)}</td>'
             f'<td class="screen"><button type="button" class="show" data-reason="{code}" '
             f'aria-label="Show the rapids: {escaped(str(reason))}">Show</button></td></tr>'
         )

@@ -98,9 +98,9 @@ const columns = [
   },
   { key: "length", head: `Length [${unit.length}]`, kind: "n wide c-num", down: true,
     show: (i) => dash(figure(lengths[i] * unit.perMm)), value: (i) => lengths[i] },
-  { key: "before", head: `Before [${unit.small}]`, kind: "n c-num", down: true,
+  { key: "before", head: `Vibration before [${unit.small}]`, kind: "n c-num", down: true,
     show: (i) => dash(small(rapids.before[i])), value: (i) => rapids.before[i] },
-  { key: "after", head: `Now [${unit.small}]`, kind: "n c-num", down: true,
+  { key: "after", head: `Vibration now [${unit.small}]`, kind: "n c-num", down: true,
     show: (i) => dash(small(rapids.after[i])), value: (i) => rapids.after[i] },
   { key: "saved", head: "Waiting saved [ms]", kind: "n wide c-num", down: true,
     show: (i) => dash(figure(1e3 * saved(i))), value: saved },
@@ -143,7 +143,7 @@ function drawLegend() {
   marks.push(scale.high);
   const shown = marks.length > 6 ? marks.filter((_, k) => k % 2 === 0 || k === marks.length - 1) : marks;
   for (const mark of shown) {
-    const tick = element("span", `${mark === scale.low ? "≤ " : ""}${small(mark)}${mark === scale.high ? ` ${unit.small}` : ""}`);
+    const tick = element("span", `${mark === scale.low ? "≤ " : ""}${Number(small(mark).replace(/[^0-9.]/g, ""))}${mark === scale.high ? ` ${unit.small}` : ""}`);
     tick.style.left = `${100 * scale.place(mark)}%`;
     ticks.append(tick);
   }
@@ -178,7 +178,7 @@ function carriedBy(i, when) {
 const lastOf = (carried) => Math.max(0, ...carried.map((part) => totalOf(part.pieces)));
 
 const charts = { acceleration: null, vibration: null };
-function chart(id, times, series, ends, unitText, band) {
+function chart(id, times, series, ends, band) {
   const holder = document.getElementById(id), { colours } = paint();
   const size = () => ({ width: Math.max(holder.clientWidth, 200), height: 190 });
   if (charts[id]) charts[id].destroy();
@@ -213,15 +213,15 @@ function chart(id, times, series, ends, unitText, band) {
     ...size(),
     scales: { x: { time: false }, y: { range: (u, low, high) => range(low, high) } },
     axes: [
-      { ...axis, values: (u, ticks) => ticks.map((x, k) => (k === ticks.length - 1 ? `${x} ms` : String(x))) },
+      { ...axis, size: 30, values: (u, ticks) => ticks.map((x, k) => (k === ticks.length - 1 ? `${x} ms` : String(x))) },
       { ...axis, size: 58, values: (u, ticks) => ticks.map((x) => (Math.abs(x) >= 1e3 ? grouped(x) : String(Number(x.toPrecision(3))))) },
     ],
     cursor: { drag: { x: false, y: false }, sync: { key: "chosen" } },
     legend: { live: !printing },
     series: [
-      { label: "time [ms]", value: (u, x) => (x === null ? "–" : figure(x)) },
+      { label: "ms", value: (u, x) => (x === null ? "–" : figure(x)) },
       ...series.map(({ name, label }) => ({
-        label: `${label} [${unitText}]`, stroke: colours[name], width: name === "after" ? 2 : 1.6,
+        label, stroke: colours[name], width: name === "after" ? 2 : 1.6,
         dash: dashes[name], points: { show: false }, spanGaps: true,
         value: (u, x) => (x === null || x === undefined ? "–" : figure(x)),
       })),
@@ -308,7 +308,8 @@ function drawAcceleration(shown, ends, until) {
   const { times, values } = aligned(parts);
   const name = `${deg ? "deg" : unit.length}/s²`;
   const series = shown.map(([key, label], k) => ({ name: key, label, values: values[k] }));
-  chart("acceleration", times, series, ends, name, 0);
+  chart("acceleration", times, series, ends, 0);
+  document.getElementById("acceleration-title").textContent = `Acceleration [${name}]`;
   const peaks = series.map((s) => `${s.label} up to ${figure(Math.max(...s.values.map((x) => Math.abs(x || 0))))} ${name}`);
   document.getElementById("acceleration").setAttribute("aria-label",
     `Acceleration ${along ? "along the path" : `of ${letter}`} over time: ${peaks.join(", ")}.`);
@@ -324,7 +325,7 @@ function drawVibration(shown, ends, until, mode, frequency) {
   const series = shown.map(([name, label, carried]) => ({
     name, label, values: Array.from(vibration(carried, modes, mode, times), (x) => x * unit.smallPerMm),
   }));
-  chart("vibration", Array.from(times, (t) => 1e3 * t), series, ends, unit.small, data.tolerance * unit.smallPerMm);
+  chart("vibration", Array.from(times, (t) => 1e3 * t), series, ends, data.tolerance * unit.smallPerMm);
   const said = series.map((s, k) => {
     const rest = s.values.filter((_, n) => times[n] >= ends[k][1]);
     return `${s.label} up to ${figure(Math.max(...rest.map(Math.abs)))} ${unit.small} after arrival at ${figure(1e3 * ends[k][1])} ms`;
@@ -410,13 +411,15 @@ function describeViews(scene) {
   space.setAttribute("aria-label", `Tool path in space. ${what} Arrow keys turn the view, plus and minus zoom.`);
   const hidden = rapids.count - scene.drawn.length;
   document.getElementById("drawn").textContent =
-    "Click a rapid to choose it; drag to turn or move the view. Program coordinates." +
-    (hidden ? ` Not drawn: ${grouped(hidden)} rapids whose start or end is not known.` : "");
+    hidden ? `Not drawn: ${grouped(hidden)} rapids whose start or end is not known.` : "";
 }
 
+if (!rapids.after.some((x) => x === x))
+  document.querySelector("input[name=colour][value=before]").checked = true;
 let started = false, table, views = [];
 document.body.classList.add("drawn");
 if (rapids.count) {
+  document.getElementById("vibration-title").textContent = `Vibration [${unit.small}]`;
   const reasonBox = document.getElementById("filter-reason"), counts = new Map();
   for (let i = 0; i < rapids.count; i++)
     if (!planned(i)) counts.set(rapids.reason[i], (counts.get(rapids.reason[i]) || 0) + 1);

@@ -10,7 +10,7 @@ const NEAR = 14; // a click is on a line that is so near [px]
 
 // Light paper: from light green up to dark violet. Dark paper: from blue up to light yellow.
 function rampOf(dark) {
-  const from = dark ? 2.2 : 7.2, to = dark ? 9 : 0;
+  const from = dark ? 2.7 : 7.2, to = dark ? 9 : 0;
   return Array.from({ length: SHADES }, (_, k) => {
     const at = from + ((to - from) * k) / (SHADES - 1), low = Math.max(0, Math.min(Math.floor(at), 8));
     const c = VIRIDIS[low].map((v, i) => Math.round(v + (VIRIDIS[low + 1][i] - v) * (at - low)));
@@ -45,7 +45,7 @@ class Scene {
     this.drawn = [];
     this.ends = new Float64Array(6 * rapids.count);
     for (let i = 0; i < rapids.count; i++) {
-      let fine = true;
+      let fine = known.includes(true);
       for (let k = 0; k < 3; k++) {
         this.ends[6 * i + k] = at(rapids.start, k, i);
         this.ends[6 * i + 3 + k] = at(rapids.end, k, i);
@@ -272,7 +272,7 @@ class View {
     context.beginPath();
     for (const [x, y] of points) {
       context.moveTo(x, y);
-      context.arc(x, y, 1.2 + width, 0, 7);
+      context.arc(x, y, (1.2 + width) * (this.scene.drawn.length > 2000 ? 0.5 : 1), 0, 7);
     }
     context.fill();
   }
