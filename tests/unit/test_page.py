@@ -157,7 +157,7 @@ def test_a_program_in_inches_is_shown_in_inches():
     ("data", "says"),
     [
         (b"G21 G90 G1 X0 F100\nM2\n", "has no rapids"),
-        (b"G21 G91\nG0 X1\nM2\n", "None of the 1 rapid was rewritten"),
+        (b"G21 G91\nG0 X1\nM2\n", "Its only rapid was not rewritten"),
     ],
 )
 def test_pages_of_programs_that_stay_as_they_are(data, says):

@@ -12,13 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from gcodejerk.reasons import EXPLAINED, REASONS
+from gcodejerk.reasons import EXPLAINED, REASONS, Reason
 from gcodejerk.report.page.text import escaped, with_code
 from gcodejerk.rewrite.result import Result
 from gcodejerk.units import MM_PER_INCH
 
 Record = dict[str, Any]
 BYTES_PER_KB = 1000.0
+NOTHING_LOST = [
+    REASONS.index(reason) for reason in (Reason.AFTER_END, Reason.NO_MOTION, Reason.CONTROL_SET)
+]
+"""Reasons of rapids that do not run, do not move, or are served otherwise."""
 WHOLE = 1000.0
 """From here on numbers have no decimals."""
 
@@ -100,10 +104,10 @@ def sentence(summary: Record, unit: Unit) -> str:
             f"{_change(summary, unit, 'worst_conventional_residual', 'worst_residual')}."
         )
     if not planned:
-        return (
-            f"None of the {number_of(count, 'rapid')} was rewritten: the program stays as it was, "
-            "and below stands why and what helps."
+        none = (
+            "Its only rapid was not" if count == 1 else f"None of the {grouped(count)} rapids was"
         )
+        return f"{none} rewritten: the program stays as it was; below stands why, and what helps."
     text = f"{grouped(planned)} of {number_of(count, 'rapid')} "
     text += "was rewritten" if planned == 1 else "were rewritten"
     text += _extra(summary)
@@ -205,13 +209,15 @@ def _waiting(summary: Record, unit: Unit, set_anew: bool) -> tuple[str, str, str
         now, then = (f"{figure(summary[key])} s" for key in ("conventional_time", "rapid_time"))
         return "Rapids in motion", now, then, "settling is not known rapid by rapid here"
     waited, waits = summary["conventional_settling_time"], summary["settling_time"]
-    if waited is None or waits is None:
+    if waits is None:
         return name, "without end", "", f"a mode without damping never comes within {within}"
     if not summary["rapids"]:
         return name, "none", "", "there are no rapids"
-    if not summary["planned"] and summary["worst_residual_all"] is None:
+    if summary["worst_residual_all"] is None:
         return name, "not known", "", "nothing that vibrates is known of these rapids"
     says = f"until what is known is within {within}, all rapids together"
+    if waited is None:
+        return name, "without end", f"{figure(waits)} s", says
     saved = waited - waits
     if saved >= 0.0005:
         says = f"{figure(saved)} s saved: {says}"
@@ -232,11 +238,14 @@ def _size(sizes: tuple[int, int]) -> tuple[str, str, str, str]:
 
 
 def reason_rows(result: Result) -> list[tuple[int, int]]:
-    """Index and count of each reason for which rapids were left alone, most rapids first."""
+    """Index and count of each reason for which rapids were left alone: most rapids lost first.
+
+    Those of which nothing is lost come last.
+    """
     reasons = result.plans.reason[~result.plans.planned]
     codes, counts = np.unique(reasons, return_counts=True)
-    order = np.argsort(-counts, kind="stable")
-    return [(int(codes[k]), int(counts[k])) for k in order]
+    lost = np.where(np.isin(codes, NOTHING_LOST), 0, counts)
+    return [(int(codes[k]), int(counts[k])) for k in np.lexsort((-counts, -lost))]
 
 
 def reasons_html(result: Result) -> str:

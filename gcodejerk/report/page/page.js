@@ -234,7 +234,7 @@ function chart(id, times, series, ends, band) {
 }
 function range(low, high) {
   const most = Math.max(Math.abs(low || 0), Math.abs(high || 0)) * 1.08 || 1;
-  return [-most, most];
+  return [low < 0 ? -most : 0, most]; // an envelope is never below 0
 }
 
 // Before and after at the same moments, however many corners each has.
@@ -325,6 +325,9 @@ function drawVibration(shown, ends, until, mode, frequency) {
   const series = shown.map(([name, label, carried]) => ({
     name, label, values: Array.from(vibration(carried, modes, mode, times), (x) => x * unit.smallPerMm),
   }));
+  const together = modes.group.filter((g) => g === mode).length > 1;
+  document.getElementById("vibration-title").textContent =
+    `Vibration [${unit.small}]${together ? ", envelope" : ""}`;
   chart("vibration", Array.from(times, (t) => 1e3 * t), series, ends, data.tolerance * unit.smallPerMm);
   const said = series.map((s, k) => {
     const rest = s.values.filter((_, n) => times[n] >= ends[k][1]);
@@ -419,7 +422,6 @@ if (!rapids.after.some((x) => x === x))
 let started = false, table, views = [];
 document.body.classList.add("drawn");
 if (rapids.count) {
-  document.getElementById("vibration-title").textContent = `Vibration [${unit.small}]`;
   const reasonBox = document.getElementById("filter-reason"), counts = new Map();
   for (let i = 0; i < rapids.count; i++)
     if (!planned(i)) counts.set(rapids.reason[i], (counts.get(rapids.reason[i]) || 0) + 1);
