@@ -1,8 +1,8 @@
 """Why a rapid was left alone: the fixed list that reports, `inspect` and the README share.
 
-The text of each member is what the user and the JSON report see; README.md explains each of them,
-and a test keeps the two together. Readers of programs (`nc`) and the planner both assign reasons,
-so the list stands below both.
+The text of each member is what the user and the JSON report see; `EXPLAINED` says what each means
+and what helps, README.md lists them all, and a test keeps the two together. Readers of programs
+(`nc`) and the planner both assign reasons, so the list stands below both.
 """
 
 from __future__ import annotations
