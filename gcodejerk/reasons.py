@@ -1,13 +1,14 @@
 """Why a rapid was left alone: the fixed list that reports, `inspect` and the README share.
 
-The text of each member is what the user and the JSON report see; README.md explains each of them,
-and a test keeps the two together. Readers of programs (`nc`) and the planner both assign reasons,
-so the list stands below both.
+The text of each member is what the user and the JSON report see; `EXPLAINED` says what each means
+and what helps, README.md lists them all, and a test keeps the two together. Readers of programs
+(`nc`) and the planner both assign reasons, so the list stands below both.
 """
 
 from __future__ import annotations
 
 import enum
+from dataclasses import dataclass
 
 
 class Reason(enum.StrEnum):
@@ -55,3 +56,180 @@ REASONS = tuple(Reason)
 """The reasons by index, as columns of reasons hold them."""
 CERTAIN = 255
 """In a column of reasons: none, the rapid can be rewritten."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What a reason means, and what helps; words in backquotes are written so in files."""
+
+    means: str
+    remedy: str
+
+
+EXPLAINED: dict[Reason, Explanation] = {
+    Reason.AFTER_END: Explanation(
+        "the block stands behind M2, M30 or the closing %",
+        "nothing: it never runs; if it should, take the end in front of it out",
+    ),
+    Reason.BLOCK_DELETE: Explanation(
+        "the block begins with `/`: whether it runs is decided at the machine",
+        "where it always runs, take the `/` out",
+    ),
+    Reason.SUBPROGRAM: Explanation(
+        "it is not the same rapid on every pass, never runs, or not every pass could be followed",
+        "post the moves in full, without subprograms, loops and branches; or begin every pass at "
+        "the same place",
+    ),
+    Reason.NOT_UNDERSTOOD: Explanation(
+        "the control would refuse it, or it holds a code that the dialect's table does not know",
+        "the notes name the line: correct it, or say how the program is written (`--dialect`)",
+    ),
+    Reason.EXPRESSION: Explanation(
+        "an axis word is a variable or an expression; where it ends is known if every variable is",
+        "write the numbers: post without variables (a computed X is rewritten nowhere)",
+    ),
+    Reason.DECIMAL_POINT: Explanation(
+        "X100 is 100 mm or 0.1 mm, as a parameter of the control decides",
+        "state `program.decimal_point` in the machine file, or write X100.",
+    ),
+    Reason.CANNED_CYCLE: Explanation(
+        "the moves of a drilling cycle, of a modal macro, or of a turning contour",
+        "drilling cycles: `--expand-cycles` writes them out; others: post them as single moves",
+    ),
+    Reason.FRAME_CHANGE: Explanation(
+        "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
+        "give G43, G54.. and their kin a block of their own and state `program.offsets`; retract "
+        "with a plain G0 instead of G28, G30 and G53",
+    ),
+    Reason.CUTTER_COMPENSATION: Explanation(
+        "G41 or G42 is, or may be, in force: the real path differs from the programmed one",
+        "put G40 in front of the rapid; where nobody says G40 at all, into `program.startup`",
+    ),
+    Reason.ROTATION: Explanation(
+        "an axis word is not the motion of that axis",
+        "cancel the rotation, scaling or mirroring in front of the rapid (G69, G50 and their kin)",
+    ),
+    Reason.SYSTEM_WRITTEN: Explanation(
+        "`#5221=`, `G10`, `$P_UIFR[1]=` and the like: until a work system and a tool length are "
+        "selected again; for good behind a G10 that writes parameters",
+        "select the work system (G54) and the tool length (G43 H1) again behind it, or enter "
+        "offsets at the control",
+    ),
+    Reason.LOOK_AHEAD: Explanation(
+        "Haas's G103 P1: no stream would be blended",
+        "end it in front of the rapids (G103), or take it out",
+    ),
+    Reason.FEED_GROUP: Explanation(
+        "Siemens, behind `FGROUP(X,Y)`: F is the speed of these axes alone",
+        "put `FGROUP()` in front of the rapids",
+    ),
+    Reason.FEED_SCALED: Explanation(
+        "M52 of LinuxCNC, OVR of Siemens: they act on streams, not on G0",
+        "LinuxCNC: end it in front of the rapids (M52 P0); Siemens: take OVR out",
+    ),
+    Reason.NO_MOTION: Explanation(
+        "the block's end is its start",
+        "nothing: what does not move shakes nothing",
+    ),
+    Reason.DISTANCE_MODE_UNKNOWN: Explanation(
+        "neither G90 nor G91 has been stated where the dialect assumes none, or a subprogram may "
+        "have changed it",
+        "put G90 into the program, behind calls once more, or into `program.startup`",
+    ),
+    Reason.UNITS_UNKNOWN: Explanation(
+        "nobody says whether lengths are mm or inches, or a subprogram may have changed it",
+        "put the code for mm or inches (G21, G20) in front, or into `program.startup`",
+    ),
+    Reason.FEED_UNIT: Explanation(
+        "Siemens: G70 and G71 leave F in the control's own unit",
+        "state the control's own unit in `program.startup` (G71 or G70), or use G710 and G700",
+    ),
+    Reason.PATH_UNKNOWN: Explanation(
+        "Siemens: exact stop (G60) is usual, and would stop a stream at every point",
+        "state G64 in the program or in `program.startup`",
+    ),
+    Reason.START_UNKNOWN: Explanation(
+        "no absolute word has yet said where an axis stands, or something may have moved it: tool "
+        "change, offset, homing, probing, somebody who jogs at M0 or M1",
+        "usual for the first move of each axis; `program.start` says where the axes stand, "
+        "`program.offsets` what work offsets and tool lengths are, `program.resume_after_stop` "
+        "what happens at M0",
+    ),
+    Reason.ROTARY_WAY: Explanation(
+        "an absolute rapid of A, B or C, which may go the short way round, or by the sign of its "
+        "number",
+        "state `wrap` of the axis in the machine file; where the axis counts turns, keep within "
+        "one turn",
+    ),
+    Reason.MIXED_AXES: Explanation(
+        "what F means then is not known for this dialect",
+        "move linear and rotary axes in blocks of their own",
+    ),
+    Reason.OTHER_WORDS: Explanation(
+        "a word of which the dialect's table does not know whether the control runs it before the "
+        "motion or behind it: M5 on Fanuc, Haas and Siemens, where the builder chooses",
+        "give the other words a block of their own",
+    ),
+    Reason.FEED_UNKNOWN: Explanation(
+        "a later feed move relies on an F, or on G94 or G95, that is not known here",
+        "state G94 and F in front of the rapid, or F in the first feed move behind it",
+    ),
+    Reason.BEAM: Explanation(
+        "grbl, Mach and Marlin also drive lasers and torches, which burn in G1",
+        "where there is no beam, state `spindle: mill` in the machine file",
+    ),
+    Reason.AXIS_UNKNOWN: Explanation(
+        "the block moves an axis that the machine file does not describe",
+        "describe the axis under `axes` in the machine file",
+    ),
+    Reason.NO_MODE: Explanation(
+        "nothing is known to vibrate, so nothing can be gained (profiles `shortest` and "
+        "`conventional` go on)",
+        "measure what vibrates, and state it as `modes` or `spectrum` in the machine file",
+    ),
+    Reason.NO_BLENDING: Explanation(
+        "LinuxCNC stops after every block in which A, B, C, U, V or W moves",
+        "move X, Y and Z in a block of their own; the rapids of other axes stay as they are",
+    ),
+    Reason.TOO_SHORT: Explanation(
+        "such moves hardly shake anything (`design.minimum_length`)",
+        "where they matter, lower `design.minimum_length` in the machine file",
+    ),
+    Reason.TOO_LONG: Explanation(
+        "it takes more than 100,000 command intervals (100 s at 1 ms)",
+        "see whether a decimal point is missing; otherwise write it as several rapids",
+    ),
+    Reason.BEYOND_TRAVEL: Explanation(
+        "an end lies outside of `travel`, where the work offset is known; or farther away than "
+        "100 km",
+        "correct the number, `program.offsets`, or `travel` of the axis",
+    ),
+    Reason.LINE_LIMIT: Explanation(
+        "a line of the stream would pass the control's longest line, or a point its digits",
+        "give other words and comments a block of their own, or the axis a coarser `resolution`",
+    ),
+    Reason.LIMITS: Explanation(
+        "no profile keeps the limits within `design.max_extension`",
+        "raise `limit.acceleration` or `limit.jerk` to what the drives can do, or "
+        "`design.max_extension`",
+    ),
+    Reason.NOT_PLAYED: Explanation(
+        "LinuxCNC: several axes under `positioning: independent`, an acceleration above "
+        "MAX_ACCELERATION/1.05, a look-ahead that is too short, or speeds that no blocks on its "
+        "servo periods give within 0.01 mm; motion controllers: ticks or counts too coarse",
+        "LinuxCNC: say `positioning: linear`, raise MAX_ACCELERATION and the look-ahead and state "
+        "them in `controller_options`, or take `--controller linuxcnc-hal`; motion controllers: "
+        "finer ticks or counts",
+    ),
+    Reason.NOT_BETTER: Explanation(
+        "the controller's own rapid shakes no more than anything that can be written, over the "
+        "whole `design.band`; or its axes excite no mode",
+        "nothing needs to be done; where the drives can do more, a higher `limit.acceleration` "
+        "may gain",
+    ),
+    Reason.CONTROL_SET: Explanation(
+        "`--as parameters`: lines of the program set the control's own law for this rapid",
+        "nothing: the control's settings serve it",
+    ),
+}
+"""Each reason with its meaning and its remedy: pages, reports and documents are made of this."""

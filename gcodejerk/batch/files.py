@@ -30,7 +30,7 @@ PREFIX = ".~gcodejerk-"
 STAMP_WITHIN = 1 << 20
 """A stamp that stands farther from the top is not looked for. [bytes]"""
 _STAMP = re.compile(rb"^[(;] ?gcodejerk stamp [0-9]", re.MULTILINE)
-_REPORT = re.compile(rb'\s*\{\s*"gcodejerk"\s*:')
+_REPORT = re.compile(rb'\s*\{\s*"gcodejerk"\s*:|<!doctype html>\n<!-- gcodejerk report ')
 SPOOL = 8 << 20
 """Standard input and output are held in memory up to this size, then on disk."""
 

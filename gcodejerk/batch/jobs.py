@@ -39,6 +39,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.planning.designs import known_limits
 from gcodejerk.reasons import REASONS
 from gcodejerk.report.difference import difference
+from gcodejerk.report.page.document import is_page, write_page
 from gcodejerk.report.records import Record, dump, process_record, summary_of
 from gcodejerk.report.tables import summary_line, whole_line
 from gcodejerk.report.tuning_record import settings_record
@@ -213,7 +214,11 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         if job.strict and (result.unserved or result.read_once):
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
-            report.write(dump(record_of(result, machine, job.output, source, progress)))
+            if is_page(job.report or ""):
+                written = sum(file.seek(0, 2) for file in (target, beside) if file is not None)
+                write_page(report, result, machine, job.output, source, written)
+            else:
+                report.write(dump(record_of(result, machine, job.output, source, progress)))
             report.flush()  # a full disk shows here, and not when the output is in its place
         if job.mode == "write" and not (job.in_place or settings.force):
             _refuse_foreign(job, source, target)

@@ -17,6 +17,7 @@ from gcodejerk.batch.inputs import (
 from gcodejerk.batch.jobs import Job
 from gcodejerk.emit import load_controller
 from gcodejerk.machine import Machine
+from gcodejerk.report.page import SUFFIX
 from gcodejerk.rewrite.pipeline import Settings
 
 
@@ -51,11 +52,11 @@ class Outputs:
         one_report = self.report if self.report_dir is None else None
         if many and (self.output is not None or one_report is not None):
             raise typer.BadParameter(
-                "-o and --report FILE.json take one program; use --output-dir and --report DIR/"
+                "-o and --report FILE take one program; use --output-dir and --report DIR/"
             )
-        if one_report is not None and not one_report.endswith(".json"):
+        if one_report is not None and not one_report.lower().endswith((".json", SUFFIX)):
             raise typer.BadParameter(
-                f"--report {one_report}: a report is a .json file in this version"
+                f"--report {one_report}: a report is a file .json, or a page .html to look at"
             )
 
     def jobs(

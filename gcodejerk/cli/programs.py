@@ -59,7 +59,10 @@ def process(
     ] = False,
     report: Annotated[
         str | None,
-        typer.Option(metavar="FILE.json", help="write a report; DIR/: one for each program"),
+        typer.Option(
+            metavar="FILE",
+            help="write a report: .html to look at, .json for programs; DIR/: a .json for each",
+        ),
     ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
     strict: Annotated[

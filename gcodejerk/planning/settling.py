@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
+from gcodejerk.motion import Profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.arrival import arrival_response
@@ -71,16 +72,11 @@ def left_alone(rapids: Rapids, plans: Plans) -> Left:
     -------
     Left
     """
-    machine, modes = plans.machine, plans.modes
+    modes = plans.modes
     residual = np.full((len(plans), len(modes.poles)), np.nan)
     time = np.zeros(len(plans))
-    moved = rapids.target - rapids.start
-    named = (rapids.words[:, np.newaxis] >> np.arange(len(AXES)) & 1).astype(bool)
-    has = np.array([axis in machine.axis_names for axis in AXES])
-    moved = np.where(named, moved, 0.0)
-    moved = np.where(np.abs(moved) > STANDSTILL, moved, 0.0 * moved)
-    certain = np.isfinite(moved).all(axis=1) & ~(named & ~has).any(axis=1)
-    certain &= np.isin(plans.reason, KNOWN) & (moved != 0.0).any(axis=1)
+    moved = known_moves(rapids, plans)
+    certain = np.isfinite(moved).all(axis=1)
     rows = np.flatnonzero(certain & ~plans.planned)
     if len(rows):
         residual[rows], time[rows] = _today(plans, moved[rows], rapids.lone[rows])
@@ -88,16 +84,69 @@ def left_alone(rapids: Rapids, plans: Plans) -> Left:
     return Left(residual, time, ~plans.planned & ~still & ~certain)
 
 
-def _today(plans: Plans, moved: Array, lone: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Residual and time of the controller's own rapids."""
-    machine, modes = plans.machine, plans.modes
-    if machine.positioning == "linear":
-        move, share = np.arange(len(moved)), moved
-    else:
+def known_moves(rapids: Rapids, plans: Plans) -> Array:
+    """What each axis moves in the rapids that are left alone, as far as all of it is known.
+
+    Parameters
+    ----------
+    rapids : Rapids
+        Of the program.
+    plans : Plans
+        Row i is rapid i.
+
+    Returns
+    -------
+    ndarray, shape (n, 9)
+        NaN in every column of a rapid of which not all is known, or that does not move. [mm], [deg]
+    """
+    moved = rapids.target - rapids.start
+    named = (rapids.words[:, np.newaxis] >> np.arange(len(AXES)) & 1).astype(bool)
+    has = np.array([axis in plans.machine.axis_names for axis in AXES])
+    moved = np.where(named, moved, 0.0)
+    moved = np.where(np.abs(moved) > STANDSTILL, moved, 0.0 * moved)
+    certain = np.isfinite(moved).all(axis=1) & ~(named & ~has).any(axis=1)
+    certain &= np.isin(plans.reason, KNOWN) & (moved != 0.0).any(axis=1)
+    out: Array = np.where(certain[:, np.newaxis], moved, np.nan)
+    return out
+
+
+def todays_rapids(
+    plans: Plans, moved: Array, lone: NDArray[np.bool_]
+) -> tuple[Profiles, NDArray[np.int64], Array]:
+    """The controller's own rapids.
+
+    Parameters
+    ----------
+    plans : Plans
+        Their machine and its modes.
+    moved : ndarray, shape (r, 9)
+        What each axis moves. [mm] or [deg]
+    lone : ndarray of bool, shape (r,)
+        As `Rapids.lone`.
+
+    Returns
+    -------
+    profiles : Profiles
+        l unit profiles: one a move, or under independent positioning one for each of its axes.
+    move : ndarray of int, shape (l,)
+        The move of each, rising.
+    share : ndarray, shape (l, 9)
+        What each carries. [mm] or [deg]
+    """
+    move = np.arange(len(moved))
+    share = moved
+    if plans.machine.positioning != "linear":
         move, axis = np.nonzero(moved)
         share = np.zeros((len(move), len(AXES)))
         share[np.arange(len(move)), axis] = moved[move, axis]
-    profiles = Task.of(machine, modes, share, lone=lone[move]).conventional
+    task = Task.of(plans.machine, plans.modes, share, lone=lone[move])
+    return task.conventional, move, share
+
+
+def _today(plans: Plans, moved: Array, lone: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Residual and time of the controller's own rapids."""
+    machine, modes = plans.machine, plans.modes
+    profiles, move, share = todays_rapids(plans, moved, lone)
     weights = share @ modes.participation.T
     residual, time = np.zeros((len(moved), len(modes.poles))), np.zeros(len(moved))
     for row in range(len(moved)):

@@ -66,6 +66,7 @@ ROOMS = {
  <- flow
  <- reader
  <- program
+ <- feed_moves
 """),
     "verification": order("""
     findings
