@@ -87,8 +87,8 @@ def page_html(
     result: Result, machine: Machine, output: str | None, source: BinaryIO, written: int
 ) -> str:
     """The text of a page; as `write_page`."""
-    unit = headline.Unit.of(result)
     summary = summary_of(result)
+    unit = headline.Unit.of(summary)
     figures = Figures.of(result)
     rows = chosen_rapids(figures, MOST_RAPIDS)
     feed, cut = _feed(result, machine, source)
