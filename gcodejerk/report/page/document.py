@@ -39,7 +39,7 @@ MARK = "<!doctype html>\n<!-- gcodejerk report"
 SCRIPTS = ("vibration.js", "views.js", "table.js", "page.js")
 MOST_LINES = 100_000
 """Programs of more lines are drawn without their feed moves."""
-MOST_POINTS = 60_000
+MOST_POINTS = 40_000
 """Of the feed moves."""
 _PLACE = re.compile(r"\{\{(\w+)\}\}")
 
