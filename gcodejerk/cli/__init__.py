@@ -17,7 +17,7 @@ import typer
 
 from gcodejerk._version import __version__
 from gcodejerk.batch.signals import exit_on
-from gcodejerk.cli.hosts import install
+from gcodejerk.cli.hosts import filter_program, install
 from gcodejerk.cli.machines import controllers, machine_check, machine_schema
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.programs import inspect, process, verify
@@ -43,6 +43,7 @@ app.command("map")(map_amplitudes)
 app.command("compare")(compare)
 app.command("parameters")(parameters)
 app.command("controllers")(controllers)
+app.command("filter")(filter_program)
 app.command("install")(install)
 machine_app.command("check")(machine_check)
 machine_app.command("schema")(machine_schema)

@@ -21,7 +21,7 @@ from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
-from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
+from gcodejerk.errors import EmitError, Place, ProcessedError, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
@@ -319,7 +319,7 @@ def _read(
         neighbours=replace(machine, controller=emitter.name).neighbours_matter,
     )
     if program.stamp is not None and not settings.force:
-        raise ProgramError(
+        raise ProcessedError(
             "this program has been processed by gcodejerk before",
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
