@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from gcodejerk.hosts.command import machine_word, own_command
+from gcodejerk.hosts.freecad.install import install_post, remove_post
 from gcodejerk.hosts.linuxcnc import filter_lines, hal_files
 from gcodejerk.hosts.linuxcnc.install import install as install_hal
 from gcodejerk.hosts.linuxcnc.install import remove as remove_hal
@@ -98,11 +99,26 @@ def _linuxcnc(request: Request) -> list[str]:
     return install_hal(request.where, request.form or hal_files.FORMS[0], request.linuxcnc_version)
 
 
+def _freecad(request: Request) -> list[str]:
+    """FreeCAD: a post-processor."""
+    if request.remove:
+        return remove_post(request.where)
+    assert request.machine is not None
+    machine = machine_word(request.machine)
+    return install_post(request.where, own_command(), machine, request.base or "linuxcnc")
+
+
 HOSTS: dict[str, Host] = {
     "linuxcnc": Host(
         "HAL that plays rapids, an override guard, or the screens' [FILTER], into an INI",
         "tested with LinuxCNC 2.9",
         frozenset({"where", "machine", "remove"}),
         _linuxcnc,
+    ),
+    "freecad": Host(
+        "a post-processor: any stock one, then the rapids; into the macro directory",
+        "tested with FreeCAD 0.20.2; the class for 1.0 with a stand-in",
+        frozenset({"where", "machine", "base", "remove"}),
+        _freecad,
     ),
 }
