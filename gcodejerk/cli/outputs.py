@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import typer
 
@@ -28,6 +28,8 @@ class Outputs:
     output_dir: str | None
     in_place: bool
     report: str | None
+    called: str | None = None
+    """What messages and reports call the program, where that is not its own name."""
 
     @property
     def report_dir(self) -> str | None:
@@ -85,6 +87,7 @@ class Outputs:
                 in_place=self.in_place,
                 strict=strict,
                 beside=output + beside if beside else None,
+                name=self.called,
                 new_folders=(
                     *_folder(output, self.output_dir),
                     *_folder(report, self.report_dir),
@@ -103,6 +106,8 @@ class Outputs:
 
     def _report(self, program: Input) -> str | None:
         """Where the report on a program goes."""
+        if self.called is not None:
+            program = Input(program.path, PurePath(self.called).name)
         return self.report if self.report_dir is None else report_name(program, self.report_dir)
 
 

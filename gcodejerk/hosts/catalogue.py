@@ -10,6 +10,8 @@ from gcodejerk.hosts.freecad.install import install_post, remove_post
 from gcodejerk.hosts.linuxcnc import filter_lines, hal_files
 from gcodejerk.hosts.linuxcnc.install import install as install_hal
 from gcodejerk.hosts.linuxcnc.install import remove as remove_hal
+from gcodejerk.hosts.slicers import SLICERS, slicer_lines
+from gcodejerk.hosts.texts import TEXTS, WATCHED, folder_lines, remove_text, text_lines
 
 _FORMS = (*hal_files.FORMS, hal_files.GUARD, filter_lines.FORM)
 
@@ -28,21 +30,20 @@ class Request:
 
     def problem(self) -> str | None:
         """What is wrong with the words of the command, None where nothing is."""
-        host = HOSTS[self.host]
+        takes = HOSTS[self.host].takes
         if self.host == "linuxcnc":
             return self._linuxcnc_problem()
-        for name, given in (
-            ("--form", self.form),
-            ("--linuxcnc-version", self.linuxcnc_version),
-            ("--base", None if "base" in host.takes else self.base),
-            ("WHERE", None if "where" in host.takes else self.where),
-            ("--remove", (None, "")["remove" not in host.takes and self.remove]),
-        ):
-            if given is not None:
-                return f"{name} is not for the host {self.host}"
-        if "where!" in host.takes and self.where is None:
-            return f"{self.host}: name the folder, `gcodejerk install {self.host} DIR`"
-        if self.machine is None and not self.remove and "machine" in host.takes:
+        if self.form is not None or self.linuxcnc_version is not None:
+            return "--form and --linuxcnc-version are for linuxcnc"
+        if self.base is not None and "base" not in takes:
+            return "--base is for freecad"
+        if self.where is not None and "where" not in takes:
+            return f"{self.host}: there is no file to put into {self.where}, leave it out"
+        if self.remove and "remove" not in takes:
+            return f"{self.host}: nothing was installed; take the line out of its settings"
+        if self.remove and self.host in TEXTS and self.where is None:
+            return f"{self.host}: name the folder that it was put into"
+        if self.machine is None and not self.remove:
             return f"{self.host}: name the machine file with --machine"
         return None
 
@@ -73,7 +74,7 @@ class Host:
     """What is installed, in a line."""
     tested: str
     takes: frozenset[str]
-    """Of `where`, `where!` (has to be said), `machine`, `base`, `remove`."""
+    """Of `where`, `machine`, `base`, `remove`."""
     install: Callable[[Request], list[str]]
     """What was done, or what to do, for the user."""
 
@@ -108,6 +109,28 @@ def _freecad(request: Request) -> list[str]:
     return install_post(request.where, own_command(), machine, request.base or "linuxcnc")
 
 
+def _slicer(request: Request) -> list[str]:
+    """A slicer: a line to paste."""
+    assert request.machine is not None
+    return slicer_lines(request.host, own_command(), machine_word(request.machine))
+
+
+def _text(request: Request) -> list[str]:
+    """A host that takes a file."""
+    if request.remove:
+        assert request.where is not None
+        return remove_text(request.host, request.where)
+    assert request.machine is not None
+    machine = machine_word(request.machine)
+    return text_lines(request.host, request.where, own_command(), machine)
+
+
+def _watched(request: Request) -> list[str]:
+    """A host that only opens files."""
+    assert request.machine is not None
+    return folder_lines(request.host, own_command(), machine_word(request.machine))
+
+
 HOSTS: dict[str, Host] = {
     "linuxcnc": Host(
         "HAL that plays rapids, an override guard, or the screens' [FILTER], into an INI",
@@ -121,4 +144,42 @@ HOSTS: dict[str, Host] = {
         frozenset({"where", "machine", "base", "remove"}),
         _freecad,
     ),
+    "prusaslicer": Host(
+        "the line for its post-processing scripts",
+        "tested with PrusaSlicer 2.5.0",
+        frozenset({"machine"}),
+        _slicer,
+    ),
+    **{
+        name: Host(
+            "the line for its post-processing scripts",
+            "untested; it calls scripts as PrusaSlicer does",
+            frozenset({"machine"}),
+            _slicer,
+        )
+        for name in SLICERS
+        if name != "prusaslicer"
+    },
+    **{
+        name: Host(what, "untested", frozenset({"where", "machine", "remove"}), _text)
+        for name, what in {
+            "cura": "a post-processing script",
+            "fusion360": "lines for the end of a post (.cps)",
+            "mastercam": "a batch file to drop programs onto",
+            "solidcam": "a batch file to drop programs onto",
+            "vectric": "a batch file, and the line of the post that calls it",
+            "octoprint": "a plugin, one file: programs are processed when they are uploaded",
+            "bcnc": "a plugin, one file: a button for the program that is open",
+        }.items()
+    },
+    **{
+        name: Host(
+            "the command that fills the folder it opens from",
+            "steps",
+            frozenset({"machine"}),
+            _watched,
+        )
+        for name in WATCHED
+    },
 }
+assert set(TEXTS) | set(WATCHED) | set(SLICERS) < set(HOSTS)

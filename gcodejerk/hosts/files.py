@@ -14,7 +14,7 @@ from gcodejerk.batch.files import new_file
 from gcodejerk.errors import EmitError
 from gcodejerk.hosts.linuxcnc.ini import is_writable
 
-_OWN = re.compile(rb"\W{1,3} gcodejerk install ([a-z0-9-]+) sum:([0-9a-f]{16})\n")
+_OWN = re.compile(rb"(?:\W{1,3}|@rem) gcodejerk install ([a-z0-9-]+) sum:([0-9a-f]{16})\n")
 
 
 def signed(host: str, body: str, comment: str = "#") -> bytes:

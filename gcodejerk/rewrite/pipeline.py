@@ -42,6 +42,7 @@ from gcodejerk.rewrite.expanded import (
     lines_in_original,
     written_out,
 )
+from gcodejerk.rewrite.feed_moves import instead_notes
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
 from gcodejerk.rewrite.result import Result, reported_profiles
@@ -262,6 +263,7 @@ def _process(
         notes=(
             *operator_notes(emitter, machine, plans),
             *program_notes(program, expansion, emitter),
+            *instead_notes(source, plans, emitter.name),
             *dogleg_notes(plans, deviation),
             *tick_notes(plans),
             *band_notes(plans, collected),
