@@ -18,7 +18,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -78,7 +78,9 @@ def open_input(path: str) -> Iterator[BinaryIO]:
 
 
 @contextlib.contextmanager
-def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
+def new_file(
+    path: str, like: str | None = None, wanted: Callable[[], bool] = lambda: True
+) -> Iterator[BinaryIO]:
     """A file that appears under its name when the block ends without an error.
 
     Parameters
@@ -87,6 +89,8 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
         Where it is to appear, or `-` for standard output.
     like : str, optional
         A file whose permissions it gets.
+    wanted : callable, optional
+        Asked at the end: without it the place stays as it is. Not for standard output.
 
     Yields
     ------
@@ -114,6 +118,8 @@ def new_file(path: str, like: str | None = None) -> Iterator[BinaryIO]:
             raise _unwritable(path, error) from error
         with io.BufferedRandom(raw) as file:
             yield file
+            if not wanted():
+                return
             file.flush()
             with _naming(path):
                 os.fsync(file.fileno())

@@ -15,7 +15,7 @@ import tempfile
 import traceback
 from collections.abc import Generator
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import BinaryIO
 
@@ -69,6 +69,13 @@ class Job:
     """What belongs to the output, for controllers that write such a file."""
     backup: bool = False
     """The original is kept where it is replaced."""
+    name: str | None = None
+    """What messages call the program; its own name where None."""
+
+    @property
+    def called(self) -> str:
+        """What messages call the program."""
+        return self.input if self.name is None else self.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,12 +163,12 @@ def run_job(job: Job, machine: Machine, settings: Settings, progress: Progress |
     except BrokenPipeError:
         raise
     except GcodejerkError as error:
-        return Done(job.input, error=str(error))
+        return Done(job.called, error=str(error))
     except MemoryError:
         problem = "there is not enough memory"
-        return Done(job.input, error=str(EmitError(f"{job.input}: {problem}", "use fewer --jobs")))
+        return Done(job.called, error=str(EmitError(f"{job.input}: {problem}", "use fewer --jobs")))
     except OSError as error:
-        return Done(job.input, error=f"{job.input}: {error}")
+        return Done(job.called, error=f"{job.input}: {error}")
 
 
 def _run_whatever_happens(
@@ -175,7 +182,7 @@ def _run_whatever_happens(
             f"{job.input}: failed by a bug of gcodejerk, please report it; nothing was written",
             traceback.format_exc(),
         )
-        return Done(job.input, error=str(bug))
+        return Done(job.called, error=str(bug))
 
 
 def _lost(job: Job, status: int | None) -> Done:
@@ -185,7 +192,7 @@ def _lost(job: Job, status: int | None) -> Done:
         f"{job.input}: the process that worked on it died ({how})",
         "if memory was short, use fewer --jobs; otherwise please report it",
     )
-    return Done(job.input, error=str(lost))
+    return Done(job.called, error=str(lost))
 
 
 def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
@@ -199,8 +206,13 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             make_folder(name)
         if job.report is not None and job.mode == "write":
             report = stack.enter_context(new_file(job.report))
+        # In place, the program is replaced only where something has changed.
+        keeps = job.in_place and job.beside is None
+        done: Done | None = None
         if job.mode == "write":
-            target: BinaryIO = stack.enter_context(new_file(job.output, like=job.input))
+            target: BinaryIO = stack.enter_context(
+                new_file(job.output, job.input, lambda: done is None or done.changed or not keeps)
+            )
         else:
             target = stack.enter_context(tempfile.TemporaryFile())
         beside: BinaryIO | None = None
@@ -209,8 +221,8 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
             beside = stack.enter_context(new_file(job.beside, like=job.input))
         elif job.beside is not None:
             beside = stack.enter_context(tempfile.TemporaryFile())
-        result = process_file(source, target, machine, settings, job.input, progress, beside)
-        summary = summary_line(job.input, summary_of(result))
+        result = process_file(source, target, machine, settings, job.called, progress, beside)
+        summary = summary_line(job.called, summary_of(result))
         if job.strict and (result.unserved or result.read_once):
             raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
         if report is not None:
@@ -225,24 +237,26 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         if job.mode == "write" and not settings.force:
             _refuse_foreign_beside(job)
         diff = difference(source, target, result) if job.mode == "diff" else b""
-        if job.backup and job.mode == "write" and not same_content(job.input, target):
-            keep(job.input, source)
         if job.in_place and version(job.input) != before:
             raise changed_error(job.input)  # an edit of the user's would be lost
-    if job.mode == "write" and job.output != STANDARD:
-        summary += f" -> {job.output}" + (f" and {job.beside}" if job.beside else "")
-    figures = summary_of(result)
-    whole = whole_line(figures)
-    written = 0 if result.expansion is None else result.expansion.written
-    places = 0 if result.settings is None else result.settings.places
-    left = result.left if result.settings is None else result.unserved
-    counts = (result.planned, left, written, places)
-    return Done(
-        job.input, *counts, summary, result.notes, diff, whole,
-        output=job.output if job.mode == "write" else None,
-        figures=figures,
-        left_at=_left_at(result),
-    )  # fmt: skip
+        written = 0 if result.expansion is None else result.expansion.written
+        places = 0 if result.settings is None else result.settings.places
+        left = result.left if result.settings is None else result.unserved
+        counts = (result.planned, left, written, places)
+        figures = summary_of(result)
+        done = Done(
+            job.called, *counts, summary, result.notes, diff, whole_line(figures),
+            figures=figures, left_at=_left_at(result),
+        )  # fmt: skip
+        if job.backup and job.mode == "write" and done.changed:
+            keep(job.input, source)
+    if job.mode != "write" or job.output == STANDARD:
+        return done
+    if keeps and not done.changed:
+        return replace(done, summary=f"{summary}; the file is as it was")
+    to = job.called if job.in_place else job.output
+    more = f" and {job.beside}" if job.beside else ""
+    return replace(done, summary=f"{summary} -> {to}{more}", output=to)
 
 
 def _left_at(result: Result) -> tuple[tuple[str, tuple[int, ...], int], ...]:

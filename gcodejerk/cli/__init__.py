@@ -19,7 +19,7 @@ import typer
 from gcodejerk._version import __version__
 from gcodejerk.batch.signals import exit_on
 from gcodejerk.cli.controllers import controllers
-from gcodejerk.cli.hosts import install
+from gcodejerk.cli.hosts import filter_program, install
 from gcodejerk.cli.machines import (
     machine_check,
     machine_list,
@@ -53,6 +53,7 @@ app.command("map")(map_amplitudes)
 app.command("compare")(compare)
 app.command("parameters")(parameters)
 app.command("controllers")(controllers)
+app.command("filter")(filter_program)
 app.command("install")(install)
 machine_app.command("new")(machine_new)
 machine_app.command("check")(machine_check)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import typer
 
@@ -30,6 +30,8 @@ class Outputs:
     in_place: bool
     report: str | None
     backup: bool = False
+    called: str | None = None
+    """What messages and reports call the program, where that is not its own name."""
 
     @property
     def report_dir(self) -> str | None:
@@ -90,6 +92,7 @@ class Outputs:
                 backup=self.backup,
                 strict=strict,
                 beside=output + beside if beside else None,
+                name=self.called,
                 new_folders=(
                     *_folder(output, self.output_dir),
                     *_folder(report, self.report_dir),
@@ -108,6 +111,8 @@ class Outputs:
 
     def _report(self, program: Input) -> str | None:
         """Where the report on a program goes."""
+        if self.called is not None:
+            program = Input(program.path, PurePath(self.called).name)
         return self.report if self.report_dir is None else report_name(program, self.report_dir)
 
 

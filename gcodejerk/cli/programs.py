@@ -105,9 +105,12 @@ def process(
     from gcodejerk.batch.inputs import find_inputs
     from gcodejerk.batch.jobs import run_jobs
     from gcodejerk.cli.outputs import Outputs
+    from gcodejerk.hosts.slicers import output_name
     from gcodejerk.rewrite.pipeline import Settings
 
-    outputs = Outputs(output, output_dir, in_place, report, backup)
+    # A slicer gives the program a name for the time being, and says the user's.
+    called = output_name() if in_place and len(files) == 1 else None
+    outputs = Outputs(output, output_dir, in_place, report, backup, called)
     outputs.check(files)
     if revert:
         _revert(files)

@@ -21,7 +21,7 @@ from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
-from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
+from gcodejerk.errors import EmitError, Place, ProcessedError, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
@@ -42,6 +42,7 @@ from gcodejerk.rewrite.expanded import (
     lines_in_original,
     written_out,
 )
+from gcodejerk.rewrite.feed_moves import instead_notes
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
 from gcodejerk.rewrite.result import Result, reported_profiles
@@ -262,6 +263,7 @@ def _process(
         notes=(
             *operator_notes(emitter, machine, plans),
             *program_notes(program, expansion, emitter),
+            *instead_notes(source, plans, emitter.name),
             *dogleg_notes(plans, deviation),
             *tick_notes(plans),
             *band_notes(plans, collected),
@@ -319,7 +321,7 @@ def _read(
         neighbours=replace(machine, controller=emitter.name).neighbours_matter,
     )
     if program.stamp is not None and not settings.force:
-        raise ProgramError(
+        raise ProcessedError(
             "this program has been processed by gcodejerk before",
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),

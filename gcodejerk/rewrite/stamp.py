@@ -8,7 +8,9 @@ it stands one line for the operator: which override acts on streams.
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Sequence
+from typing import BinaryIO
 
 from gcodejerk._version import __version__
 from gcodejerk.machine import Machine
@@ -21,6 +23,33 @@ SUM_UNKNOWN = SUM_MARK + b"0" * SUM_DIGITS
 """The sum while it is computed: BLAKE2b, 8 bytes, over the output with these digits in it."""
 SUM_WITHIN = 1 << 17
 """A stamp that stands farther from the top than this has no sum. [bytes]"""
+
+_SIGNED = re.compile(rb"gcodejerk stamp [ -~]{1,40}?" + SUM_MARK + rb"([0-9a-f]{16})")
+
+
+def is_unchanged(file: BinaryIO) -> bool | None:
+    """Whether a stamped program is what was written, by its sum.
+
+    Parameters
+    ----------
+    file : binary file
+        Seekable; read from its beginning, left at its end.
+
+    Returns
+    -------
+    bool or None
+        None where there is no sum to hold it to.
+    """
+    file.seek(0)
+    head = file.read(SUM_WITHIN)
+    found = _SIGNED.search(head)
+    if found is None:
+        return None
+    digest = hashlib.blake2b(digest_size=SUM_DIGITS // 2)
+    digest.update(head[: found.start(1)] + b"0" * SUM_DIGITS + head[found.end(1) :])
+    while data := file.read(1 << 20):
+        digest.update(data)
+    return digest.hexdigest().encode() == found[1]
 
 
 def stamp_text(machine: Machine, chosen: Sequence[str]) -> bytes:

@@ -86,13 +86,18 @@ def read_ini(path: str) -> Ini:
     EmitError
         It is none, or cannot be read.
     """
+    return parse_ini(Path(path), read_bytes(path))
+
+
+def read_bytes(path: str) -> bytes:
+    """The bytes of an INI."""
     try:
-        data = Path(path).read_bytes()
-    except OSError as error:
+        return Path(path).read_bytes()
+    except (OSError, ValueError) as error:
         raise EmitError(
-            f"{path} cannot be read: {error.strerror}", "name the .ini file of a configuration"
+            f"{path} cannot be read: {getattr(error, 'strerror', None) or error}",
+            "name the .ini file of a configuration",
         ) from error
-    return parse_ini(Path(path), data)
 
 
 def parse_ini(path: Path, data: bytes) -> Ini:
