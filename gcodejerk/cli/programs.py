@@ -93,6 +93,12 @@ def process(
     revert: Annotated[
         bool, typer.Option("--revert", help="put the originals that --backup kept back")
     ] = False,
+    if_changed: Annotated[
+        bool,
+        typer.Option(
+            "--if-changed", help="skip programs whose output is newer and of these options"
+        ),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="print a line of JSON for each program")
     ] = False,
@@ -110,7 +116,7 @@ def process(
 
     # A slicer gives the program a name for the time being, and says the user's.
     called = output_name() if in_place and len(files) == 1 else None
-    outputs = Outputs(output, output_dir, in_place, report, backup, called)
+    outputs = Outputs(output, output_dir, in_place, report, backup, if_changed, called)
     outputs.check(files)
     if revert:
         _revert(files)
@@ -172,7 +178,7 @@ class _Tally:
         self.mode, self.quiet, self.many = mode, quiet, many
         self.as_json, self.verbose = as_json, verbose
         self.out = sys.stderr if aside else sys.stdout
-        self.programs = self.planned = self.left = self.failed = self.set = 0
+        self.programs = self.planned = self.left = self.failed = self.set = self.current = 0
         self.changed = False
 
     def fail(self, error: str) -> None:
@@ -192,6 +198,7 @@ class _Tally:
         self.planned += done.planned
         self.left += done.left
         self.set += bool(done.set_at)
+        self.current += done.current
         self.changed |= done.changed
         if done.diff:
             sys.stdout.flush()
@@ -217,9 +224,10 @@ class _Tally:
         if self.quiet:
             return
         would = "" if self.mode == "write" else "would be "
+        current = f"{self.current} up to date, " if self.current else ""
         control = f"control {would}set in {self.set}, " if self.set else ""
         print(
-            f"{self.programs} programs: {control}{self.planned} rapids {would}rewritten, "
+            f"{self.programs} programs: {current}{control}{self.planned} rapids {would}rewritten, "
             f"{self.left} left alone; {self.failed or 'none'} failed",
             file=self.out,
         )
