@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from gcodejerk.planning.plans import Plans
 
-LOOKED_AT = 4 << 20
+LOOKED_AT = 2 << 20
 """Bytes of a program that are looked at: a second or two."""
 LEAST = 2
 """Fewer moves make no habit."""
