@@ -185,7 +185,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.NO_MODE: Explanation(
         "nothing is known to vibrate, so nothing can be gained (profiles `shortest` and "
         "`conventional` go on)",
-        "measure what vibrates, and state it as `modes` or `spectrum` in the machine file",
+        "measure what vibrates (`gcodejerk machine test-program` writes a program for that), and "
+        "state it as `modes` or `spectrum` in the machine file",
     ),
     Reason.NO_BLENDING: Explanation(
         "LinuxCNC stops after every block in which A, B, C, U, V or W moves",

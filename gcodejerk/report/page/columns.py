@@ -28,11 +28,11 @@ from gcodejerk.rewrite.result import Result
 Record = dict[str, Any]
 Rows = NDArray[np.int64]
 MOST_RAPIDS = 20_000
-CURVE_BYTES = 2_000_000
+CURVE_BYTES = 1_600_000
 """Of all profiles, as they are packed."""
 EXACT_BYTES = 800_000
 """Profiles that take more are packed in single precision."""
-LONGEST_TEXT = 120
+LONGEST_TEXT = 80
 """Characters of a block that are shown."""
 LONGEST_BLOCK = 1000
 """Bytes of a block that are read."""

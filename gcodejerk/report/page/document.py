@@ -39,7 +39,7 @@ MARK = "<!doctype html>\n<!-- gcodejerk report"
 SCRIPTS = ("vibration.js", "views.js", "table.js", "page.js")
 MOST_LINES = 100_000
 """Programs of more lines are drawn without their feed moves."""
-MOST_POINTS = 60_000
+MOST_POINTS = 40_000
 """Of the feed moves."""
 _PLACE = re.compile(r"\{\{(\w+)\}\}")
 
@@ -87,8 +87,8 @@ def page_html(
     result: Result, machine: Machine, output: str | None, source: BinaryIO, written: int
 ) -> str:
     """The text of a page; as `write_page`."""
-    unit = headline.Unit.of(result)
     summary = summary_of(result)
+    unit = headline.Unit.of(summary)
     figures = Figures.of(result)
     rows = chosen_rapids(figures, MOST_RAPIDS)
     feed, cut = _feed(result, machine, source)

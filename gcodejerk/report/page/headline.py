@@ -37,10 +37,9 @@ class Unit:
     small_per_mm: float
 
     @classmethod
-    def of(cls, result: Result) -> Unit:
+    def of(cls, summary: Record) -> Unit:
         """Inches where all rapids are in inches, else mm."""
-        inch = result.program.rapids.inch
-        if len(inch) and bool(inch.all()):
+        if summary["inch"]:
             return cls("in", 1.0 / MM_PER_INCH, "thou", 1000.0 / MM_PER_INCH)
         return cls("mm", 1.0, "µm", 1000.0)
 
