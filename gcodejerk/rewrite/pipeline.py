@@ -21,7 +21,7 @@ from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
-from gcodejerk.errors import EmitError, Place, ProcessedError, ProgramError, VerifyError
+from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
@@ -49,7 +49,7 @@ from gcodejerk.rewrite.rapid_feed import check_dialect, check_rapid_feed
 from gcodejerk.rewrite.result import Result, reported_profiles
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.set_control import set_control
-from gcodejerk.rewrite.stamp import stamp_text
+from gcodejerk.rewrite.stamp import ProcessedError, stamp_text
 from gcodejerk.verification import Verification, require, verify_files
 
 Progress = Callable[[str, int, int], None]
