@@ -21,6 +21,7 @@ from gcodejerk.cli.common import (
     progress,
     say,
 )
+from gcodejerk.cli.rapid_feed import ClearanceOption, RapidFeedOption, counting
 from gcodejerk.errors import GcodejerkError
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ def process(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    rapid_feed: RapidFeedOption = None,
+    rapid_clearance: ClearanceOption = None,
     report: Annotated[
         str | None,
         typer.Option(
@@ -134,7 +137,7 @@ def process(
         force=force,
         expand_cycles=expand_cycles,
     )
-    described = load_machine(machine, files)
+    described = counting(load_machine(machine, files), rapid_feed, rapid_clearance)
     mode = "check" if check else "diff" if diff else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
     aside = diff or any(job.output == "-" for job in batch)
@@ -241,6 +244,8 @@ def inspect(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    rapid_feed: RapidFeedOption = None,
+    rapid_clearance: ClearanceOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the report as JSON")] = False,
 ) -> None:
     """Show all rapids of a program: planned, or left alone and why."""
@@ -249,7 +254,7 @@ def inspect(
     from gcodejerk.report.tables import rapids_table, summary_line, whole_line
     from gcodejerk.rewrite.pipeline import Settings, process_file
 
-    described = load_machine(machine, [file])
+    described = counting(load_machine(machine, [file]), rapid_feed, rapid_clearance)
     settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
     with open_input(file) as source, progress(as_json) as show:
         result = process_file(source, None, described, settings, file, show)
@@ -280,6 +285,8 @@ def verify(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="the original's cycles are written out")
     ] = False,
+    rapid_feed: RapidFeedOption = None,
+    rapid_clearance: ClearanceOption = None,
     report: Annotated[
         str | None,
         typer.Option(metavar="FILE.json", help="hold streams for LinuxCNC to its profiles, too"),
@@ -300,7 +307,7 @@ def verify(
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
-    described = load_machine(machine, [original])
+    described = counting(load_machine(machine, [original]), rapid_feed, rapid_clearance)
     if report is not None and expand_cycles:
         raise typer.BadParameter("--report: its lines are the original's, before its cycles")
     no_cycles = "--expand-cycles: a table of streams has no cycles written out"

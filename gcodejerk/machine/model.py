@@ -157,6 +157,7 @@ class Machine(Description):
             wraps={axis.name: axis.wrap for axis in self.axes if axis.wrap is not None},
             resume=self.program.resume_after_stop,
             spindle=self.spindle,
+            rapid_feed=self.rapid_feed,
             diameter=any(axis.diameter for axis in self.axes),
         )
 
