@@ -69,4 +69,5 @@ def _hash(machine: Machine, settings: Settings) -> str:
         settings.expand_cycles,
         settings.dialect,
         form,
+        "" if machine.rapid_feed is None else machine.rapid_feed.text,
     )
