@@ -292,7 +292,7 @@ def accepted():
 
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
-@settings(FLOW, max_examples=36)
+@settings(FLOW, max_examples=20)
 @given(lines=flows(), hidden=st.tuples(*[st.integers(-2, 4)] * 3))
 def test_drawn_flow_is_read_as_the_interpreter_runs_it(tmp_path, accepted, part, lines, hidden):
     settings_line = " ".join(f"#{33 + n}={value}" for n, value in enumerate(hidden))
@@ -326,7 +326,7 @@ def planned():
     assert sum(counts) > 10
 
 
-@settings(FLOW, max_examples=24)
+@settings(FLOW, max_examples=16)
 @given(lines=flows())
 def test_drawn_flow_moves_alike_before_and_after(tmp_path, planned, lines):
     k = len(planned)

@@ -226,7 +226,7 @@ def check(programs, hidden, at, start):
     return len(certain)
 
 
-@settings(max_examples=80)
+@settings(max_examples=50)
 @given(fanuc_programs(), st.tuples(numbers, numbers), st.tuples(numbers, numbers, numbers))
 def test_what_is_known_holds_on_every_pass(programs, hidden, at):
     check(programs, hidden, at, Start())

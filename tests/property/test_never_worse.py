@@ -21,7 +21,7 @@ from gcodejerk.rewrite.pipeline import process
 
 CALM = settings(
     deadline=None,
-    max_examples=5,
+    max_examples=3,
     phases=(Phase.explicit, Phase.reuse, Phase.generate),
     suppress_health_check=list(HealthCheck),
 )

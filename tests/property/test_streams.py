@@ -15,7 +15,7 @@ from gcodejerk.testing import assert_stream_valid, machines, moves
 # A machine is a large thing to shrink: minutes for a smaller example that says no more.
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 slow = settings(
-    max_examples=24, deadline=None, phases=PHASES, suppress_health_check=list(HealthCheck)
+    max_examples=14, deadline=None, phases=PHASES, suppress_health_check=list(HealthCheck)
 )
 
 
@@ -76,7 +76,7 @@ def test_no_stream_takes_longer_than_the_conventional_time_but_where_limits_leav
 
 
 @given(cases())
-@settings(slow, max_examples=10)
+@settings(slow, max_examples=6)
 def test_residual_of_a_stream_is_that_of_a_simulated_mode(case):
     plan = plan_or_skip(case)
     modes = plan.plans.modes
@@ -107,7 +107,7 @@ def worst_in_band(machine, positions, dt):
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @given(case=cases(jerk_limited=True))
-@settings(slow, max_examples=12)
+@settings(slow, max_examples=8)
 def test_no_stream_leaves_more_than_the_conventional_one(part, case):
     plan = plan_or_skip(case)
     plans, dt = plan.plans, plan.machine.interval
@@ -132,7 +132,7 @@ def rewritten():
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @given(case=cases(jerk_limited=True, positioning="linear"))
-@settings(slow, max_examples=12)
+@settings(slow, max_examples=8)
 def test_segments_add_up_to_the_time_and_to_the_length(part, rewritten, case):
     plan = plan_or_skip(case)
     position = velocity = acceleration = 0.0

@@ -24,7 +24,7 @@ from gcodejerk.verification import verify, verify_files
 # A machine is a large thing to shrink: minutes for a smaller example that says no more.
 CALM = settings(
     deadline=None,
-    max_examples=16,
+    max_examples=10,
     phases=(Phase.explicit, Phase.reuse, Phase.generate),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
@@ -57,7 +57,7 @@ def outputs(data, machine, controller):
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "mach"])
-@settings(parent=CALM, max_examples=4)
+@settings(parent=CALM, max_examples=3)
 @given(machine_of(axes="XYZ"), programs(), st.booleans())
 def test_every_output_is_accepted(controller, machine, data, known):
     machine = ready(machine, known)
@@ -71,7 +71,7 @@ def test_every_output_is_accepted(controller, machine, data, known):
 
 @pytest.mark.parametrize("controller", ["linuxcnc"])
 @pytest.mark.parametrize("planner", PLANNERS)
-@settings(parent=CALM, max_examples=3)
+@settings(parent=CALM, max_examples=2)
 @given(st.data(), st.booleans(), st.sampled_from(["condition3", "cascade", "conventional"]))
 def test_every_output_is_accepted_whatever_profile_todays_rapids_follow(
     controller, planner, data, known, profile
@@ -99,7 +99,7 @@ def test_every_output_is_accepted_whatever_profile_todays_rapids_follow(
 
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
-@settings(parent=CALM, max_examples=8)
+@settings(parent=CALM, max_examples=4)
 @given(machine=machines(axes="XYZ"), data=programs())
 def test_every_table_is_accepted(part, machine, data):
     machine = ready(machine)
@@ -111,7 +111,7 @@ def test_every_table_is_accepted(part, machine, data):
 
 
 @pytest.mark.parametrize("dialect", sorted(VOCABULARIES))
-@settings(parent=CALM, max_examples=10)
+@settings(parent=CALM, max_examples=6)
 @given(st.data(), st.booleans())
 def test_every_output_of_every_dialect_is_accepted(dialect, data, known):
     program = data.draw(programs(dialect))

@@ -118,7 +118,7 @@ class Killed:
         raise AssertionError("".join(said))
 
 
-STRIDE = 4
+STRIDE = 6
 """Calls from one kill to the next; the long run kills before each."""
 
 
@@ -174,7 +174,7 @@ def test_killed_at_drawn_moments_a_batch_leaves_whole_files_only(folder, request
     took = time.monotonic() - begun
     whole = {name: Path("out", name).read_bytes() for name in names("out")}
     assert len(whole) == 4
-    for _ in range(32 if request.config.getoption("--long") else 4):
+    for _ in range(32 if request.config.getoption("--long") else 2):
         for name in names("out"):
             os.unlink(f"out/{name}")
         number = draw.choice([signal.SIGKILL, signal.SIGTERM])

@@ -22,7 +22,7 @@ PARTS = 2
 
 
 @pytest.mark.parametrize("part", range(PARTS))
-@pytest.mark.parametrize(("name", "runs"), [("fuzz_reader", 200), ("fuzz_process", 100)])
+@pytest.mark.parametrize(("name", "runs"), [("fuzz_reader", 80), ("fuzz_process", 60)])
 def test_a_harness_finds_nothing_in_a_few_hundred_inputs(name, runs, part, request):
     check = load(name).load()
     seeds = load("engine").seeds()

@@ -235,9 +235,16 @@ def test_a_map_of_a_measured_spectrum(command, tmp_path):
 
 
 def test_completion_can_be_had():
-    done = subprocess.run(
-        [sys.executable, "-m", "gcodejerk.cli", "--show-completion", "bash"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert "complete" in done.stdout
+    for words, expected in (
+        ("gcodejerk plan --machine v", "vmc"),
+        ("gcodejerk process --controller linuxcnc-", "linuxcnc-hal"),
+        ("gcodejerk machine test", "test-program"),
+    ):
+        # What a shell asks behind a tabulator.
+        asked = {"_GCODEJERK_COMPLETE": "complete_bash", "COMP_WORDS": words,
+                 "COMP_CWORD": str(len(words.split()) - 1)}  # fmt: skip
+        done = subprocess.run(
+            [Path(sys.executable).with_name("gcodejerk")], env=os.environ | asked,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.stdout.split() == [expected]
