@@ -76,13 +76,16 @@ EXPLAINED: dict[Reason, Explanation] = {
         "where it always runs, take the `/` out",
     ),
     Reason.SUBPROGRAM: Explanation(
-        "it is not the same rapid on every pass, never runs, or not every pass could be followed",
+        "it is not the same rapid on every pass, never runs, or not every pass could be followed; "
+        "or behind a call, a label or a loop nobody has said G40",
         "post the moves in full, without subprograms, loops and branches; or begin every pass at "
-        "the same place",
+        "the same place; where a note names the line, state G40 and the other modes behind it",
     ),
     Reason.NOT_UNDERSTOOD: Explanation(
-        "the control would refuse it, or it holds a code that the dialect's table does not know",
-        "the notes name the line: correct it, or say how the program is written (`--dialect`)",
+        "the control would refuse it, or it holds a code that the dialect's table does not know; "
+        "or such a block stands in front of it, and since then nobody has said G40",
+        "the notes name the line: correct it, say how the program is written (`--dialect`), "
+        "declare a harmless code (`program.harmless`), or state G40 and the other modes behind it",
     ),
     Reason.EXPRESSION: Explanation(
         "an axis word is a variable or an expression; where it ends is known if every variable is",
@@ -132,12 +135,13 @@ EXPLAINED: dict[Reason, Explanation] = {
         "nothing: what does not move shakes nothing",
     ),
     Reason.DISTANCE_MODE_UNKNOWN: Explanation(
-        "neither G90 nor G91 has been stated where the dialect assumes none, or a subprogram may "
-        "have changed it",
+        "neither G90 nor G91 has been stated where the dialect assumes none, or a subprogram or a "
+        "block that is not understood may have changed it",
         "put G90 into the program, behind calls once more, or into `program.startup`",
     ),
     Reason.UNITS_UNKNOWN: Explanation(
-        "nobody says whether lengths are mm or inches, or a subprogram may have changed it",
+        "nobody says whether lengths are mm or inches, or a subprogram or a block that is not "
+        "understood may have changed it",
         "put the code for mm or inches (G21, G20) in front, or into `program.startup`",
     ),
     Reason.FEED_UNIT: Explanation(
