@@ -101,7 +101,8 @@ class Executor(Phases):
         if not self._stays:
             self.state.forget_positions()  # who refuses, stops; and somebody goes on
         step.fault, step.refused = True, code
-        step.feed_event = USES_FEED
+        if step.feed_event:
+            step.feed_event = USES_FEED
 
     def _leave_contour(self, block: Block) -> None:
         """Forget what a block of a contour said: it did not run here."""

@@ -74,6 +74,8 @@ class Line:
     blank: bool = False
     offsets: bool = False
     """An assignment that may change offsets."""
+    swivelled: bool = False
+    """The plane is turned from here on."""
     group: bool = False
     """F is from here on the speed of some axes only."""
 
@@ -321,7 +323,7 @@ class Text:
             if effect == "feed group":
                 line.group = (match[2] or b"").strip(b"() \t") != b""
             if effect == "swivel":
-                effect = "transform" if (match[2] or b"").strip(b"() \t") else "frames"
+                line.swivelled = (match[2] or b"").strip(b"() \t") != b""
             if effect != "none":
                 line.effects.append(effect)
             return b" "

@@ -30,7 +30,7 @@ _FRAMES: frozenset[Effect] = frozenset(
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
-_READ: frozenset[Effect] = QUIET | frozenset[Effect](("frames", "machine"))
+_READ: frozenset[Effect] = QUIET | frozenset[Effect](("frames", "swivel", "machine"))
 """Effects of names that are followed."""
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
@@ -155,11 +155,8 @@ class Tracker(Drilling):
             return Observation()
         if not line.understood or any(effect not in _READ for effect in line.effects):
             return self._lost(line)
-        if "frames" in line.effects:
-            if any(letter != "N" for letter, _, _ in line.words):
-                return self._lost(line)
-            self._new_frame()
-            return Observation()
+        if not {"frames", "swivel"}.isdisjoint(line.effects):
+            return self._new_frame(line)
         if self.contour is not None:
             self._in_contour(line)
             return Observation()
@@ -176,17 +173,22 @@ class Tracker(Drilling):
             return self._run_or_refused(block)
         seen = self._run_block(block)
         if "machine" in line.effects:
-            self.lose()  # SUPA: its words are no program coordinates
+            self.lose(_letters(block.axes))  # SUPA: its words are no program coordinates
             seen = Observation(against="a coordinate frame changes in it")
         if line.effects and seen.sure:
             seen.sure = False
         return seen
 
-    def _new_frame(self) -> None:
+    def _new_frame(self, line: Line) -> Observation:
         """A frame that is not known, and a way to it that is not."""
+        if any(letter != "N" for letter, _, _ in line.words):
+            return self._lost(line)
         self.lose_offsets()
         self.lose()
         self.g["motion"], self.feed = None, NAN
+        if "swivel" in line.effects and (line.swivelled or "swivel" in self.frames):
+            self.frames["swivel"] = line.swivelled
+        return Observation()
 
     def _run_or_refused(self, block: Sorted) -> Observation:
         """A block that does something on some of the controls, and nothing on others."""
@@ -205,7 +207,7 @@ class Tracker(Drilling):
         # M3 I: a letter without a number is no word
         fires = any(letter == "M" and number in (3, 4) for letter, number, _ in line.words)
         self.habits = self.habits or (fires and not line.understood)
-        if any(effect in ("transform", "modal cycle") for effect in line.effects):
+        if any(effect in ("transform", "swivel", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
         return Observation()
