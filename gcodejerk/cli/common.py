@@ -107,7 +107,8 @@ def _found(programs: Sequence[str]) -> Path:
             f"these programs belong to different machines, {paths[0]} and {paths[1]}: state "
             "--machine M, or process them one after the other"
         )
-    print(f"machine: {paths[0]}", file=sys.stderr)
+    shown = os.path.relpath(paths[0])
+    print(f"machine: {paths[0] if shown.startswith('..') else shown}", file=sys.stderr)
     return paths[0]
 
 

@@ -67,6 +67,10 @@ def parameters(
         typer.Option("--plot", metavar="FILE", help="draw what time buys, and robustness (.png, "
                      ".svg, .pdf)"),
     ] = None,
+    no_curve: Annotated[
+        bool,
+        typer.Option("--no-curve", help="do not search what more or less time would buy: quicker"),
+    ] = False,
     dialect: Annotated[str | None, typer.Option(help="how the programs are read")] = None,
 ) -> None:  # fmt: skip
     """Tune the control's own time constants, jerk limits and shapers for a shop's rapids."""
@@ -85,6 +89,8 @@ def parameters(
         raise typer.BadParameter(f"--goal {goal}: choose {' or '.join(GOALS)}")
     if plot is not None and Path(plot).suffix.lower() not in FIGURES:
         raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
+    if plot is not None and no_curve:
+        raise typer.BadParameter("--plot draws the curve: leave --no-curve out")
     own = _numbers(tried or [])
     written = [name for name in (output, as_json, plot) if name is not None]
     if len(set(written)) < len(written):
@@ -101,7 +107,7 @@ def parameters(
         scheme = emitter.scheme(described, settings)
         scheme.checked(own)
         found = tune(
-            scheme, moves, described, goal=goal, time=time,
+            scheme, moves, described, goal=goal, time=time, curve=not no_curve,
             progress=None if show is None else lambda done, total: show("searching", done, total),
         )  # fmt: skip
     sheet = emitter.sheet(found, of)

@@ -36,6 +36,10 @@ API = 1
 MOST_DECIMALS = 9
 
 
+CONFIRM = "confirm with your machine's manual before use"
+"""Said of every fact that nobody could verify."""
+
+
 @dataclass(frozen=True, slots=True)
 class Form:
     """One way in which an emitter can write, and how far its facts can be trusted."""

@@ -14,7 +14,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from gcodejerk.emit.sheets import CONFIRM, Change, Sheets, changes, confirmation
+from gcodejerk.emit.base import CONFIRM
+from gcodejerk.emit.sheets import Change, Sheets, changes, confirmation
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.parameters import ALL, PATH, Setting, Tuning

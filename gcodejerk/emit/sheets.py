@@ -11,6 +11,7 @@ Rule: what is not sure (`settings.LIVE`) and not confirmed by the machine file
 from __future__ import annotations
 
 import math
+import textwrap
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import numpy as np
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
+from gcodejerk.emit.base import CONFIRM
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import ControllerParameter, Machine
 from gcodejerk.motion.profiles.profile import Array
@@ -26,7 +28,6 @@ from gcodejerk.parameters import LIVE, MARKS, Scheme, Setting, Tuning
 
 WIDTH = 69
 """Characters of a line at most."""
-CONFIRM = "confirm with your machine's manual before use"
 UNITS = {
     **{"s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6)},
     **{"mm/s^2": ("mm/s^2", 1.0), "m/s^2": ("mm/s^2", 1e3), "mm/min^2": ("mm/s^2", 1 / 3600.0)},
@@ -154,25 +155,14 @@ class Sheets:
             text = line.upper() if self.upper else line
             if behind:  # no parentheses within parentheses
                 text = text.replace("(", "[").replace(")", "]")
-            for part in _wrapped(text, room) if wrap else [text]:
+            parts = textwrap.wrap(
+                text, room, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+            )
+            for part in (parts or [""]) if wrap else [text]:
                 out.append(
                     f"{before}{part}{behind}".rstrip() if not behind else before + part + behind
                 )
         return out
-
-
-def _wrapped(text: str, room: int) -> list[str]:
-    """A line in parts that fit; what goes on is indented."""
-    if len(text) <= room:
-        return [text]
-    out, line = [], ""
-    for word in text.split(" "):
-        if line and len(line) + 1 + len(word) > room:
-            out.append(line)
-            line = "  " + word
-        else:
-            line = f"{line} {word}" if line else word
-    return [*out, line]
 
 
 def changes(tuning: Tuning) -> list[Change]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Controller, Options, WithoutStreams
+from gcodejerk.emit.base import CONFIRM, Controller, Options, WithoutStreams
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 
 WIDTH = 68
 PEAKS = "V, A, J: velocity, acceleration, jerk along the way, mm (deg), s"
-CONFIRM = "confirm with your machine's manual before use"
 UM_PER_MM = 1e3
 MS_PER_S = 1e3
 

@@ -16,7 +16,7 @@ from gcodejerk.machine.sources.draft import Draft, Fact
 from gcodejerk.units import SECONDS_PER_MINUTE
 
 MARLIN, RRF = "Marlin M503", "RepRapFirmware config.g"
-LETTERS = "XYZABC"
+LETTERS = "XYZABCUVW"
 _CODE = re.compile(
     r"^\s*(?:echo:)?\s*(?:Recv:\s*)?(?:echo:)?\s*(M\d+|G2[01])\b([^;\n(]*)", re.I | re.M
 )
