@@ -22,6 +22,7 @@ class Reason(enum.StrEnum):
     DECIMAL_POINT = "number without a decimal point"
     CANNED_CYCLE = "rapid inside a canned cycle"
     FRAME_CHANGE = "coordinate frame changes in the block"
+    NOT_FOLLOWED = "behind a call, jump or loop that is not followed"
     CUTTER_COMPENSATION = "cutter compensation active"
     ROTATION = "rotation, scaling, mirroring or polar active"
     SYSTEM_WRITTEN = "offsets or parameters written by the program"
@@ -76,10 +77,9 @@ EXPLAINED: dict[Reason, Explanation] = {
         "where it always runs, take the `/` out",
     ),
     Reason.SUBPROGRAM: Explanation(
-        "it is not the same rapid on every pass, never runs, or not every pass could be followed; "
-        "or behind a call, a label or a loop nobody has said G40",
+        "it is not the same rapid on every pass, never runs, or not every pass could be followed",
         "post the moves in full, without subprograms, loops and branches; or begin every pass at "
-        "the same place; where a note names the line, state G40 and the other modes behind it",
+        "the same place",
     ),
     Reason.NOT_UNDERSTOOD: Explanation(
         "the control would refuse it, or it holds a code that the dialect's table does not know; "
@@ -103,6 +103,11 @@ EXPLAINED: dict[Reason, Explanation] = {
         "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
         "give G43, G54.. and their kin a block of their own and state `program.offsets`; retract "
         "with a plain G0 instead of G28, G30 and G53",
+    ),
+    Reason.NOT_FOLLOWED: Explanation(
+        "what runs there may have changed every mode, and since then nobody has said G40",
+        "the notes name the line: state G40 and the other modes (G90, G21, the work system) behind "
+        "it",
     ),
     Reason.CUTTER_COMPENSATION: Explanation(
         "G41 or G42 is, or may be, in force: the real path differs from the programmed one",

@@ -113,7 +113,7 @@ def test_who_says_that_nobody_moves_the_axes_knows_where_they_stand():
     ("line", "reason"),
     [
         (b"G999", "block not understood"),
-        (b"G65 P9000", "inside a subprogram, loop or conditional block"),
+        (b"G65 P9000", "behind a call, jump or loop that is not followed"),
         (b"G41 D1", "cutter compensation active"),
         (b"/G41 D1", "cutter compensation active"),
     ],
@@ -121,7 +121,7 @@ def test_who_says_that_nobody_moves_the_axes_knows_where_they_stand():
 def test_the_reason_names_what_made_compensation_unknown(line, reason):
     found, notes = read(line + b"\nG90 G21 G17 G54 G94\nG0 X1.\n", "fanuc")
     assert found == [reason]
-    since = [note for note in notes if "since line 1" in note]
+    since = [note for note in notes if "since this line" in note]
     assert len(since) == (b"G41" not in line)
     assert all(line.decode() in note for note in since)
 
@@ -134,13 +134,13 @@ def test_compensation_that_is_stated_again_is_known_again():
     text += b"/G41 D1\nG0 X7.\n"
     found, notes = read(text, "fanuc")
     assert found[-1] == "cutter compensation active"
-    assert not any("since line" in note for note in notes)
+    assert not any("since this line" in note for note in notes)
 
 
 def test_what_a_block_that_may_be_skipped_makes_unknown_has_its_line():
     found, notes = read(b"F90.\nG0 X1.\n/G999\nG0 X5.\n", "fanuc")
     assert found == [None, "block not understood"]
-    assert any("since line 3" in note and "1 rapid " in note for note in notes)
+    assert any("since this line (/G999): 1 rapid " in note for note in notes)
 
 
 # --- the line of % ---

@@ -276,7 +276,7 @@ class State:
         for name in _FRAME:
             self.lose(name)
 
-    def forget(self, because: Reason = Reason.SUBPROGRAM) -> None:
+    def forget(self, because: Reason = Reason.NOT_FOLLOWED) -> None:
         """Forget everything, for a reason that rapids are left alone with."""
         known = [name for name in _NAMED_LOST if getattr(self, name) is not None]
         self.forget_modes()

@@ -56,7 +56,7 @@ class Phases(Effects):
         """Execute the words of a block, in the fixed order."""
         understood = not codes.unknown
         if codes.unknown or not self._goes_on(codes, step):
-            self.state.forget(Reason.SUBPROGRAM if understood else Reason.NOT_UNDERSTOOD)
+            self.state.forget(Reason.NOT_FOLLOWED if understood else Reason.NOT_UNDERSTOOD)
             step.feed_event = USES_FEED
             return
         self._feed_mode(codes)

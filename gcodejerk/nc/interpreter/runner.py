@@ -195,7 +195,7 @@ class Runner:
             found.append(
                 Finding(
                     number,
-                    f"what is in force is unknown since line {number}: {text}: {rapids} left "
+                    f"what is in force is unknown since this line ({text}): {rapids} left "
                     "alone; state the modes again behind it (G40, G90, G21 and their kin)",
                 )
             )
