@@ -239,3 +239,42 @@ def test_cycle800_without_arguments_turns_the_plane_back():
     turned = "rotation, scaling, mirroring or polar active"
     text = b'CYCLE800(1,"TC",0)\nG0 X1 Y1 Z1\nG0 X5\nCYCLE800()\nG0 X1 Y1 Z1\nG0 X5\n'
     assert read(text, "siemens")[0] == [turned, turned, "start unknown", None]
+
+
+# --- a first reading that takes such a block for nothing is not believed ---
+
+MISTAKEN = [
+    *[("grbl", line) for line in (b"G41 D1", b"G51 X2", b"G64 G91", b"G66 P1", b"T1 M6", b"G7")],
+    *[("siemens", line) for line in (b"SUPA X7", b'CYCLE800(1,"A")', b"DEPTH=4", b"CYCLE800()")],
+    *[("haas", line) for line in (b"M39", b"M51", b"M16")],
+    *[("fanuc-lathe-a", line) for line in (b"G10.9 X0.", b"G123")],
+    *[("fanuc", line) for line in (b"%G91", b"M150", b"G187")],
+]
+
+
+def judged(believed, text, dialect, rapid):
+    """What the second reading of a text says of a rapid that was read in another one."""
+    start = start_of(dialect, decimal_point="calculator", spindle="mill")
+    rapids = read_program(io.BytesIO(believed), dialect=dialect, start=start).rapids
+    assert rapids.reason[rapid] == CERTAIN
+    found = Findings(9)
+    confirmed = confirm(io.BytesIO(text), dialect, start, rapids, [rapid], found)
+    return confirmed, found.violations
+
+
+@pytest.mark.parametrize(("dialect", "line"), MISTAKEN)
+def test_what_may_move_or_change_a_mode_is_not_confirmed_as_nothing(dialect, line):
+    head = b"G0 X1. Z1. F90.\n"
+    believed, text = head + b"\nG0 X5.\nM30\n", head + line + b"\nG0 X5.\nM30\n"
+    assert judged(believed, believed, dialect, 1)[0] == 1
+    assert judged(believed, text, dialect, 1)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("dialect", "block"), [("grbl", b"G64 G0 X5."), ("siemens", b"G0 SUPA X5.")]
+)
+def test_a_rapid_beside_such_a_word_is_refused(dialect, block):
+    believed, text = b"F90\nG0 X5.\nM30\n", b"F90\n" + block + b"\nM30\n"
+    confirmed, violations = judged(believed, text, dialect, 0)
+    assert confirmed == 0
+    assert [v.original_line for v in violations] == [2]
