@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from click import Command, Parameter
 
 from gcodejerk.cli import app
 from gcodejerk.machine import machine_schema
@@ -52,7 +51,7 @@ def commands() -> str:
     return "\n".join(lines)
 
 
-def _walk(group: Command, prefix: str) -> Iterator[tuple[str, Command]]:
+def _walk(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
     for name, command in getattr(group, "commands", {}).items():
         full = f"{prefix}{name}"
         if getattr(command, "commands", None):
@@ -61,7 +60,7 @@ def _walk(group: Command, prefix: str) -> Iterator[tuple[str, Command]]:
             yield full, command
 
 
-def _row(param: Parameter) -> str | None:
+def _row(param: Any) -> str | None:
     """One line of a table of options."""
     text = _cell(getattr(param, "help", None) or "")
     if param.param_type_name == "argument":

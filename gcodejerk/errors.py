@@ -56,10 +56,6 @@ class ProgramError(GcodejerkError):
     """The NC program cannot be read or must not be rewritten."""
 
 
-class ProcessedError(ProgramError):
-    """The program carries our stamp: it was processed before."""
-
-
 class MachineError(GcodejerkError):
     """The machine file is wrong."""
 

@@ -12,6 +12,47 @@ from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
+class RapidFeed:
+    """Feed moves that the user has said to be rapids: some CAM systems write no others."""
+
+    feed: float
+    """Their F, exactly. [program's unit/min]"""
+    clearance: float
+    """Z that both of their ends are at, or above, in program coordinates. [program's unit]"""
+
+    @property
+    def text(self) -> str:
+        """As the settings of an output say it."""
+        return f"rapid-feed {self.feed!r} {self.clearance!r}"
+
+    def covers(self, feed: float, start: float, end: float, unit: float) -> bool:
+        """Whether a straight feed move is one of them.
+
+        Parameters
+        ----------
+        feed : float
+            F in force, in feed per minute. [program's unit/min]
+        start, end : float
+            Z in front of it and behind it; NaN where unknown. [mm]
+        unit : float
+            Millimetres of the program's unit. [mm]
+
+        Examples
+        --------
+        >>> RapidFeed(5000.0, 5.0).covers(5000.0, 15.0, 5.0, 1.0)
+        True
+        >>> RapidFeed(5000.0, 5.0).covers(5000.0, 15.0, float("nan"), 1.0)
+        False
+        """
+        least = self.clearance * unit - _NEAR
+        return feed == self.feed and start >= least and end >= least
+
+
+_NEAR = 1e-6
+"""Sums of increments differ in their last digits. [mm]"""
+
+
+@dataclass(frozen=True, slots=True)
 class Start:
     """What may be assumed when the program starts; by default nothing but the dialect's modes."""
 
@@ -41,6 +82,8 @@ class Start:
     harmless: frozenset[str] = frozenset()
     """Codes, for example ``M150``, of which the owner says that they move nothing and change no
     mode and no frame; one that the dialect's table knows means what it says there."""
+    rapid_feed: RapidFeed | None = None
+    """Feed moves that count as rapids; None, as a rule: none do."""
 
 
 NOTHING_KNOWN = Start()

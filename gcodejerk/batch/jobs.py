@@ -21,6 +21,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from gcodejerk.batch.current import is_current
 from gcodejerk.batch.files import (
     STANDARD,
     is_ours,
@@ -69,6 +70,8 @@ class Job:
     """What belongs to the output, for controllers that write such a file."""
     backup: bool = False
     """The original is kept where it is replaced."""
+    if_changed: bool = False
+    """Leave an output as it is that stands for the program already."""
     name: str | None = None
     """What messages call the program; its own name where None."""
 
@@ -99,6 +102,8 @@ class Done:
     output: str | None = None
     figures: Record = field(default_factory=dict)
     """Summary of the report."""
+    current: bool = False
+    """The output was there, and stands for the program."""
     left_at: tuple[tuple[str, tuple[int, ...], int], ...] = ()
     """Reason, the first lines of rapids that were left alone for it, and how many there are."""
 
@@ -109,6 +114,7 @@ class Done:
             "output": self.output,
             "error": self.error,
             "changed": self.changed,
+            "current": self.current,
             "summary": self.figures or None,
             "notes": list(self.notes),
         }
@@ -197,6 +203,11 @@ def _lost(job: Job, status: int | None) -> Done:
 
 def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
     _refuse_overwriting(job, machine)
+    if job.if_changed and job.mode == "write":
+        others = [name for name in (job.report, job.beside) if name is not None]
+        if is_current(job.input, job.output, others, machine, settings):
+            summary = f"{job.called}: {job.output} is up to date"
+            return Done(job.called, summary=summary, output=job.output, current=True)
     with ExitStack() as stack:
         before = version(job.input)
         source = stack.enter_context(open_input(job.input))

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from gcodejerk.cli.common import JsonOption, MachineOption, ProfileOption, load_machine
+from gcodejerk.cli.rapid_feed import ClearanceOption, RapidFeedOption, counting
 
 
 def filter_program(
@@ -27,6 +28,8 @@ def filter_program(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    rapid_feed: RapidFeedOption = None,
+    rapid_clearance: ClearanceOption = None,
 ) -> None:
     """Rewrite a program on its way into a screen of LinuxCNC, which calls this by its [FILTER]."""
     from gcodejerk.hosts.linuxcnc.filter import filter_program as pass_on
@@ -35,7 +38,7 @@ def filter_program(
 
     if file == "-":
         raise typer.BadParameter("a filter is given a file: it has no standard input")
-    described = load_machine(machine, [file])
+    described = counting(load_machine(machine, [file]), rapid_feed, rapid_clearance)
     settings = Settings(
         controller=controller, profile=profile, dialect=dialect, expand_cycles=expand_cycles
     )

@@ -30,6 +30,7 @@ class Outputs:
     in_place: bool
     report: str | None
     backup: bool = False
+    if_changed: bool = False
     called: str | None = None
     """What messages and reports call the program, where that is not its own name."""
 
@@ -44,6 +45,8 @@ class Outputs:
             raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
         if "-" in files and len(files) > 1:
             raise typer.BadParameter("standard input (-) is one program: give it alone")
+        if self.if_changed and (self.in_place or self.output == "-"):
+            raise typer.BadParameter("--if-changed compares a program with its output: name one")
         if self.backup and not self.in_place:
             raise typer.BadParameter("--backup is of --in-place: elsewhere the original stays")
         if self.in_place and "-" in files:
@@ -90,6 +93,7 @@ class Outputs:
                 mode=mode,
                 in_place=self.in_place,
                 backup=self.backup,
+                if_changed=self.if_changed,
                 strict=strict,
                 beside=output + beside if beside else None,
                 name=self.called,

@@ -21,6 +21,7 @@ from gcodejerk.cli.common import (
     progress,
     say,
 )
+from gcodejerk.cli.rapid_feed import ClearanceOption, RapidFeedOption, counting
 from gcodejerk.errors import GcodejerkError
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ def process(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    rapid_feed: RapidFeedOption = None,
+    rapid_clearance: ClearanceOption = None,
     report: Annotated[
         str | None,
         typer.Option(
@@ -93,6 +96,12 @@ def process(
     revert: Annotated[
         bool, typer.Option("--revert", help="put the originals that --backup kept back")
     ] = False,
+    if_changed: Annotated[
+        bool,
+        typer.Option(
+            "--if-changed", help="skip programs whose output is newer and of these options"
+        ),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="print a line of JSON for each program")
     ] = False,
@@ -110,7 +119,7 @@ def process(
 
     # A slicer gives the program a name for the time being, and says the user's.
     called = output_name() if in_place and len(files) == 1 else None
-    outputs = Outputs(output, output_dir, in_place, report, backup, called)
+    outputs = Outputs(output, output_dir, in_place, report, backup, if_changed, called)
     outputs.check(files)
     if revert:
         _revert(files)
@@ -128,7 +137,7 @@ def process(
         force=force,
         expand_cycles=expand_cycles,
     )
-    described = load_machine(machine, files)
+    described = counting(load_machine(machine, files), rapid_feed, rapid_clearance)
     mode = "check" if check else "diff" if diff else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
     aside = diff or any(job.output == "-" for job in batch)
@@ -172,7 +181,7 @@ class _Tally:
         self.mode, self.quiet, self.many = mode, quiet, many
         self.as_json, self.verbose = as_json, verbose
         self.out = sys.stderr if aside else sys.stdout
-        self.programs = self.planned = self.left = self.failed = self.set = 0
+        self.programs = self.planned = self.left = self.failed = self.set = self.current = 0
         self.changed = False
 
     def fail(self, error: str) -> None:
@@ -192,6 +201,7 @@ class _Tally:
         self.planned += done.planned
         self.left += done.left
         self.set += bool(done.set_at)
+        self.current += done.current
         self.changed |= done.changed
         if done.diff:
             sys.stdout.flush()
@@ -217,9 +227,10 @@ class _Tally:
         if self.quiet:
             return
         would = "" if self.mode == "write" else "would be "
+        current = f"{self.current} up to date, " if self.current else ""
         control = f"control {would}set in {self.set}, " if self.set else ""
         print(
-            f"{self.programs} programs: {control}{self.planned} rapids {would}rewritten, "
+            f"{self.programs} programs: {current}{control}{self.planned} rapids {would}rewritten, "
             f"{self.left} left alone; {self.failed or 'none'} failed",
             file=self.out,
         )
@@ -233,6 +244,8 @@ def inspect(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    rapid_feed: RapidFeedOption = None,
+    rapid_clearance: ClearanceOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the report as JSON")] = False,
 ) -> None:
     """Show all rapids of a program: planned, or left alone and why."""
@@ -241,7 +254,7 @@ def inspect(
     from gcodejerk.report.tables import rapids_table, summary_line, whole_line
     from gcodejerk.rewrite.pipeline import Settings, process_file
 
-    described = load_machine(machine, [file])
+    described = counting(load_machine(machine, [file]), rapid_feed, rapid_clearance)
     settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
     with open_input(file) as source, progress(as_json) as show:
         result = process_file(source, None, described, settings, file, show)
@@ -272,6 +285,8 @@ def verify(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="the original's cycles are written out")
     ] = False,
+    rapid_feed: RapidFeedOption = None,
+    rapid_clearance: ClearanceOption = None,
     report: Annotated[
         str | None,
         typer.Option(metavar="FILE.json", help="hold streams for LinuxCNC to its profiles, too"),
@@ -292,7 +307,7 @@ def verify(
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
-    described = load_machine(machine, [original])
+    described = counting(load_machine(machine, [original]), rapid_feed, rapid_clearance)
     if report is not None and expand_cycles:
         raise typer.BadParameter("--report: its lines are the original's, before its cycles")
     no_cycles = "--expand-cycles: a table of streams has no cycles written out"

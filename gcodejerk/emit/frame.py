@@ -44,11 +44,21 @@ class Frame:
         """Addresses of increments, with their axes."""
         return self.dialect.increments
 
+    @property
+    def fed(self) -> bool:
+        """Whether the block is a G1 that counts as a rapid."""
+        return bool(self.rapids.fed[self.move])
+
+    @property
+    def motion_words(self) -> list[Word]:
+        """The G1 of such a block: without axis words it is a motion of no length."""
+        return [w for w in self.block.words if self.fed and w.letter == "G" and w.value == 1.0]
+
     def head(self, comments: bool) -> list[bytes]:
         """A comment that names the block, and the block without its axis words."""
         out = [self._comment()] if comments else []
         rest, at = [], 0
-        moved = [*self.axis_words, *self.behind, *self.exact]
+        moved = [*self.axis_words, *self.behind, *self.exact, *self.motion_words]
         for word in sorted(moved, key=lambda w: w.begin):
             rest.append(self.text[at : word.begin])
             at = word.end

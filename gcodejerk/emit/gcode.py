@@ -13,7 +13,8 @@ A replaced block becomes, each line only where it is needed::
     G94 G64                      modes of the stream that are not in force, or not stated
     G1 X0.0012 Y0.0006 F38.4     the points
     G1 G61 X10. Y5. F1.2         the last with the block's own words, and the exact stop
-    G0 F600.                     the modal values that the program relies on
+    G0 F600.                     the modal values that the program relies on; of a G1 that
+                                 counts as a rapid (`Rapids.fed`) F alone, for G1 is in force
     M0                           what the control runs after the motion
 
 Rule: the last point repeats the block's own words, so the end is exactly the programmed one,
@@ -103,7 +104,7 @@ class GcodeController(Controller):
                 *frame.modes(),
                 points[row].text,
                 last,
-                b" ".join([b"G0", *frame.restored()]),
+                b" ".join([*([] if frame.fed else [b"G0"]), *frame.restored()]),
                 *frame.after(),
             ]
             out.append(line_ends[row].join(line for line in lines if line) + last_ends[row])

@@ -108,7 +108,7 @@ class LinuxcncController(LinuxcncSettings, Controller):
                 *points.lead(filled=bool(rapids.queued[move]) and not guard),
                 points.text(ends[row]),
                 frame.last_point(points.reached(), b"G0"),
-                *([b" ".join(words)] if (words := frame.restored()) else []),
+                *([b" ".join(words)] if (words := restored(frame)) else []),
             ]
             if guard:
                 lines = guarded(int(rapids.line[move]), lines, frame.own_motion())
@@ -146,6 +146,11 @@ class LinuxcncController(LinuxcncSettings, Controller):
                 "program.startup"
             )
         return notes
+
+
+def restored(frame: Frame) -> list[bytes]:
+    """What restores the modes behind the G0 to the end; a G1 of no length moves nothing."""
+    return [*([b"G1"] if frame.fed else []), *frame.restored()]
 
 
 def _too_slow(plans: Plans) -> list[str]:

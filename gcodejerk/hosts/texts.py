@@ -39,7 +39,8 @@ TEXTS = {
         (
             "copy your post, put this at the end of the copy, choose the copy when you post",
             "proof that it ran is the comment `gcodejerk stamp` near the top of the program",
-            "a Personal licence writes rapids as feed moves, which stay as they are: docs/cam.md",
+            "a Personal licence writes rapids as feed moves, which stay as they are unless you say "
+            "otherwise: docs/cam.md",
         ),
     ),
     "mastercam": Text("drop.bat", "gcodejerk.bat", "@rem", _BATCH),

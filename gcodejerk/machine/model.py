@@ -158,6 +158,7 @@ class Machine(Description):
             resume=self.program.resume_after_stop,
             harmless=frozenset(self.program.harmless),
             spindle=self.spindle,
+            rapid_feed=self.rapid_feed,
             diameter=any(axis.diameter for axis in self.axes),
         )
 

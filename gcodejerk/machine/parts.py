@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gcodejerk.errors import MachineError
+from gcodejerk.start import RapidFeed
 
 OSCILLATORS = 4
 """That a line of a spectrum stands for."""
@@ -313,6 +314,8 @@ class Description:
     controller_parameters: tuple[ControllerParameter, ...] = ()
     spindle: str | None = None
     """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
+    rapid_feed: RapidFeed | None = None
+    """Feed moves that count as rapids in one run; no machine file says so."""
     inch: bool = field(default=False, compare=False)
     """The file's lengths are inches."""
     source: str = field(default="<machine>", compare=False)

@@ -156,7 +156,8 @@ class Reader:
     def can_run(self) -> bool:
         """Whether the lines that follow may be taken as a run."""
         alone = self._plain and not self.flow.inside and not self._structure
-        return self.dialect.quick and self.started and alone and can_run(self.state)
+        quick = self.dialect.quick and self.runner.executor.rapid_feed is None
+        return quick and self.started and alone and can_run(self.state)
 
     def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
         """Take plain lines of a chunk as arrays; the first that was not taken."""

@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from gcodejerk.planning.plans import Plans
 
-LOOKED_AT = 4 << 20
+LOOKED_AT = 2 << 20
 """Bytes of a program that are looked at: a second or two."""
 LEAST = 2
 """Fewer moves make no habit."""
@@ -222,8 +222,9 @@ def feed_move_notes(source: BinaryIO, machine: str, controller: str, rapids: int
         ]
     return [
         f"{counted}; {found.count} moves{of} at F{found.feed:g} without cutting look like "
-        f"rapids (none of them in X or Y below Z{found.above:g}): some licences of CAM systems "
-        "write rapids as feed moves, and these stay as they are (docs/cam.md)"
+        f"rapids (none of them in X or Y below Z{found.above:g}), as some licences of CAM systems "
+        f"write them; --rapid-feed {found.feed:g} --rapid-clearance {found.above:g} treats them as "
+        "rapids, see docs/cam.md"
     ]
 
 

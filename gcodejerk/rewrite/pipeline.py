@@ -21,7 +21,7 @@ from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
-from gcodejerk.errors import EmitError, Place, ProcessedError, ProgramError, VerifyError
+from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, find_dialect, read_program
@@ -45,10 +45,11 @@ from gcodejerk.rewrite.expanded import (
 from gcodejerk.rewrite.feed_moves import instead_notes
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
+from gcodejerk.rewrite.rapid_feed import check_dialect, check_rapid_feed
 from gcodejerk.rewrite.result import Result, reported_profiles
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.set_control import set_control
-from gcodejerk.rewrite.stamp import stamp_text
+from gcodejerk.rewrite.stamp import ProcessedError, stamp_text
 from gcodejerk.verification import Verification, require, verify_files
 
 Progress = Callable[[str, int, int], None]
@@ -172,6 +173,7 @@ def process_file(
         Without `output` and `beside`.
     """
     emitter = load_controller(settings.controller or machine.controller)
+    check_rapid_feed(machine, emitter, form=settings.form, cycles=settings.expand_cycles)
     if settings.form == PARAMETERS:
         return _set(source, target, machine, settings, name, emitter, progress or silent)
     emitter = emitter.in_form(settings.form)
@@ -218,6 +220,7 @@ def _process(
     """Process a program; the source is that with its cycles written out, if they are."""
     lines = None if expansion is None else expansion.map
     program = _read(source, machine, settings, name, emitter, report, lines)
+    check_dialect(machine, program)
     plans = _plan(source, program, machine, settings, emitter, report)
     peaks = np.zeros((3, len(plans)))
     form = emitter.row_format(machine) if emitter.play is Play.CUBIC else None
@@ -363,6 +366,7 @@ def _chosen(machine: Machine, settings: Settings, name: str, form: str) -> list[
     """The user's choices that shape the output, for the stamp."""
     chosen = [name, form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
+    chosen += [machine.rapid_feed.text] if machine.rapid_feed is not None else []
     return chosen + ([f"dialect {settings.dialect}"] if settings.dialect is not None else [])
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import BinaryIO
 
 from gcodejerk._version import __version__
+from gcodejerk.errors import ProgramError
 from gcodejerk.machine import Machine
 
 STAMP_LENGTH = 67
@@ -23,6 +24,11 @@ SUM_UNKNOWN = SUM_MARK + b"0" * SUM_DIGITS
 """The sum while it is computed: BLAKE2b, 8 bytes, over the output with these digits in it."""
 SUM_WITHIN = 1 << 17
 """A stamp that stands farther from the top than this has no sum. [bytes]"""
+
+
+class ProcessedError(ProgramError):
+    """The program carries our stamp: it was processed before."""
+
 
 _SIGNED = re.compile(rb"gcodejerk stamp [ -~]{1,40}?" + SUM_MARK + rb"([0-9a-f]{16})")
 

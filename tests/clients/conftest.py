@@ -6,4 +6,4 @@ from pathlib import Path
 # For `interpreter`, which several tests share.
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-collect_ignore = ["linuxcnc", "oracle.py"]
+collect_ignore = ["linuxcnc", "freecad", "oracle.py"]

@@ -1,6 +1,8 @@
 """Real PrusaSlicer slices a cube and calls us by the line that `install prusaslicer` prints."""
 
+import json
 import re
+import shlex
 import shutil
 import subprocess
 
@@ -66,8 +68,11 @@ def slice_it(folder, line, start="", where="--post-process"):
 def test_a_sliced_program_stays_as_it_is_and_the_slicer_goes_on(folder):
     line = paste_line(own_command(), str(folder / "Drucker.yaml"))
     _, _, plain = slice_it(folder, "")
-    status, said, program = slice_it(folder, line + " --report " + "reports/")
+    reports = folder / "reports"
+    status, said, program = slice_it(folder, f"{line} --report {shlex.quote(f'{reports}/')}")
     assert status == 0, said
+    report = json.loads((reports / "out put.gcode.json").read_text())
+    assert any("as slicers write them" in note for note in report["notes"])
     # Its travel is G1; the settings at the end name the script.
     assert re.sub(r"; post_process = [^\n]*", "", program) == re.sub(
         r"; post_process = [^\n]*", "", plain

@@ -265,7 +265,7 @@ def test_the_commands_write_check_report_and_verify(tmp_path):
     run = CliRunner().invoke
     options = [str(part), "--machine", machine, "--as", "parameters"]
     checked = run(app, ["process", *options, "--check"])
-    assert checked.exit_code == 1
+    assert checked.exit_code == 3
     assert part.read_bytes() == program
     assert b"G231=" in run(app, ["process", *options, "--diff"]).stdout_bytes
     done = run(app, ["process", *options, "--report", str(report)])

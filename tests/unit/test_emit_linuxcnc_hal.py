@@ -182,7 +182,7 @@ def test_standard_output_cannot_hold_two_files(folder, capsys, monkeypatch):
     assert (code, out) == (2, "")
     assert "writes two files" in err
     code, _, _ = run(capsys, monkeypatch, "process", part, "-m", machine, "--check")
-    assert code == 1
+    assert code == 3
     assert sorted(p.name for p in folder.iterdir()) == ["m.yaml", "part.ngc"]
 
 

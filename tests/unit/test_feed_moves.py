@@ -5,7 +5,8 @@ import io
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.rewrite.feed_moves import LOOKED_AT, Alike, Travel, feed_move_notes, look
+from gcodejerk.rewrite import feed_moves
+from gcodejerk.rewrite.feed_moves import Alike, Travel, feed_move_notes, look
 from gcodejerk.rewrite.pipeline import process
 
 PERSONAL = b"""%
@@ -92,10 +93,11 @@ def test_travel_of_a_slicer_is_recognised():
     assert "--controller klipper" in feed_move_notes(io.BytesIO(PRINTED), "p", "linuxcnc", 0)[0]
 
 
-def test_a_long_program_is_looked_at_in_part_and_the_note_says_so():
-    program = PRINTED + b"G1 X0 Y0\nG1 X3 Y4\n" * (LOOKED_AT // 18)
+def test_a_long_program_is_looked_at_in_part_and_the_note_says_so(monkeypatch):
+    monkeypatch.setattr(feed_moves, "LOOKED_AT", 1 << 20)
+    program = PRINTED + b"; " + b"-" * (1 << 20) + b"\nG1 X0 Y0\n"
     (note,) = feed_move_notes(io.BytesIO(program), "p", "klipper", 1)
-    assert "of the first 4 MB are G1" in note
+    assert "of the first 1 MB are G1" in note
 
 
 @pytest.mark.parametrize(

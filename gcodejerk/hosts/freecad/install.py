@@ -136,11 +136,8 @@ def _user_folders() -> list[Path]:
         library = home / "Library"
         return [library / "Application Support" / "FreeCAD", library / "Preferences" / "FreeCAD"]
     data = Path(os.environ.get("XDG_DATA_HOME") or home / ".local" / "share")
-    sandboxes = [home / ".var" / "app" / name / "data" for name in _FLATPAKS]
-    return [data / "FreeCAD", *(box / "FreeCAD" for box in sandboxes), home / ".FreeCAD"]
-
-
-_FLATPAKS = ("org.freecad.FreeCAD", "org.freecadweb.FreeCAD")
+    # A FreeCAD in a sandbox (flatpak, snap) starts no program outside it: its folders are left out.
+    return [data / "FreeCAD", home / ".FreeCAD"]
 
 
 def _settings() -> list[Path]:

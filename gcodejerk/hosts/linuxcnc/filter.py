@@ -18,12 +18,12 @@ from typing import BinaryIO, TextIO
 
 from gcodejerk.batch.files import STANDARD, new_file, open_input
 from gcodejerk.emit import load_controller
-from gcodejerk.errors import EmitError, Place, ProcessedError
+from gcodejerk.errors import EmitError, Place
 from gcodejerk.machine import Machine
 from gcodejerk.report.records import summary_of
 from gcodejerk.report.tables import summary_line
 from gcodejerk.rewrite.pipeline import Settings, process_file
-from gcodejerk.rewrite.stamp import is_unchanged
+from gcodejerk.rewrite.stamp import ProcessedError, is_unchanged
 from gcodejerk.verification.bytes.stamp import read_stamp
 
 BAR = "AXIS_PROGRESS_BAR"

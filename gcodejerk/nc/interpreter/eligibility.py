@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import COMPENSATION, LINEAR, Dialect, Effect
-from gcodejerk.nc.dialects.gcodes import G40
+from gcodejerk.nc.dialects.gcodes import G1, G40
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import NO_FEED
@@ -74,6 +74,8 @@ class Step:
     """Bit k set: a word for AXES[k]."""
     cycle: bool = False
     """The rapid is one of a canned cycle."""
+    fed: bool = False
+    """The rapid is a G1 that the user has said to be one."""
     feed_event: int = NO_FEED
     fault: bool = False
     unknown: str = ""
@@ -209,19 +211,19 @@ def _check_known_move(
         return Reason.PATH_UNKNOWN
     if step.way_unknown:
         return Reason.ROTARY_WAY
-    if _other_words(codes, dialect):
+    if _other_words(codes, dialect, fed=step.fed):
         return Reason.OTHER_WORDS
     if mixed and not dialect.feed_of_mixed:
         return Reason.MIXED_AXES
     return None
 
 
-def _other_words(codes: Codes, dialect: Dialect) -> bool:
+def _other_words(codes: Codes, dialect: Dialect, *, fed: bool) -> bool:
     """Whether words stand in the block that act neither before nor after its motion for certain."""
     # Where the table does not say what a letter is for, nobody knows what it does to a rapid.
     others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
     return (
-        any(code not in dialect.harmless for code in codes.g.values())
+        any(code not in dialect.harmless and not (fed and code == G1) for code in codes.g.values())
         or not dialect.before_m | dialect.after_m >= set(codes.m)
         or bool(others or codes.names or codes.functions)
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
-from gcodejerk.nc.dialects.gcodes import G40, G64
+from gcodejerk.nc.dialects.gcodes import G1, G40, G64
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes
@@ -49,6 +49,8 @@ class Phases(Effects):
         super().__init__(dialect, state, start)
         self._stays = start.resume == "same" or (start.resume is None and dialect.same_after_stop)
         """Behind M0 and M1 the axes stand where they stood."""
+        self.rapid_feed = start.rapid_feed
+        """Feed moves that count as rapids."""
         self._contour: float | None = None
         """N of the block that ends a contour, which a cycle runs by itself."""
 
@@ -307,12 +309,22 @@ class Phases(Effects):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         else:
             go_straight(state, codes, step)
+            step.fed = motion == G1 and self._counts_as_rapid(step)
+            step.rapid = step.rapid or step.fed
         if any(self._named(name) == "machine" for name in codes.names):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))
         if any(on is not False for on in state.transforms.values()):
             state.forget_positions()
+
+    def _counts_as_rapid(self, step: Step) -> bool:
+        """Whether a straight feed move is one that the user has said to be a rapid."""
+        state, wanted = self.state, self.rapid_feed
+        if wanted is None or state.unit is None or state.feed_mode != 94:
+            return False
+        z = AXES.index("Z")
+        return wanted.covers(state.feed, step.start[z], state.position[z], state.unit)
 
     def _select_motion(self, codes: Codes) -> None:
         """Put the motion code of the block in force, if it states one."""

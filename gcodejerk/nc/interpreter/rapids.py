@@ -75,6 +75,8 @@ class Rapids:
     program would not lead it there."""
     beam: NDArray[np.bool_]
     """What M3 turns on is, or may be, on."""
+    fed: NDArray[np.bool_]
+    """A G1 that the user has said to be a rapid; G1 and its F are in force behind it."""
 
     def __len__(self) -> int:
         return len(self.line)
@@ -90,7 +92,7 @@ _TYPES: dict[str, tuple[type, int]] = {
         name: (np.bool_, 0)
         for name in (
             *("inch", "incremental", "diameter", "distance_stated"),
-            *("feed_mode_stated", "feed_needed", "feed_whole", "beam", "lone", "queued"),
+            *("feed_mode_stated", "feed_needed", "feed_whole", "beam", "lone", "queued", "fed"),
         )
     },
 }

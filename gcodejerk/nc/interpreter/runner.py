@@ -145,7 +145,7 @@ class Runner:
         if uncertain and reason not in (Reason.AFTER_END, Reason.BLOCK_DELETE):
             reason = Reason.SUBPROGRAM
         speed = NAN
-        if self.dialect.feed_on_rapids:
+        if self.dialect.feed_on_rapids or step.fed:
             speed = state.feed * (state.unit or NAN) / SECONDS_PER_MINUTE
             if reason is None and not speed > 0.0:
                 reason = Reason.FEED_UNKNOWN
@@ -156,7 +156,7 @@ class Runner:
         row.begin, row.end = line.begin, line.begin + len(line.text)
         row.start, row.target = step.start, step.end
         row.turned, row.words = step.turned, step.words
-        row.beam = step.beam
+        row.beam, row.fed = step.beam, step.fed
         row.feed, row.speed = state.feed, speed
         if visit:
             self.log.visit(line.number, reason, row)

@@ -24,7 +24,7 @@ NEAR = 1e-9
 """Sums of increments differ in their last digits from pass to pass. [mm, deg]"""
 _ALIKE = (
     *("reason", "words", "inch", "incremental", "diameter", "feed_mode"),
-    *("path", "path_p", "path_q", "speed"),
+    *("path", "path_p", "path_q", "speed", "fed"),
 )
 """What a stream relies on besides its start and end."""
 
@@ -49,6 +49,7 @@ class ModeColumns:
     speed: float = NAN
     turned: int = 0
     queued: bool = False
+    fed: bool = False
 
     @classmethod
     def of(cls, state: State) -> Self:

@@ -11,6 +11,7 @@ import re
 from decimal import Decimal
 
 from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.gcodes import G1
 from gcodejerk.verification.bytes.form import Stream, StreamReader, run_of
 from gcodejerk.verification.bytes.modes import read_words
 from gcodejerk.verification.findings import Kind
@@ -120,7 +121,8 @@ class AlignedReader(StreamReader):
         self._compare(type(self.modes).after(self.rapids, self.i))
         if wanted:
             self._same_scale(line)
-            problem = self.allowed.tail_problem([("G", Decimal(0)), *(words or [])])
+            before_it: Words = [] if G1 in self.allowed.tail else [("G", Decimal(0))]
+            problem = self.allowed.tail_problem([*before_it, *(words or [])])
             if problem and len(self.found.violations) == before:
                 self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
             self.last(more=bool(self.allowed.behind))

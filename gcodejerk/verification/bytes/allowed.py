@@ -18,7 +18,7 @@ from decimal import Decimal
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Block, Dialect, Rapids
-from gcodejerk.nc.dialects.gcodes import G90
+from gcodejerk.nc.dialects.gcodes import G0, G1, G90
 
 FINER = 3
 """Decimals more than the resolution's, where the control computes in doubles."""
@@ -79,7 +79,9 @@ class Allowed:
             standstill=not (follows or exact),
             setup=_setup_codes(rapids, i, dialect, exact=exact),
             ending=_ending_code(rapids, i, block, dialect, exact=exact),
-            tail=frozenset({0} | ({code} if mode != 94 and code is not None else set())),
+            tail=frozenset(
+                {_motion(rapids, i)} | ({code} if mode != 94 and code is not None else set())
+            ),
             feed=mode != 93 and not math.isnan(float(rapids.feed[i])),
             behind=tuple(("M", float(w.value)) for w in m_words if w.value in dialect.after_m),
             unknown_m=tuple(
@@ -111,6 +113,11 @@ class Allowed:
         if others != (["F"] if self.feed else []):
             return "F stands behind the points where it is known, and nothing else does"
         return None
+
+
+def _motion(rapids: Rapids, i: int) -> int:
+    """G code of the motion that is in force behind a block."""
+    return G1 if rapids.fed[i] else G0
 
 
 def _setup_codes(rapids: Rapids, i: int, dialect: Dialect, *, exact: bool) -> frozenset[int]:

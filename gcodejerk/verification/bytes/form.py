@@ -35,6 +35,7 @@ _COMMENT = re.compile(rb"(?:\(gcodejerk: ([ -'*-~]*)\)|; gcodejerk: ([ -'*-~]*))
 # Zero is zero with a decimal point and without.
 _WHOLE = re.compile(rb"[A-FH-Z][ \t]*[-+]?0*[1-9][0-9]*(?![0-9.])")
 _EXACT = Context(prec=200)
+_G1 = [("G", Decimal(1))]
 
 
 @dataclass(slots=True)
@@ -79,7 +80,9 @@ class Stream:
         return sums
 
 
-def head_of(block: Block, text: bytes, dialect: Dialect) -> tuple[bytes, bool]:
+def head_of(
+    block: Block, text: bytes, dialect: Dialect, *, fed: bool = False
+) -> tuple[bytes, bool]:
     """Take out of a block what stands elsewhere; what is left, and whether it says anything."""
     axes = AXES + "".join(dialect.increments)
     exact = None if dialect.exact_stop is None else dialect.exact_stop / 10
@@ -89,6 +92,7 @@ def head_of(block: Block, text: bytes, dialect: Dialect) -> tuple[bytes, bool]:
         if w.letter in axes
         or (w.letter == "M" and w.value in dialect.after_m)
         or (w.letter == "G" and w.value == exact)
+        or (w.letter == "G" and w.value == 1.0 and fed)
     ]
     kept, at = [], 0
     for word in sorted(out, key=lambda w: w.begin):
@@ -219,7 +223,8 @@ class StreamReader:
         self.next()
 
     def _head(self) -> bool:
-        head, needed = head_of(self.block, self.text, self.dialect)
+        fed = bool(self.rapids.fed[self.i])
+        head, needed = head_of(self.block, self.text, self.dialect, fed=fed)
         line = self.peek()
         if line in (head, head.rstrip(b" \t")) and line.strip():
             self.next()
@@ -373,9 +378,11 @@ class StreamReader:
             self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
             return False
         before = len(self.found.violations)
-        self._compare(Modes.after(self.rapids, self.i))
+        wanted = Modes.after(self.rapids, self.i)
+        self._compare(wanted)
         self._same_scale(line)
-        problem = self.allowed.tail_problem(words or [])
+        # Points are G1: where that stays in force, nothing restores it.
+        problem = self.allowed.tail_problem(_G1[: wanted.motion] + (words or []))
         if problem and len(self.found.violations) == before:
             self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
         if number := too_long_a_number(line, b""):
@@ -407,8 +414,9 @@ class StreamReader:
     def _compare(self, wanted: Modes) -> None:
         """Compare what is in force after the stream with what was after the block."""
         modes = self.modes
-        if modes.motion != 0:
-            self.complain(Kind.MOTION, "G1 stays in force, the original has G0 here")
+        if modes.motion != wanted.motion:
+            wrong = f"G{modes.motion} stays in force, the original has G{wanted.motion} here"
+            self.complain(Kind.MOTION, wrong)
         if modes.distance != wanted.distance:
             self.complain(
                 Kind.DISTANCE,

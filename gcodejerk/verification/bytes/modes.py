@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from gcodejerk.nc import Dialect, Rapids
-from gcodejerk.nc.dialects.gcodes import G64, G90, G91
+from gcodejerk.nc.dialects.gcodes import G0, G1, G64, G90, G91
 
 # No axis needs more digits; numbers without bounds would be a way to stall the reading.
 _NUMBER = rb"[-+]?(?:[0-9]{1,9}(?:\.[0-9]{0,250})?|\.[0-9]{1,250})(?![0-9.])"
@@ -43,7 +43,7 @@ class Modes:
         """List what the original has in force after the block of rapid i."""
         feed = float(rapids.feed[i])
         return cls(
-            0,
+            1 if rapids.fed[i] else 0,
             91 if rapids.incremental[i] else 90,
             int(rapids.feed_mode[i]),
             None if math.isnan(feed) else Decimal(repr(feed)),
@@ -72,8 +72,8 @@ class Modes:
     def _set(self, codes: set[int], values: dict[str, Decimal], dialect: Dialect) -> None:
         """Change what the words say, the feed mode before the feed."""
         for code in codes:
-            if code == 0:
-                self.motion = 0
+            if code in (G0, G1):
+                self.motion = code // 10
             elif code in dialect.feed_modes:
                 mode = dialect.feed_modes[code]
                 if mode != self.feed_mode:
@@ -95,7 +95,7 @@ def _out_of_place(codes: set[int], values: dict[str, Decimal], dialect: Dialect)
     groups = [dialect.groups.get(code) for code in codes]
     if len(set(groups)) < len(groups):
         return "two codes of one modal group"
-    known = {0, *dialect.feed_modes, *dialect.paths}
+    known = {G0, G1, *dialect.feed_modes, *dialect.paths}
     known |= {code for code in (G90, G91) if dialect.groups.get(code) == "distance"}
     if not codes <= known:
         return f"G{min(codes - known) / 10:g} has no place here"

@@ -54,9 +54,11 @@ def choices_hash(
     expand_cycles: bool,
     dialect: str | None,
     form: str = FORM,
+    rapid_feed: str = "",
 ) -> str:
     """Eight hex digits of the hash of a machine file's settings and a user's choices."""
     chosen = [controller, form, profile, *([EXPANDED] if expand_cycles else [])]
+    chosen += [rapid_feed] if rapid_feed else []
     chosen += [] if dialect is None else [f"dialect {dialect}"]
     text = " ".join((settings_hash, *chosen)).encode()
     return hashlib.blake2b(text, digest_size=4).hexdigest()
@@ -89,15 +91,16 @@ def read_stamp(processed: BinaryIO, machine: Machine) -> Stamp | None:
     if match is None:
         return None
     found = match[1].decode()
+    fed = "" if machine.rapid_feed is None else machine.rapid_feed.text
     names = dict.fromkeys((machine.controller, *_controllers()))
     profiles = dict.fromkeys((machine.design.profile, *PROFILES))
-    chosen = _choices(machine.settings_hash, tuple(names), tuple(profiles)).get(found)
+    chosen = _choices(machine.settings_hash, tuple(names), tuple(profiles), fed).get(found)
     return Stamp(found, True, *chosen) if chosen else Stamp(found)
 
 
 @lru_cache(maxsize=16)
 def _choices(
-    settings_hash: str, names: tuple[str, ...], profiles: tuple[str, ...]
+    settings_hash: str, names: tuple[str, ...], profiles: tuple[str, ...], rapid_feed: str
 ) -> dict[str, tuple[str, str, str | None, bool]]:
     """Controller, profile, dialect and expansion by their hash: all that a user can choose."""
     out: dict[str, tuple[str, str, str | None, bool]] = {}
@@ -105,6 +108,6 @@ def _choices(
         (None, *DIALECTS, "auto"), (False, True), names, profiles
     ):
         for form in (*FORMS.get(name, (FORM,)), PARAMETERS):
-            found = choices_hash(settings_hash, name, profile, expand, dialect, form)
+            found = choices_hash(settings_hash, name, profile, expand, dialect, form, rapid_feed)
             out.setdefault(found, (name, profile, dialect, expand))
     return out

@@ -18,14 +18,12 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
 from gcodejerk.units import MM_PER_INCH
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.second_reading.known import Facts
+from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
 from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
-from gcodejerk.verification.second_reading.tracking import Observation, Tracker
+from gcodejerk.verification.second_reading.tracking import Tracker
 
 MARK = b"\xef\xbb\xbf"
 """Of UTF-8, in front of the first line."""
-NEAR = 1e-6
-"""Two sums of the same numbers may differ by this much. [mm] or [deg]"""
 
 
 def confirm(
@@ -202,6 +200,7 @@ def _behaves_like_a_laser(original: BinaryIO, dialect: Dialect, start: Start) ->
 
 def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
     """A tracker in the state that programs start in."""
+    fed = start.rapid_feed
     tracker = Tracker(
         dialect,
         Facts(
@@ -213,6 +212,7 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
             start.wraps,
             start.resume,
             start.spindle,
+            None if fed is None else (fed.feed, fed.clearance),
         ),
     )
     codes = text.read(start.startup.encode("latin-1", "replace"), first=False)
@@ -268,6 +268,7 @@ def _told(rapids: Rapids, i: int) -> dict[str, Any]:
         "F without a point": bool(rapids.feed_whole[i]) if feed == feed else None,
         "path": int(rapids.path[i]) or None,
         "speed": float(rapids.speed[i]),
+        "motion": 1 if rapids.fed[i] else 0,
     }
 
 

@@ -48,6 +48,28 @@ class Facts:
     wraps: Mapping[str, str] = field(default_factory=dict)
     resume: str | None = None
     spindle: str | None = None
+    rapid_feed: tuple[float, float] | None = None
+    """F and least Z of feed moves that count as rapids. [program's units]"""
+
+
+NEAR = 1e-6
+"""Two sums of the same numbers may differ by this much. [mm] or [deg]"""
+
+
+@dataclass(slots=True)
+class Observation:
+    """A line as the second reading sees it; None and NaN where it does not know."""
+
+    against: str | None = None
+    """Why the line is certainly no rapid that may be rewritten."""
+    sure: bool = False
+    """It is a rapid, by itself and in a known frame."""
+    start: list[float] = field(default_factory=list)
+    end: list[float] = field(default_factory=list)
+    axes: int = 0
+    """Bit k: a word for AXES[k]."""
+    modes: dict[str, Any] = field(default_factory=dict)
+    """In force behind it."""
 
 
 class Known:

@@ -9,16 +9,16 @@ might have changed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, Effect
-from gcodejerk.nc.dialects.gcodes import G40, G43, G49, G80, G90, G91
+from gcodejerk.nc.dialects.gcodes import G1, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.second_reading.coding import QUIET
 from gcodejerk.verification.second_reading.drilling import Drilling
+from gcodejerk.verification.second_reading.known import NEAR, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line, Run
 from gcodejerk.verification.second_reading.sorting import Sorted
 
@@ -36,22 +36,6 @@ _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
 
 
-@dataclass(slots=True)
-class Observation:
-    """A line as the second reading sees it; None and NaN where it does not know."""
-
-    against: str | None = None
-    """Why the line is certainly no rapid that may be rewritten."""
-    sure: bool = False
-    """It is a rapid, by itself and in a known frame."""
-    start: list[float] = field(default_factory=list)
-    end: list[float] = field(default_factory=list)
-    axes: int = 0
-    """Bit k: a word for AXES[k]."""
-    modes: dict[str, Any] = field(default_factory=dict)
-    """In force behind it."""
-
-
 class Tracker(Drilling):
     """Follows lines."""
 
@@ -63,7 +47,8 @@ class Tracker(Drilling):
     @property
     def _plain(self) -> bool:
         return (
-            self.g.get("distance") == G90
+            self.facts.rapid_feed is None
+            and self.g.get("distance") == G90
             and self.cycle is None
             and not self.ended
             and self.contour is None
@@ -308,6 +293,7 @@ class Tracker(Drilling):
             "plane": self.g.get("plane"),
             "retract": self.g.get("retract"),
             "path": self.path,
+            "motion": None if (motion := self.g.get("motion")) is None else motion // 10,
             "P": self.p,
             "Q": self.q,
         }
@@ -347,8 +333,7 @@ class Tracker(Drilling):
         if motion is None or motion == G80:
             self.lose()
             return
-        if motion != self.dialect.rapid:
-            seen.against = seen.against or f"it moves with G{motion // 10}"
+        elsewhere = "machine" in kinds or motion in self.dialect.redrawn
         if "machine" in kinds:
             self._go_to_machine_position(block)
         elif motion in self.dialect.redrawn:
@@ -356,7 +341,22 @@ class Tracker(Drilling):
             self.lose(_letters(block.axes))
         else:
             self._go(block)
+        counts = motion == self.dialect.rapid or self._said_to_be_rapid(motion, seen)
+        if counts is False or (elsewhere and motion != self.dialect.rapid):
+            seen.against = seen.against or f"it moves with G{motion // 10}"
         self._why_not(block, seen)
+        seen.sure = seen.sure and counts is not None
+
+    def _said_to_be_rapid(self, motion: int, seen: Observation) -> bool | None:
+        """Whether the user counts a feed move as a rapid, at that F and nowhere too low."""
+        if self.facts.rapid_feed is None or motion != G1 or self.feed_mode not in (None, 94):
+            return False
+        feed, least = self.facts.rapid_feed
+        heights = [z / self.scale("Z") for z in (seen.start[2], self.at[2])]
+        # What is not known is neither: a comparison with it is false.
+        if self.feed < feed or self.feed > feed or any(z < least - NEAR for z in heights):
+            return False
+        return (self.feed_mode == 94 and all(z == z for z in (self.feed, *heights))) or None
 
     def _taken(self, block: Sorted, kinds: set[Effect]) -> bool:
         """Execute what takes the axis words from the motion: G28, G92, G10, G43.1."""
