@@ -70,6 +70,7 @@ def test_grbl_has_no_cutter_compensation_to_be_unknown():
     ("line", "after"),
     [
         (b"G64", None),
+        (b"%", None),
         (b"T1 M6", None),
         (b"G43 H1", None),
         (b"M62 P1", None),

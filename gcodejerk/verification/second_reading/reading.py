@@ -240,7 +240,7 @@ class Text:
     def _no_words(self, text: bytes, line: Line) -> bool:
         """Take a line that is no block of words: ``%``, an O word, system data, another base."""
         rules = self.dialect.text
-        if rules.percent != "error" and _PERCENT.match(text):
+        if _PERCENT.match(text) and (rules.percent != "error" or text == b"%"):
             line.percent = True
             line.understood = text == b"%" or (rules.percent == "named" and b" " not in text)
             leader = rules.percent == "leader" and _LEADER.fullmatch(text)

@@ -104,7 +104,10 @@ class Tracker(Drilling):
         return Observation(against="the operator may skip it")
 
     def _percent(self, line: Line) -> None:
-        if not line.understood:
+        if self.dialect.text.percent == "error":
+            self.begun = self.started = True
+            self.lose()  # refused as a block of its own; who refuses, waits for somebody
+        elif not line.understood:
             self.forget()
         elif not self.begun and not self.opened:
             self.opened = self.started = True
