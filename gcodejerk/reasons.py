@@ -22,6 +22,7 @@ class Reason(enum.StrEnum):
     DECIMAL_POINT = "number without a decimal point"
     CANNED_CYCLE = "rapid inside a canned cycle"
     FRAME_CHANGE = "coordinate frame changes in the block"
+    NOT_FOLLOWED = "behind a call, jump or loop that is not followed"
     CUTTER_COMPENSATION = "cutter compensation active"
     ROTATION = "rotation, scaling, mirroring or polar active"
     SYSTEM_WRITTEN = "offsets or parameters written by the program"
@@ -81,8 +82,10 @@ EXPLAINED: dict[Reason, Explanation] = {
         "the same place",
     ),
     Reason.NOT_UNDERSTOOD: Explanation(
-        "the control would refuse it, or it holds a code that the dialect's table does not know",
-        "the notes name the line: correct it, or say how the program is written (`--dialect`)",
+        "the control would refuse it, or it holds a code that the dialect's table does not know; "
+        "or such a block stands in front of it, and since then nobody has said G40",
+        "the notes name the line: correct it, say how the program is written (`--dialect`), "
+        "declare a harmless code (`program.harmless`), or state G40 and the other modes behind it",
     ),
     Reason.EXPRESSION: Explanation(
         "an axis word is a variable or an expression; where it ends is known if every variable is",
@@ -100,6 +103,11 @@ EXPLAINED: dict[Reason, Explanation] = {
         "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
         "give G43, G54.. and their kin a block of their own and state `program.offsets`; retract "
         "with a plain G0 instead of G28, G30 and G53",
+    ),
+    Reason.NOT_FOLLOWED: Explanation(
+        "what runs there may have changed every mode, and since then nobody has said G40",
+        "the notes name the line: state G40 and the other modes (G90, G21, the work system) behind "
+        "it",
     ),
     Reason.CUTTER_COMPENSATION: Explanation(
         "G41 or G42 is, or may be, in force: the real path differs from the programmed one",
@@ -132,12 +140,13 @@ EXPLAINED: dict[Reason, Explanation] = {
         "nothing: what does not move shakes nothing",
     ),
     Reason.DISTANCE_MODE_UNKNOWN: Explanation(
-        "neither G90 nor G91 has been stated where the dialect assumes none, or a subprogram may "
-        "have changed it",
+        "neither G90 nor G91 has been stated where the dialect assumes none, or a subprogram or a "
+        "block that is not understood may have changed it",
         "put G90 into the program, behind calls once more, or into `program.startup`",
     ),
     Reason.UNITS_UNKNOWN: Explanation(
-        "nobody says whether lengths are mm or inches, or a subprogram may have changed it",
+        "nobody says whether lengths are mm or inches, or a subprogram or a block that is not "
+        "understood may have changed it",
         "put the code for mm or inches (G21, G20) in front, or into `program.startup`",
     ),
     Reason.FEED_UNIT: Explanation(

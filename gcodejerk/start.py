@@ -79,6 +79,9 @@ class Start:
     spindle: str | None = None
     """What M3 turns on: a ``mill``, or a beam: ``laser``, ``plasma``; None: unknown where the
     dialect's controls drive beams too, a mill elsewhere."""
+    harmless: frozenset[str] = frozenset()
+    """Codes, for example ``M150``, of which the owner says that they move nothing and change no
+    mode and no frame; one that the dialect's table knows means what it says there."""
     rapid_feed: RapidFeed | None = None
     """Feed moves that count as rapids; None, as a rule: none do."""
 

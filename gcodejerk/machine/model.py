@@ -156,6 +156,7 @@ class Machine(Description):
             decimal_point=self.program.decimal_point,
             wraps={axis.name: axis.wrap for axis in self.axes if axis.wrap is not None},
             resume=self.program.resume_after_stop,
+            harmless=frozenset(self.program.harmless),
             spindle=self.spindle,
             rapid_feed=self.rapid_feed,
             diameter=any(axis.diameter for axis in self.axes),

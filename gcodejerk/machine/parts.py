@@ -240,6 +240,8 @@ class ProgramStart:
     """What a number without a decimal point is: ``calculator``, ``standard``, None unknown."""
     resume_after_stop: str | None = None
     """Where the axes stand behind M0 and M1: ``same``, ``unknown``, None: as usual there."""
+    harmless: tuple[str, ...] = ()
+    """Codes (``M62``, ``G187``) that move nothing and change nothing that a rapid rests on."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ class Reader:
 
     def __init__(self, name: str, dialect: Dialect, start: Start) -> None:
         self.name = name
-        self.dialect = dialect
+        self.dialect = dialect = dialect.with_harmless(start.harmless)
         self.runner = Runner(name, dialect, start)
         self._spindle = start.spindle
         self.flow = Flow()
@@ -194,6 +194,7 @@ class Reader:
         runner = self.runner
         if self._targets is not None and is_target(line.block, self._targets):
             runner.log.feed_event(USES_FEED)
+            runner.state.line = line
             runner.state.forget()
             runner.state.ended = False
         self.calls.main_line = line.number
@@ -208,7 +209,11 @@ class Reader:
 
     def _percent(self, line: Line) -> None:
         """Take a lone %: the first one opens the program, the second one ends it."""
-        if not self.started or (self.dialect.text.leader and not self.blocks):
+        self.state.line = line
+        if not self.blocks and self.percent is None:
+            first = not self.started or self.dialect.text.leader
+            if not first and not self.dialect.text.leader:
+                self.runner.add_problem(line, "this control reads a % on its first line only", 1)
             self.started = True
             self.percent = line.number
             self.insert_at = line.end
@@ -218,7 +223,7 @@ class Reader:
             self.runner.add_problem(
                 line, "% in the middle of a program that did not begin with one", 1
             )
-            self.state.forget()
+            self.state.forget(Reason.NOT_UNDERSTOOD)
             self.log.feed_event(USES_FEED)
         if any(word.letter == "G" for word in line.block.words):
             self._read_block(line)  # %NAME G71 * of Heidenhain
@@ -232,6 +237,7 @@ class Reader:
         if calls and not beside and not self.flow.inside and not self.passes.exhausted:
             self._pass(Node("call", "", line))
             return
+        self.state.line = line
         self.log.feed_event(USES_FEED)
         if calls:
             self.passes.lose()
@@ -310,6 +316,7 @@ class Reader:
                 found.append(
                     Finding(line, f"no {codes} before the first rapid: {assumed} is assumed")
                 )
+        found += runner.losses()
         if not self.state.ended:
             found.append(Finding(None, "program ends without M2, M30 or a closing %"))
         return tuple(found)

@@ -82,7 +82,7 @@ NEVER = {
     "emit": {"verification", "report"},
 }
 """What the picture alone would allow, or what matters enough to be said twice."""
-SECOND_READER = ("reading", "sorting", "known", "coding", "tracking")
+SECOND_READER = ("reading", "sorting", "known", "coding", "drilling", "tracking")
 """Modules of `verification` that read programs without the help of `nc`, but for its tables."""
 FOREIGN = {
     "yaml": {"machine"},

@@ -4,7 +4,7 @@ import pickle
 import pytest
 
 from gcodejerk.errors import MachineError
-from gcodejerk.machine import Limits, Machine, MachineFileError
+from gcodejerk.machine import Limits, Machine, MachineFileError, machine_yaml
 
 CONTRACT_EXAMPLE = """\
 schema: 1
@@ -97,6 +97,16 @@ def test_offsets_and_tool_lengths_are_told_apart():
     program = Machine.loads(text).program
     assert program.offsets == {"G54": {"X": 10.0}, "G59.1": {}, "G54.1 P3": {"X": 1.0}}
     assert program.tool_lengths == {1: 87.2}
+
+
+def test_harmless_codes_are_spelled_as_programs_are_read():
+    machine = Machine.loads(MILL + "program: {harmless: [M62, m0150, G187, g10.9, M62]}\n")
+    assert machine.program.harmless == ("G10.9", "G187", "M150", "M62")
+    assert machine.program_start().harmless == {"G10.9", "G187", "M150", "M62"}
+    assert Machine.loads(machine_yaml(machine)).program == machine.program
+    assert Machine.loads(MILL).program.harmless == ()
+    (found,) = lines(MILL + "program: {harmless: [M62 P1]}\n")
+    assert "program.harmless[0] is 'M62 P1', expected a code such as M150 or G187" in found
 
 
 def test_startup_codes_are_kept_as_written():

@@ -292,7 +292,7 @@ def test_a_code_beside_one_that_is_not_known_is_no_way_out(words):
 
 
 def test_code_that_is_no_number_leaves_its_mode_unknown():
-    assert last(b"G9..1 X1\nG0 X5\n")[0] is Reason.CUTTER_COMPENSATION
+    assert last(b"G9..1 X1\nG0 X5\n")[0] is Reason.NOT_UNDERSTOOD
 
 
 def test_progress_tells_the_bytes_read():

@@ -92,7 +92,7 @@ def test_subprogram_without_return_is_not_followed():
 
 def test_subprogram_that_calls_itself_is_left_alone():
     found = reasons(b"M98 P1000\nG0 X1.\nM30\nO1000\nG90 G0 X5.\nX6.\nM98 P1000\nM99\n")
-    assert (found[2], found[6]) == (Reason.CUTTER_COMPENSATION, Reason.SUBPROGRAM)
+    assert (found[2], found[6]) == (Reason.NOT_FOLLOWED, Reason.SUBPROGRAM)
 
 
 def test_nested_calls_are_followed():

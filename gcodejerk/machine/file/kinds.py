@@ -82,7 +82,7 @@ class Pair:
 class ListOf:
     """A list."""
 
-    of: Section | Choice
+    of: Section | Choice | Text
     at_most: int
     """More make no sense on a machine, and aliases could stand for very many."""
 

@@ -317,6 +317,11 @@ def _controller_options(values: dict[str, Any]) -> ControllerOptions:
     )
 
 
+def _code(name: str) -> str:
+    """A code as readers of programs spell it: ``M150``, ``G187``, ``G10.9``."""
+    return f"{name[0].upper()}{float(name[1:]):g}"
+
+
 def _program(values: dict[str, Any]) -> ProgramStart:
     offsets = values.get("offsets", {})
     return ProgramStart(
@@ -328,4 +333,5 @@ def _program(values: dict[str, Any]) -> ProgramStart:
         startup=values["startup"],
         decimal_point=values.get("decimal_point"),
         resume_after_stop=values.get("resume_after_stop"),
+        harmless=tuple(sorted({_code(name) for name in values.get("harmless", {}).values()})),
     )

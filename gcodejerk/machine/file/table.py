@@ -255,6 +255,12 @@ _PROGRAM = Section(
             "Where the axes stand when the program goes on behind M0 or M1: in the same place, or "
             "wherever somebody has moved them by hand. Left out: same for linuxcnc, unknown "
             "elsewhere.", example="unknown"),
+        Key("harmless", ListOf(
+            Text(r"[Gg][0-9]{1,3}(\.[0-9])?|[Mm][0-9]{1,4}", "a code such as M150 or G187"),
+            at_most=200),
+            "Codes of the machine's builder that move no axis and change no mode and no frame: "
+            "lamps, doors, chip conveyors, counters. One that the dialect itself knows keeps its "
+            "meaning.", example="[M62, M150, G187]"),
         Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*", "G-code words"),
             "The codes in force when a program starts (LinuxCNC: RS274NGC_STARTUP_CODE).",
             default="", example='"G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"'),

@@ -80,6 +80,7 @@ def machine_yaml(machine: Description) -> str:
                 if program.resume_after_stop is not None
                 else []
             ),
+            *([f"  harmless: [{', '.join(program.harmless)}]"] if program.harmless else []),
             "",
         ]
     )

@@ -14,7 +14,7 @@ might have changed is unknown.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from gcodejerk.axes import AXES
@@ -30,6 +30,12 @@ PLANES: dict[int, tuple[str, str, str]] = {
     181: ("W", "U", "V"),
     191: ("V", "W", "U"),
 }
+
+COMPENSATION = "cutter compensation"
+"""Name, among the transforms, of one that most controls of the dialect do not have."""
+HARMLESS = "harmless"
+"""Group of the M codes, and first word of the groups of the G codes, that the machine file says
+move nothing and change nothing."""
 
 ARC_CENTRES: dict[int, tuple[str, str]] = {170: ("I", "J"), 180: ("I", "K"), 190: ("J", "K")}
 """The centre words that an arc may carry in each plane; the remaining one is an error."""
@@ -58,6 +64,8 @@ Effect = Literal[
     "diameter",  # X is a diameter from here on
     "radius",  # it is none
     "either",  # it is one or the other, depending on the word
+    "declaration",  # the rest of the line names variables, which hold numbers or text and no more
+    "swivel",  # turns the plane, and moves; without arguments turns it back
     "written",  # writes offsets, tool data or parameters of the control
     "feed group",  # F means the speed of the axes that it names; of all, where it names none
     "feed override",  # scales F, and not G0
@@ -83,8 +91,9 @@ class Text:
     N, also with a level ``/1`` to ``/9``; the ``/`` is thrown away and the block runs; an error."""
     o_word: Literal["flow", "program", "error"] = "error"
     """``o100 while [..]``; ``O1234`` names a program (and so does ``:1234``); neither."""
-    percent: Literal["lone", "named", "error"] = "lone"
-    """A ``%`` stands alone; a name may follow it; it is an error."""
+    percent: Literal["lone", "leader", "named", "error"] = "lone"
+    """A ``%`` stands alone; the number of a program and comments may stand on its line, which is
+    not read; a name may follow it; it is an error."""
     leader: bool = False
     """What stands in front of the first ``%`` is not read, and the first line may be the name of
     the file."""
@@ -227,6 +236,11 @@ class Dialect:
     """Is X100 100 mm? It is; or a parameter of the machine decides."""
     diameter_codes: bool = False
     """A program may state whether X is a diameter."""
+    diameter_fixed: bool = False
+    """It is one for good, or for good none: no code that is not in the table changes that."""
+    refused: frozenset[str] = frozenset()
+    """Codes ("G64", "M6") that some of its controls refuse, and others run. Where one is refused,
+    its whole block changes nothing, and the sender waits for somebody, who may move the axes."""
     feed_of_mixed: bool = False
     """What F means where linear and rotary axes move together is known: it is the speed of the
     linear ones."""
@@ -307,6 +321,33 @@ class Dialect:
     def effect(self, code: int | None) -> Effect:
         """What a G code does besides changing its group."""
         return "none" if code is None else self.effects.get(code, "none")
+
+    def with_harmless(self, codes: frozenset[str]) -> Dialect:
+        """The dialect of a machine whose owner says of some codes that they are harmless.
+
+        Parameters
+        ----------
+        codes : frozenset of str
+            For example ``G187``, ``M150``. One that the table knows means what it says there.
+
+        Returns
+        -------
+        Dialect
+            In which the others move no axis, and change no mode and no frame.
+        """
+        g = {round(float(name[1:]) * 10.0): name for name in codes if name[0] == "G"}
+        m = {int(name[1:]): name for name in codes if name[0] == "M"}
+        g = {code: name for code, name in g.items() if code not in self.groups}
+        m = {code: name for code, name in m.items() if code not in self.m_groups}
+        if not g and not m:
+            return self
+        names = frozenset((*g.values(), *m.values()))
+        return replace(
+            self,
+            groups={**self.groups, **{code: f"{HARMLESS} {name}" for code, name in g.items()}},
+            m_groups={**self.m_groups, **dict.fromkeys(m, HARMLESS)},
+            uses={letter: users | names for letter, users in self.uses.items()},
+        )
 
     def feed_code(self, mode: int) -> int | None:
         """G code of a feed mode."""

@@ -7,6 +7,8 @@ power-on that 3402 chooses (G0 or G1, plane, G90 or G91, G94 or G95), the path o
 `positioning`), and whether G43 alone moves (5006#6).
 Parameters by number without a page, the order of M codes and the check of the position behind G0
 are general knowledge that was not looked up: they are used to leave rapids alone, and to stop.
+What stands between the first % and the end of its line is skipped (B-63524EN/01 p. 649; leader
+section, B-64014EN/03 p. 21).
 A machine builder adds M codes of his own, which may be macros that move. FreeCAD's post writes the
 name of the file as the first line.
 """
@@ -56,6 +58,8 @@ FANUC = Dialect(
     sources=(
         "30i G-code list, cncschool.pl",
         "B-63944EN/02 p. 48",
+        "B-63524EN/01 p. 649",
+        "B-64014EN/03 p. 21",
         "sample programs, github.com/NC-PB/gEdit",
     ),
     text=Text(
@@ -64,7 +68,7 @@ FANUC = Dialect(
         delete="numbered",
         o_word="program",
         leader=True,
-        percent="lone",
+        percent="leader",
         variables="#",
         open_expressions=True,
         keywords=_JUMPS,
@@ -94,6 +98,7 @@ FANUC = Dialect(
             "cylinder": (71,),
             "look-ahead": (51, 80),
             "modal macro": (660, 661, 670),
+            "diameter switch": (109,),
             "non-modal": (
                 *(40, 50, 90, 100, 110, 270, 280, 290, 300, 310, 520, 530, 600, 650),
                 *(920, 921),
@@ -133,6 +138,7 @@ FANUC = Dialect(
         **{160: ("polar", True), 150: ("polar", False)},
         **{121: ("polar interpolation", True), 131: ("polar interpolation", False)},
         71: ("cylinder", True),
+        109: ("diameter switch", True),
         **dict.fromkeys((434, 435), ("tool centre point", True)),
         490: ("tool centre point", False),
         670: ("modal macro", False),
@@ -203,6 +209,7 @@ _LATHE_GROUPS = {
     "modal macro": (660, 670),
     "speed check": (250, 260),
     "drilling": (800, 830, 840, 850, 870, 880, 890),
+    "diameter switch": (109,),
 }
 _LATHE = replace(
     FANUC,
@@ -212,8 +219,10 @@ _LATHE = replace(
         **dict.fromkeys((121, 1120), ("polar interpolation", True)),
         **dict.fromkeys((131, 1130), ("polar interpolation", False)),
         71: ("cylinder", True),
+        109: ("diameter switch", True),
         670: ("modal macro", False),
     },
+    diameter_fixed=True,  # parameter 1006#3, which G10.9 alone changes
     tool_frame=frozenset("T"),
     contours=frozenset({710, 720, 730}),
     drilling=Drilling(),

@@ -3,11 +3,16 @@
 Source: gnea/grbl, grbl/gcode.c and grbl/protocol.c. Blanks and control characters are thrown away,
 so is ``/`` (the block runs), a parenthesis that does not close ends with its line, and ``%``, O and
 M6 are errors. M2 leaves G1, power-on G0: which of the two is in force at the start is not known.
+
+What plain grbl refuses and grblHAL (gcode.c) or FluidNC (GCode.cpp) run stands in `refused`: a
+block that holds such a code is executed or changes nothing at all (gc_execute_line returns before
+gc_state is written), and both are reckoned with. grblHAL's cutter compensation, scaling, diameters
+and macros are named so that nothing is taken for certain behind them.
 """
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Text, Writing, code_names, grouped
+from gcodejerk.nc.dialects.dialect import COMPENSATION, Dialect, Text, Writing, code_names, grouped
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 
@@ -35,10 +40,16 @@ GRBL = Dialect(
             "feed mode": (930, 940),
             "units": (200, 210),
             "compensation": (400,),
-            "tool length": (431, 490),
+            "tool length": (430, 431, 432, 490),
             "system": SYSTEMS,
             "path": (610,),
+            "path tolerance": (640,),  # grblHAL may be built with it; lines stay lines
             "non-modal": (40, 100, 280, 281, 300, 301, 530, 920, 921),
+            "retract": (980, 990),
+            "grblHAL's compensation": (410, 411, 420, 421),
+            "scaling": (500, 510),
+            "diameter": (70, 80),
+            "macro": (650, 660, 661, 670),
         }
     ),
     m_groups=grouped(
@@ -46,7 +57,9 @@ GRBL = Dialect(
             "stop": (0, 1, 2, 30),
             "spindle": (3, 4, 5),
             "coolant": (7, 8, 9),
-            "override": (56,),
+            "override": (48, 49, 50, 51, 53, 56),
+            "tool": (6,),
+            "output": (62, 63, 64, 65, 66, 67, 68),
         }
     ),
     defaults={
@@ -63,19 +76,38 @@ GRBL = Dialect(
         **dict.fromkeys((280, 300), "return"),
         **dict.fromkeys((281, 301), "store"),
         **dict.fromkeys(SYSTEMS, "system"),
-        **dict.fromkeys((431, 490), "length"),
+        **dict.fromkeys((430, 431, 432, 490), "length"),
+        70: "diameter",
+        80: "radius",
+        650: "flow",
+        **dict.fromkeys((660, 661), "modal cycle"),
         100: "table",
         530: "machine",
         920: "set",
         921: "clear",
     },
-    letters="FSTXYZABCIJKLPR",
+    transforms={
+        **dict.fromkeys((410, 411, 420, 421), (COMPENSATION, True)),
+        400: (COMPENSATION, False),
+        **{510: ("scaling", True), 500: ("scaling", False)},
+        670: ("modal macro", False),
+    },
+    refused=code_names(
+        *("G43", "G43.2", "G64", "G98", "G99", "G41", "G41.1", "G42", "G42.1", "G50", "G51"),
+        *("G7", "G8", "M6", "M48", "M49", "M50", "M51", "M53", "M56"),
+        *(f"M{n}" for n in range(62, 69)),
+    ),
+    letters="FSTXYZABCDEHIJKLPQR",
     uses={
         "I": code_names("G2", "G3"),
         "J": code_names("G2", "G3"),
         "K": code_names("G2", "G3"),
-        "L": code_names("G10"),
-        "P": code_names("G4", "G10"),
+        "D": code_names("G41", "G41.1", "G42", "G42.1"),
+        "E": code_names("M66", "M67", "M68"),
+        "H": code_names("G43", "G43.2"),
+        "L": code_names("G10", "M66"),
+        "P": code_names("G4", "G10", "G64", "G51", *(f"M{n}" for n in range(50, 69))),
+        "Q": code_names("G64", "M66", "M67", "M68"),
         "R": code_names("G2", "G3"),
     },
     strict=True,

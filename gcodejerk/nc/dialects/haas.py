@@ -5,6 +5,11 @@ gcodes.net, G28 (without axes it moves all of them; it cancels the tool length);
 (positions between holes are rapids). Whether G0 goes straight is a setting: `positioning`. G100 to
 G103, G112, G113, G253 to G255, G268 and G269 are general knowledge that was not looked up; they are
 used to leave rapids alone.
+
+M codes that move no axis, by the lists of M codes of the mill manuals 96-8000 and 96-8200: chip
+conveyor (M31, M33), coolant spigot (M34, M35), gear (M41, M42; p. 215), air blast and air gun (M73,
+M74, M83, M84), coolant through the spindle (M88, M89). Relays (M21 to M28, M51 to M66) may start
+anything, M16 and M39 move: they are not here.
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ from gcodejerk.nc.dialects.dialect import grouped
 from gcodejerk.nc.dialects.fanuc import FANUC
 
 _EXTRA_SYSTEMS = tuple(range(1100, 1300, 10))
+_STANDING_M = (31, 33, 34, 35, 41, 42, 73, 74, 83, 84, 88, 89)
 _PATTERNS = (120, 130, 470, 700, 710, 720, 1500)
 """Pockets, engraving, bolt circles: they move, and end where the manual of the version says."""
 
@@ -25,7 +31,7 @@ HAAS = replace(
     sources=(
         "Haas: Help with the decimal points",
         "gcodes.net: Haas G28",
-        "Haas VF operator's manual 96-8000 p. 182",
+        "Haas VF operator's manual 96-8000 pp. 182, 215",
     ),
     groups={
         **{code: group for code, group in FANUC.groups.items() if code not in (120, 130)},
@@ -61,7 +67,11 @@ HAAS = replace(
         **{2680: ("feature", True), 2690: ("feature", False)},
         **dict.fromkeys((1410, 1430, 2340), ("tool centre point", True)),
     },
-    m_groups={**FANUC.m_groups, 97: "stop", 96: "stop"},
+    m_groups={
+        **FANUC.m_groups,
+        **dict.fromkeys((96, 97), "stop"),
+        **dict.fromkeys(_STANDING_M, "auxiliary"),
+    },
     # G103 P1 lets the control look only one block ahead, so that no stream is blended.
     bars={1030: ("look-ahead", "P")},
     packed_repeats=False,

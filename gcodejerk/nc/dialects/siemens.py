@@ -13,17 +13,18 @@ from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Effect, Text, Wri
 SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 
 _SILENT = (
-    *("MSG", "LIMS", "SETMS", "STOPRE", "SOFT", "BRISK", "DRIVE", "FFWON", "FFWOF", "DEF"),
+    *("MSG", "LIMS", "SETMS", "STOPRE", "SOFT", "BRISK", "DRIVE", "FFWON", "FFWOF"),
     *("COMPON", "COMPOF", "COMPCAD", "COMPCURV", "CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
     *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "SPOS", "SPOSA", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
     *("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM", "SF", "SCC"),  # corners: the end stays
     *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
+    *("FNORM", "FIFOCTRL", "WAITM", "WAITMC", "SETM", "CLEARM"),  # F as it is; waiting for channels
 )
 _TURNED = (
-    *("ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CRPL", "SUPA"),
+    *("ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CRPL"),
     *("TRANSMIT", "TRACYL", "TRAANG", "TRAORI", "TRACON", "TOFRAME", "TOROT", "PAROT", "RTLIOF"),
-    *("CYCLE800", "AP", "RP", "POLF", "GEOAX"),
+    *("AP", "RP", "POLF", "GEOAX"),
 )
 _CYCLES = (
     *(f"CYCLE{n}" for n in (*range(60, 100), 801, 802, 899, *range(930, 960))),
@@ -43,6 +44,9 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys(_CYCLES, "cycle"),
     **dict.fromkeys(_FLOW, "flow"),
     "FGROUP": "feed group",
+    "DEF": "declaration",
+    "SUPA": "machine",  # for its block alone, as G153 and G53
+    "CYCLE800": "swivel",
     "$": "written",  # $P_UIFR[1]=.., $TC_DP3[1,1]=.., $MC_..: offsets, tools, machine data
     "MCALL": "modal cycle",
     "DIAMON": "diameter",

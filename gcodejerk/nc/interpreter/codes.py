@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.dialect import HARMLESS, Dialect
 from gcodejerk.nc.dialects.gcodes import G80
 from gcodejerk.nc.interpreter.modal import NAN
 from gcodejerk.nc.interpreter.variables import before_block, word_value
@@ -99,6 +99,8 @@ def sort_words(
             sorter.increment(word, value)
         elif word.letter != "N":
             sorter.number(word, value)
+    if codes.moved() and any(group.startswith(HARMLESS) for group in codes.g):
+        codes.reject(b"axis words beside a harmless code")
     codes.expression = codes.expression or bool(block.assigns)
     codes.names = list(block.names)
     if dialect.one_command and codes.g and (codes.m or len(codes.g) > 1):

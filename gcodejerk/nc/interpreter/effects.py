@@ -6,6 +6,8 @@ and nowhere else.
 
 from __future__ import annotations
 
+import re
+
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.codes import Codes
@@ -17,6 +19,12 @@ from gcodejerk.nc.text.block import Name
 from gcodejerk.nc.text.tokenizer import CHECKSUM
 from gcodejerk.start import Start
 
+_DECLARATION = re.compile(
+    rb"[ \t]*(?:REAL|INT|BOOL|CHAR|STRING[ \t]*\[[ \t]*[0-9]+[ \t]*\])[ \t]+(.*)", re.IGNORECASE
+)
+_VALUES = re.compile(rb"\[[^\]]*\]|=[ \t]*(?:\"[^\"]*\"|[^,\"]*)")
+"""Sizes of arrays, and what variables begin with."""
+
 
 class Effects:
     """Does to a state what codes and names do besides the motion."""
@@ -25,6 +33,8 @@ class Effects:
         self.dialect = dialect
         self.state = state
         self.lengths = dict(start.tool_lengths)
+        self.declared: set[str] = set()
+        """Variables with a name that the program has declared."""
         self.jumps_known = False
         """Whoever runs the blocks forgets everything at the targets of jumps."""
 
@@ -48,6 +58,8 @@ class Effects:
             return "none"
         if name.name in self.dialect.text.keywords:
             return "flow"
+        if name.name in self.declared and name.arguments.lstrip(b" \t")[:1] in (b"=", b"["):
+            return "none"
         return self.dialect.names.get(name.name, "flow")
 
     def _effect(self, effect: Effect, code: int, values: dict[str, float], step: Step) -> None:
@@ -88,6 +100,27 @@ class Effects:
             state.forget_positions()
         elif effect == "flow":
             self._leave(step)
+
+    def _declare(self, names: list[Name]) -> None:
+        """DEF REAL DEPTH, WIDTH=5: from here on these are variables."""
+        for name in names:
+            if self._named(name) != "declaration":
+                continue
+            match = _DECLARATION.fullmatch(name.arguments)
+            if match is None:
+                self.state.forget()
+                return
+            texts = _VALUES.sub(b"", match[1]).split(b",")
+            self.declared |= {text.strip(b" \t").decode("latin-1").upper() for text in texts}
+
+    def _swivel(self, names: list[Name], step: Step) -> None:
+        """CYCLE800(..) turns the plane, CYCLE800() turns it back; where the axes go, it says."""
+        for name in names:
+            if self._named(name) == "swivel":
+                on = bool(name.arguments.strip(b"() \t"))
+                self.state.forget_frame()
+                self._effect("cycle", 0, {}, step)
+                self._transform("swivel", on=on)
 
     def _transform(self, name: str, on: bool) -> None:
         """Begin or end a rotation, scaling, mirroring or polar frame."""

@@ -10,12 +10,12 @@ import math
 from dataclasses import dataclass, field
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import LINEAR, Dialect, Effect
+from gcodejerk.nc.dialects.dialect import COMPENSATION, LINEAR, Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G1, G40
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import NO_FEED
-from gcodejerk.nc.text.block import Block
+from gcodejerk.nc.text.block import Block, Line
 from gcodejerk.reasons import Reason
 
 _FRAME_CHANGES: frozenset[Effect] = frozenset(
@@ -80,6 +80,8 @@ class Step:
     fault: bool = False
     unknown: str = ""
     """A code that the dialect does not know, as written."""
+    refused: str = ""
+    """A code that some of the dialect's controls refuse."""
     turned: int = 0
     """Bit k set: AXES[k] turns, and its word alone does not say which way."""
     way_unknown: bool = False
@@ -93,6 +95,8 @@ class Step:
     """The program ends behind the block's motion."""
     call: Call | None = None
     """A subprogram of the file that runs behind the block."""
+    since: Line | None = None
+    """The line behind which nobody knows what is in force, where the rapid is left alone for it."""
     leaves: bool = False
     """Programs run that are not followed."""
 
@@ -139,6 +143,7 @@ def why_left_alone(
     """
     g = codes.g
     effects = {dialect.effect(code) for code in g.values()}
+    effects |= {dialect.names.get(name.name, "none") for name in codes.names}
     if ended:
         return Reason.AFTER_END
     if block.block_delete:
@@ -156,6 +161,8 @@ def why_left_alone(
     if effects & _FRAME_CHANGES or not dialect.tool_frame.isdisjoint(codes.values):
         return Reason.FRAME_CHANGE
     if state.compensation != G40:
+        return _why_compensated(step, state)
+    if state.transforms.get(COMPENSATION, False) is not False:
         return Reason.CUTTER_COMPENSATION
     if state.transformed:
         return Reason.ROTATION
@@ -165,6 +172,15 @@ def why_left_alone(
     return _check_move(codes, step, state, dialect)
 
 
+def _why_compensated(step: Step, state: State) -> Reason:
+    """Say why cutter compensation is, or may be, in force."""
+    loss = state.lost.get("compensation") if state.compensation is None else None
+    if loss is None:
+        return Reason.CUTTER_COMPENSATION
+    step.since = loss.line
+    return loss.reason
+
+
 def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Reason | None:
     """Find the reasons that lie in the move itself."""
     named = [k for k in range(len(AXES)) if step.words >> k & 1]
@@ -172,6 +188,9 @@ def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
     unknown = any(math.isnan(a) or math.isnan(b) for a, b in ends)
     if not unknown and all(a == b for a, b in ends):
         return Reason.NO_MOTION
+    for mode in ("distance", "unit"):
+        if state.unknown(mode) and mode in state.lost:
+            step.since = step.since or state.lost[mode].line
     if state.distance is None:
         return Reason.DISTANCE_MODE_UNKNOWN
     if state.unit is None:

@@ -14,12 +14,13 @@ from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import inline_power
 from gcodejerk.nc.interpreter.codes import Codes, sort_words
 from gcodejerk.nc.interpreter.eligibility import Call, Step, looks_rapid, why_left_alone
-from gcodejerk.nc.interpreter.modal import NAN, State
+from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.phases import Phases
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.rules import is_complete
 from gcodejerk.nc.interpreter.variables import assign, assigned_values, reads_feed
 from gcodejerk.nc.text.block import Block
+from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
 
@@ -45,6 +46,7 @@ class Executor(Phases):
         step = self._begin(block, codes)
         before, ended = state.motion, state.ended
         self._execute(block, codes, step)
+        state = self.state  # another one behind a code that some of the controls refuse
         step.beam |= state.spindle != 5
         step.habit |= block.problem is not None and inline_power(codes, block.rest)
         if reads_feed(block, self.dialect.arithmetic):
@@ -82,7 +84,25 @@ class Executor(Phases):
             return
         if block.assigns:
             assign(block, values, state, rules)
+        code = _first_refused(codes, self.dialect)
+        if code:
+            self._run_or_refuse(codes, step, code)
+        else:
+            self.act(codes, step)
+
+    def _run_or_refuse(self, codes: Codes, step: Step, code: str) -> None:
+        """Run a block that some of the dialect's controls refuse: what both leave, is known."""
+        before = self.state.copy()
         self.act(codes, step)
+        if step.ends:
+            self.state.forget(Reason.NOT_UNDERSTOOD)
+            step.ends = False
+        self.state = join(before, self.state)
+        if not self._stays:
+            self.state.forget_positions()  # who refuses, stops; and somebody goes on
+        step.fault, step.refused = True, code
+        if step.feed_event:
+            step.feed_event = USES_FEED
 
     def _leave_contour(self, block: Block) -> None:
         """Forget what a block of a contour said: it did not run here."""
@@ -100,7 +120,7 @@ class Executor(Phases):
         before, state.touched, ended = state.touched, set(), state.ended
         self.act(codes, step)
         if step.ends:
-            state.forget()
+            state.forget(Reason.NOT_UNDERSTOOD)
             step.ends = False
         touched, state.touched = state.touched, before
         state.ended = ended
@@ -109,7 +129,7 @@ class Executor(Phases):
             # A control that is not strict may run what we refuse, and move what it does not name.
             state.forget_positions()
         if block.problem is not None and any(byte in b"GMOgmo#[" for byte in block.rest):
-            state.forget()
+            state.forget(Reason.NOT_UNDERSTOOD)
         step.feed_event = USES_FEED
 
     def _assign(self, target: str) -> None:
@@ -130,6 +150,14 @@ class Executor(Phases):
         self.state.forget()
         self.state.put("motion", 10)
         self.state.ended = True
+
+
+def _first_refused(codes: Codes, dialect: Dialect) -> str:
+    """Name a code of the block that some of the dialect's controls refuse; empty without one."""
+    if not dialect.refused:
+        return ""
+    names = [f"G{code / 10:g}" for code in codes.g.values()] + [f"M{m}" for m in codes.m]
+    return next((name for name in names if name in dialect.refused), "")
 
 
 def _call(codes: Codes, dialect: Dialect) -> Call | None:

@@ -14,6 +14,7 @@ from gcodejerk.nc.dialects.dialect import Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G90
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import NAN, State
+from gcodejerk.reasons import Reason
 
 Values = Mapping[str, float]
 """Letter -> value of the words of a block; NaN for an expression."""
@@ -134,7 +135,7 @@ def write_data(state: State, lengths: dict[int, float], values: Values) -> None:
     if kind in _OFFSETS:
         end_bar(state, "tool data written")
     elif "L" in values and kind not in _TOOLS:
-        state.forget()
+        state.forget(Reason.SYSTEM_WRITTEN)
         state.put("bars", {**state.bars, "parameters written": True})
 
 

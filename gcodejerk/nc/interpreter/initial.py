@@ -40,15 +40,24 @@ def _set_defaults(state: State, dialect: Dialect) -> None:
     state.feed_mode = None if mode is None else dialect.feed_modes.get(mode, mode // 10)
     path = dialect.defaults.get("path")
     state.path = None if path is None else dialect.paths[path]
-    written = set(dialect.groups.values())
-    state.fixed = frozenset(
-        GROUP_FIELDS.get(group, group.replace(" ", "_"))
-        for group in dialect.defaults
-        if group not in written
-    )
+    state.fixed = _fixed(dialect)
     units = dialect.defaults.get("units")
     state.unit = None if units is None else MM_PER_INCH if dialect.units[units] else 1.0
     state.unit_stated = units is not None
+
+
+def _fixed(dialect: Dialect) -> frozenset[str]:
+    """List the fields that no code of the dialect changes: its one code is in force already."""
+    changed = {
+        group for code, group in dialect.groups.items() if dialect.defaults.get(group) != code
+    }
+    fixed = {group for group in dialect.defaults if group not in changed}
+    fields = {GROUP_FIELDS.get(group, group.replace(" ", "_")) for group in fixed}
+    if "units" in fixed:
+        fields |= {"unit", "feed_unit"}
+    if dialect.diameter_fixed:
+        fields.add("diameter")
+    return frozenset(fields)
 
 
 def _set_frames(state: State, start: Start) -> None:

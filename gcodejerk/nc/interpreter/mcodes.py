@@ -43,7 +43,7 @@ def run_m_code(state: State, m: int, dialect: Dialect, step: Step) -> bool:
         # A tool change may go anywhere, and so may a program of the user's.
         state.forget_positions()
         forget_shared(state, dialect.arithmetic)
-        if dialect.other_m == "positions":
+        if dialect.other_m == "positions" or f"M{m}" in dialect.refused:
             _behind_macro(state)
     elif m == 73 and group == "state":
         state.put("restores", True)
@@ -65,4 +65,4 @@ def _behind_macro(state: State) -> None:
     if state.cycle is not None:
         state.lose("cycle")
     if state.distance == G91 and "distance" not in state.fixed:
-        state.put("distance", None)
+        state.lose("distance")

@@ -23,6 +23,8 @@ from typing import Any, Literal
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR
+from gcodejerk.nc.text.block import Line
+from gcodejerk.reasons import Reason
 
 NAN = math.nan
 MOST_VARIABLES = 1000
@@ -46,6 +48,7 @@ Kind = Literal[
     "named",  # name -> in force, None unknown; a name that is not there is not in force
     "table",  # key -> what is known of it; a key that is not there is unknown
     "constant",  # the same from the start to the end, or kept by whoever runs the blocks
+    "note",  # for people: nothing is computed from it
 ]
 
 
@@ -63,6 +66,19 @@ class Field:
     only_if: str = ""
     """It can only be unknown where this field of kind "once" is true: without a G7 in the program,
     X is a radius for certain."""
+
+
+_NAMED_LOST = ("compensation", "distance", "unit")
+"""Modes of which `State.lost` says since when they are unknown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Why something is not known any more."""
+
+    line: Line | None
+    """Since which line; None: it has no number."""
+    reason: Reason
 
 
 FIELDS = (
@@ -92,6 +108,7 @@ FIELDS = (
     *(Field(name, "constant", start) for name, start in (("ended", False), ("touched", None))),
     Field("fixed", "constant", frozenset()),
     Field("wraps", "constant", (None,) * len(AXES)),
+    *(Field(name, "note", start) for name, start in (("line", None), ("lost", {}))),
 )
 """What a state holds."""
 BY_NAME = {field.name: field for field in FIELDS}
@@ -178,6 +195,10 @@ class State:
     """What blocks have changed since somebody wanted to know."""
     fixed: frozenset[str]
     """Modes that no code of the dialect changes, so that nothing makes them unknown."""
+    line: Line | None
+    """That which is run."""
+    lost: dict[str, Loss]
+    """Mode that a block made unknown -> which block. Never changed, but made anew."""
     wraps: tuple[str | None, ...]
     """How each axis turns: see `gcodejerk.start.Start`; None unknown."""
 
@@ -226,6 +247,8 @@ class State:
 
     def lose(self, name: str) -> None:
         """Make one field unknown, and those that are known with it."""
+        if name in self.lost:
+            self.lost = {n: loss for n, loss in self.lost.items() if n != name}
         field = BY_NAME[name]
         for each in _GROUPS.get(field.together, (name,)):
             self.put(each, _unknown(BY_NAME[each], getattr(self, each)))
@@ -241,7 +264,7 @@ class State:
         """Forget every modal group, and what lies between machine and program coordinates."""
         for field in FIELDS:
             name = field.name
-            if field.kind in ("once", "table", "constant") or name == "position":
+            if field.kind in ("once", "table", "constant", "note") or name == "position":
                 continue
             if name in self.fixed or (field.only_if and not getattr(self, field.only_if)):
                 continue
@@ -253,9 +276,12 @@ class State:
         for name in _FRAME:
             self.lose(name)
 
-    def forget(self) -> None:
-        """Forget everything."""
+    def forget(self, because: Reason = Reason.NOT_FOLLOWED) -> None:
+        """Forget everything, for a reason that rapids are left alone with."""
+        known = [name for name in _NAMED_LOST if getattr(self, name) is not None]
         self.forget_modes()
+        lost = {n: Loss(self.line, because) for n in known if getattr(self, n) is None}
+        self.lost = {**self.lost, **lost} if lost else self.lost
         self.forget_positions()
         self.forget_variables()
         self.offsets = {}
@@ -278,6 +304,10 @@ class State:
                 self.set_variable(name[1:], NAN)
             else:
                 self.lose(name)
+
+    def unknown(self, mode: str) -> bool:
+        """Whether a mode is not known."""
+        return getattr(self, mode) is None
 
     @property
     def transformed(self) -> bool:
@@ -322,7 +352,7 @@ def agree(a: State, b: State) -> bool:
     return all(
         _equal(field, getattr(a, field.name), getattr(b, field.name))
         for field in FIELDS
-        if field.name != "touched"
+        if field.name != "touched" and field.kind != "note"
     )
 
 
@@ -332,8 +362,10 @@ def join(before: State, after: State) -> State:
     joined.touched = after.touched
     for field in FIELDS:
         a, b = getattr(before, field.name), getattr(after, field.name)
-        if field.kind != "constant" and not _equal(field, a, b):
+        if field.kind not in ("constant", "note") and not _equal(field, a, b):
             _join(joined, field, a, b)
+    losses = [(n, loss) for s in (after, before) for n, loss in s.lost.items() if s.unknown(n)]
+    joined.lost = dict(losses)
     return joined
 
 

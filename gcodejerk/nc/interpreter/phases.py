@@ -26,10 +26,13 @@ from gcodejerk.nc.interpreter.moves import (
 )
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.interpreter.rules import arc_words, takes_axes
+from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
 
-_TAKES_WORDS: frozenset[Effect] = frozenset({"words", "cycle", "home", "flow", "modal cycle"})
+_TAKES_WORDS: frozenset[Effect] = frozenset(
+    {"words", "cycle", "home", "flow", "modal cycle", "swivel"}
+)
 """Effects of a code beside which the axis words of the block are no straight move."""
 _NAME_TAKES_WORDS: frozenset[Effect] = (_TAKES_WORDS - {"flow"}) | {"frames", "transform"}
 """The same of a name; one of flow that goes on to the next block leaves the words to the motion."""
@@ -53,8 +56,9 @@ class Phases(Effects):
 
     def act(self, codes: Codes, step: Step) -> None:
         """Execute the words of a block, in the fixed order."""
+        understood = not codes.unknown
         if codes.unknown or not self._goes_on(codes, step):
-            self.state.forget()
+            self.state.forget(Reason.NOT_FOLLOWED if understood else Reason.NOT_UNDERSTOOD)
             step.feed_event = USES_FEED
             return
         self._feed_mode(codes)
@@ -161,6 +165,10 @@ class Phases(Effects):
 
     def _names(self, codes: Codes, step: Step) -> None:
         """Words with a name (TRANS, MCALL, FGROUP): they change what the codes have selected."""
+        if not codes.names:
+            return
+        self._declare(codes.names)
+        self._swivel(codes.names, step)
         effects = [self._named(name) for name in codes.names]
         if "modal cycle" in effects:
             # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
@@ -303,6 +311,8 @@ class Phases(Effects):
             go_straight(state, codes, step)
             step.fed = motion == G1 and self._counts_as_rapid(step)
             step.rapid = step.rapid or step.fed
+        if any(self._named(name) == "machine" for name in codes.names):
+            state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))
         if any(on is not False for on in state.transforms.values()):

@@ -46,6 +46,8 @@ class Runner:
         self.executor = Executor(dialect, state, start)
         self.syntax_problems: list[Finding] = []
         self.problem_count = 0
+        self._lost: dict[int, tuple[Line, int]] = {}
+        """Line behind which what is in force is unknown -> it, and rapids left alone for that."""
         self.asked_distance: int | None = None
         self.asked_feed_mode: int | None = None
         self.call: Callable[[Call, Line], bool] | None = None
@@ -83,6 +85,7 @@ class Runner:
             the one in force if the block may be skipped.
         """
         executor, block = self.executor, line.block
+        executor.state.line = line
         before = executor.state.copy() if block.block_delete else None
         step = executor.run(block)
         if not (visit and line.number in self.log.visits.rows):  # else said on the first pass
@@ -107,7 +110,11 @@ class Runner:
 
     def _name_problem(self, step: Step, line: Line) -> None:
         """Tell the user of a block that the control refuses, or of a code nobody knows."""
-        if step.fault and line.block.problem is None:
+        if step.refused:
+            name = self.dialect.name
+            what = f"some controls of the dialect {name} refuse {step.refused}, and then the block"
+            self.add_problem(line, f"{what} does nothing")
+        elif step.fault and line.block.problem is None:
             self.add_problem(line, "the controller would refuse this combination of words")
         elif step.unknown:
             name = self.dialect.name
@@ -130,6 +137,11 @@ class Runner:
     def _rapid(self, step: Step, line: Line, *, uncertain: bool, visit: bool) -> None:
         """Enter a rapid."""
         state, reason = self.state, step.reason
+        if step.since is not None:
+            self._lost[step.since.number] = (
+                step.since,
+                self._lost.get(step.since.number, (0, 0))[1] + 1,
+            )
         if uncertain and reason not in (Reason.AFTER_END, Reason.BLOCK_DELETE):
             reason = Reason.SUBPROGRAM
         speed = NAN
@@ -173,6 +185,21 @@ class Runner:
         fixed = "feed_mode" in state.fixed
         if not (fixed or state.feed_mode_stated) and self.asked_feed_mode is None:
             self.asked_feed_mode = number
+
+    def losses(self) -> list[Finding]:
+        """Name the lines behind which it is not known what is in force."""
+        found = []
+        for number, (line, count) in sorted(self._lost.items())[:_SHOWN]:
+            text = line.text.strip()[:40].decode("latin-1")
+            rapids = "1 rapid" if count == 1 else f"{count} rapids"
+            found.append(
+                Finding(
+                    number,
+                    f"what is in force is unknown since this line ({text}): {rapids} left "
+                    "alone; state the modes again behind it (G40, G90, G21 and their kin)",
+                )
+            )
+        return found
 
     def add_problem(self, line: Line, problem: str, column: int | None = None) -> None:
         """Note a line that is not understood."""

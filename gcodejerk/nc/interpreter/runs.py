@@ -41,6 +41,7 @@ def can_run(state: State) -> bool:
         and state.diameter is not None
         and state.plane in ARC_CENTRES
         and state.feed_mode is not None
+        and (state.unit is not None or not state.lost)
         and state.touched is None
         and state.cycle is None
         and not any(on is not False for on in state.transforms.values())

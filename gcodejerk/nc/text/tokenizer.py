@@ -33,6 +33,9 @@ _BLOCK = re.compile(
 )
 """Text that a control may run: words, or an assignment."""
 _STRING = re.compile(rb'"[^"]*"')
+_LEADER = re.compile(
+    rb"[ \t]*%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t]*(?:\([^()]*\)?[ \t]*)*;?[ \t]*", re.IGNORECASE
+)
 _HEXADECIMAL = re.compile(rb"[A-Z][ \t]*[-+]?0[Xx]", re.IGNORECASE)
 
 
@@ -187,7 +190,7 @@ class _Line(Cursor):
         name, begin = match[0].decode().upper(), self.at
         if self.dialect.one_command:
             self.at = len(self.text)  # all that follows belongs to the command
-        elif self.dialect.names.get(name) == "flow" and self.skip() != b":":
+        elif self.dialect.names.get(name) in ("flow", "declaration") and self.skip() != b":":
             self.at = _TO_COMMENT.match(self.text, self.at).end()  # type: ignore[union-attr]
         elif self.skip() == b"(":
             self._arguments()
@@ -254,8 +257,9 @@ class _Line(Cursor):
         rules, text = self.rules, self.text
         if rules.percent == "error":
             raise SyntaxProblem("'%' has no meaning here", self.at)
-        if rules.percent == "lone":
-            if text.strip(b" \t") != b"%":
+        if rules.percent in ("lone", "leader"):
+            leader = rules.percent == "leader" and _LEADER.fullmatch(text)
+            if text.strip(b" \t") != b"%" and not leader:
                 raise SyntaxProblem("text on the line of %", self.at + 1)
             self.at = len(text)
         elif any(word.letter != "N" for word in self.words):

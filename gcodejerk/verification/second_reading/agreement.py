@@ -151,6 +151,7 @@ def observations(
         Index into `lines`.
     seen : Observation
     """
+    dialect = dialect.with_harmless(start.harmless)
     begin = original.tell()
     doubt = jumps_back(original, dialect)
     original.seek(begin)

@@ -81,7 +81,7 @@ class Codes(Known):
                 self.forget()
             elif group in (None, "tool", "user"):
                 self.lose()
-                if self.dialect.other_m == "positions":
+                if self.dialect.other_m == "positions" or f"M{m}" in self.dialect.refused:
                     self.tool = [NAN] * len(AXES)
                     if self.cycle is not None:
                         self.g["motion"], self.cycle = None, None
@@ -103,7 +103,8 @@ class Codes(Known):
                 name, on = dialect.transforms[code]
                 if on or self.frames.get(name, False) is not False:
                     self.lose()
-                self.frames[name] = on
+                if on or name in self.frames:
+                    self.frames[name] = on
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
                 by_p = _switched(values.get("P", 0.0))

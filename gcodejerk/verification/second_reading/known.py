@@ -77,9 +77,9 @@ class Known:
 
     def __init__(self, dialect: Dialect, facts: Facts) -> None:
         self.dialect, self.facts = dialect, facts
-        written = set(dialect.groups.values())
         modes = dict(dialect.defaults)
-        self.fixed = {group: code for group, code in modes.items() if group not in written}
+        self.fixed = {group: code for group, code in modes.items() if _lone(dialect, group, code)}
+        """Groups of which the dialect has no other code."""
         self.g: dict[str, int | None] = dict(modes)
         """Modal group -> code in force."""
         self.feed_mode: int | None = self.mode_of(modes.get("feed mode"))
@@ -183,7 +183,7 @@ class Known:
         self.selected = self.cycle = self.spindle = None
         if "units" not in self.fixed:
             self.unit = self.feed_unit = None
-        if self.turns:
+        if self.turns and not self.dialect.diameter_fixed:
             self.diameter = None
         self.lose_offsets()
         self.systems, self.lengths = {}, {}
@@ -300,6 +300,11 @@ class Known:
         plane = self.g.get("plane")
         # Heidenhain's G20 is a plane that nothing here knows.
         return "".join(PLANES[plane][:2]) if plane in PLANES else "XYZUVW"
+
+
+def _lone(dialect: Dialect, group: str, code: int) -> bool:
+    """Whether a group has no code but this one."""
+    return {code}.issuperset(c for c, name in dialect.groups.items() if name == group)
 
 
 def _common(kind: str, mine: Any, theirs: Any) -> Any:

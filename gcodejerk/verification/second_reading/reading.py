@@ -37,6 +37,11 @@ _ASSIGNMENTS = re.compile(
 _TARGET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
 _COMPUTED = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+)?[ \t]*#[ \t]*[#\[].*=")
 _PERCENT = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?%")
+_LEADER = re.compile(rb"%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t\0]*")
+_DEF = re.compile(
+    rb"(?:N[0-9]+[ \t]*)?DEF[ \t]+(?:REAL|INT|BOOL|CHAR|STRING[ \t]*\[[0-9]+\])[ \t]+"
+)
+_DECLARED = re.compile(rb"(?:^|,)[ \t]*([A-Z_][A-Z_][A-Z0-9_]*)")
 _O_WORD = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?[O:][ \t]*(<[^<>]*>|[0-9]+)[ \t]*([A-Z0-9]*)")
 _FILE_NAME = re.compile(rb"[A-Z_][\w-]*\.[A-Z]{1,5}")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*$")
@@ -69,6 +74,8 @@ class Line:
     blank: bool = False
     offsets: bool = False
     """An assignment that may change offsets."""
+    swivelled: bool = False
+    """The plane is turned from here on."""
     group: bool = False
     """F is from here on the speed of some axes only."""
 
@@ -119,6 +126,8 @@ class Text:
         level = rb"[0-9]?" if rules.delete == "numbered" else b""
         number = rb"(?:N[0-9]+[ \t]*)?" if rules.delete == "numbered" else b""
         self.delete = re.compile(rb"[ \t]*" + number + rb"/" + level)
+        self.declared: set[bytes] = set()
+        """Variables with a name."""
         self.run, self.run_stated, self.run_on = self._runs(decimals_matter)
 
     def _runs(self, decimals_matter: bool) -> tuple[re.Pattern[bytes], ...]:
@@ -231,9 +240,11 @@ class Text:
     def _no_words(self, text: bytes, line: Line) -> bool:
         """Take a line that is no block of words: ``%``, an O word, system data, another base."""
         rules = self.dialect.text
-        if rules.percent != "error" and _PERCENT.match(text):
+        if _PERCENT.match(text) and (rules.percent != "error" or text == b"%"):
             line.percent = True
             line.understood = text == b"%" or (rules.percent == "named" and b" " not in text)
+            leader = rules.percent == "leader" and _LEADER.fullmatch(text)
+            line.understood = line.understood or bool(leader)
         elif rules.o_word != "error" and (match := _O_WORD.match(text)):
             line.flow = match[2].decode()
         elif rules.hexadecimal and _HEXADECIMAL.search(text):
@@ -299,11 +310,20 @@ class Text:
 
     def _names(self, text: bytes, line: Line) -> bytes:
         """Take out words that have names."""
+        if self.dialect.names.get("DEF") == "declaration" and (match := _DEF.match(text)):
+            rest = re.sub(rb'"[^"]*"', b"", text[match.end() :])
+            self.declared |= set(_DECLARED.findall(rest))
+            return b""
+        for name in self.declared if b"=" in text else ():
+            if name in text:
+                text = re.sub(_assignment(name), b" ", text)
 
         def take(match: re.Match[bytes]) -> bytes:
             effect = self.dialect.names.get(match[1].decode(), "flow")
             if effect == "feed group":
                 line.group = (match[2] or b"").strip(b"() \t") != b""
+            if effect == "swivel":
+                line.swivelled = (match[2] or b"").strip(b"() \t") != b""
             if effect != "none":
                 line.effects.append(effect)
             return b" "
@@ -315,6 +335,11 @@ class Text:
             take(match)
             return b""
         return _NAME.sub(take, text)
+
+
+def _assignment(name: bytes) -> bytes:
+    """Pattern of what sets a variable."""
+    return rb"(?<![A-Z0-9_$])" + name + rb"[ \t]*(?:\[[^\]]*\])?[ \t]*=[ \t]*[^ \t;]*"
 
 
 def pieces(file: BinaryIO) -> Iterator[bytes]:

@@ -7,7 +7,7 @@ the dialect's table is not understood as a whole.
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.dialect import HARMLESS, Dialect
 from gcodejerk.verification.second_reading.reading import NAN, Line
 
 LEAST = 0.001
@@ -46,7 +46,8 @@ class Sorted:
                 read = None if dwells else decimals
                 number = _without_point(number, axis or letter, dialect, read, inch=inch)
             self._put(letter, axis, number)
-        return True
+        # axis words beside a code of the builder's may be its own
+        return not (self.axes and any(group.startswith(HARMLESS) for group in self.g))
 
     def _codes(self, line: Line, dialect: Dialect) -> bool:
         """Sort the codes; whether they are known and may stand together."""

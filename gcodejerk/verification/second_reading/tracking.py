@@ -12,11 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Effect
-from gcodejerk.nc.dialects.gcodes import G1, G17, G40, G43, G49, G80, G90, G91, G98, G99
+from gcodejerk.nc.dialects.dialect import LINEAR, Effect
+from gcodejerk.nc.dialects.gcodes import G1, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
-from gcodejerk.verification.second_reading.coding import QUIET, Codes
+from gcodejerk.verification.second_reading.coding import QUIET
+from gcodejerk.verification.second_reading.drilling import Drilling
 from gcodejerk.verification.second_reading.known import NEAR, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line, Run
 from gcodejerk.verification.second_reading.sorting import Sorted
@@ -29,11 +30,13 @@ _FRAMES: frozenset[Effect] = frozenset(
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
+_READ: frozenset[Effect] = QUIET | frozenset[Effect](("frames", "swivel", "machine"))
+"""Effects of names that are followed."""
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
 
 
-class Tracker(Codes):
+class Tracker(Drilling):
     """Follows lines."""
 
     @property
@@ -101,9 +104,12 @@ class Tracker(Codes):
         return Observation(against="the operator may skip it")
 
     def _percent(self, line: Line) -> None:
-        if not line.understood:
+        if self.dialect.text.percent == "error":
+            self.begun = self.started = True
+            self.lose()  # refused as a block of its own; who refuses, waits for somebody
+        elif not line.understood:
             self.forget()
-        elif not self.started or (self.dialect.text.leader and not self.begun):
+        elif not self.begun and not self.opened:
             self.opened = self.started = True
         elif self.opened:
             self.ended = True
@@ -135,8 +141,10 @@ class Tracker(Codes):
             for effect in line.effects:
                 self.write(effect, line)
             return Observation()
-        if not line.understood or any(effect not in QUIET for effect in line.effects):
+        if not line.understood or any(effect not in _READ for effect in line.effects):
             return self._lost(line)
+        if not {"frames", "swivel"}.isdisjoint(line.effects):
+            return self._new_frame(line)
         if self.contour is not None:
             self._in_contour(line)
             return Observation()
@@ -146,18 +154,48 @@ class Tracker(Codes):
         if not dialect.modal_motion:
             self.g["motion"] = None
         for effect in line.effects:
-            self.turning(effect)
+            if effect in QUIET:
+                self.turning(effect)
+        codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}
+        if codes & dialect.refused:
+            return self._run_or_refused(block)
         seen = self._run_block(block)
+        if "machine" in line.effects:
+            self.lose(_letters(block.axes))  # SUPA: its words are no program coordinates
+            seen = Observation(against="a coordinate frame changes in it")
         if line.effects and seen.sure:
             seen.sure = False
         return seen
+
+    def _new_frame(self, line: Line) -> Observation:
+        """A frame that is not known, and a way to it that is not."""
+        if any(letter != "N" for letter, _, _ in line.words):
+            return self._lost(line)
+        self.lose_offsets()
+        self.lose()
+        self.g["motion"], self.feed = None, NAN
+        if "swivel" in line.effects and (line.swivelled or "swivel" in self.frames):
+            self.frames["swivel"] = line.swivelled
+        return Observation()
+
+    def _run_or_refused(self, block: Sorted) -> Observation:
+        """A block that does something on some of the controls, and nothing on others."""
+        before = self.copy()
+        self._run_block(block)
+        if self.ended and not before.ended:
+            self.forget()
+            self.ended = False
+        self.join(before)
+        if not self._stays():
+            self.lose()
+        return Observation(against="some of the controls refuse it")
 
     def _lost(self, line: Line) -> Observation:
         """A line that is not understood."""
         # M3 I: a letter without a number is no word
         fires = any(letter == "M" and number in (3, 4) for letter, number, _ in line.words)
         self.habits = self.habits or (fires and not line.understood)
-        if any(effect in ("transform", "modal cycle") for effect in line.effects):
+        if any(effect in ("transform", "swivel", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
         return Observation()
@@ -232,13 +270,17 @@ class Tracker(Codes):
 
     def _stop(self, block: Sorted, *, ends: bool) -> None:
         """Stop or end behind the motion."""
-        stays = self.facts.resume == "same"
-        if not stays and not (self.facts.resume is None and self.dialect.same_after_stop):
+        if not self._stays():
             stops = [m for m in block.m if m in _STOPS and self.dialect.m_groups.get(m) == "stop"]
             self.lose(AXES if stops else "")
         if ends:
             self.forget()
             self.ended = self.depth == 0  # in a branch it may not run
+
+    def _stays(self) -> bool:
+        """Whether nobody moves an axis while the program waits."""
+        resume = self.facts.resume
+        return resume == "same" or (resume is None and self.dialect.same_after_stop)
 
     def _in_force(self) -> dict[str, Any]:
         distance = self.g.get("distance")
@@ -332,15 +374,6 @@ class Tracker(Codes):
             return True
         return block.g.get("tool length") not in (None, G43, G49) and block.axes != 0
 
-    def _cycle_of(self, block: Sorted) -> int | None:
-        """Code of the canned cycle that a block belongs to."""
-        dialect, code = self.dialect, block.g.get("cycle")
-        if code is not None and code not in dialect.cycles:
-            self.cycle, code = None, None
-        if not dialect.drilling.own_group and self.g.get("motion") in dialect.cycles:
-            code = self.g["motion"]
-        return code or self.cycle
-
     def _go_to_machine_position(self, block: Sorted) -> None:
         """G53: the words are machine coordinates."""
         for k, axis in enumerate(AXES):
@@ -399,50 +432,6 @@ class Tracker(Codes):
         if self.dialect.lengths_only and None not in (self.unit, self.feed_unit):
             return "F is not in the unit of lengths" if self.unit != self.feed_unit else None
         return None
-
-    def _drill(self, code: int, block: Sorted) -> None:
-        """Where a block of a drilling cycle ends, if it is one that is followed."""
-        values, drilling = block.values, self.dialect.drilling
-        plane = self.g.get("plane")
-        unsure = code in drilling.unknown_ends or (plane != G17 and code in drilling.only_in_xy)
-        if self.g.get("motion") == G80 or plane not in PLANES or unsure:
-            self.lose()
-            self.cycle = code
-            self.level = self.r = NAN
-            return
-        first, second, along = PLANES[plane]
-        self._begin_cycle(code, block, along)
-        if not block.axes:
-            return
-        repeats = [values[letter] for letter in drilling.repeats if letter in values]
-        if self.g.get("distance") != G90 or any(n != 1.0 for n in repeats) or block.increments:
-            self.lose()
-            self.level = self.r = NAN
-            return
-        for axis in (first, second):
-            if axis in values:
-                self.at[AXES.index(axis)] = values[axis] * self.scale(axis)
-        self.at[AXES.index(along)] = self._retracted()
-        if self.turned() or self.g.get("compensation") != G40:
-            self.lose()
-
-    def _retracted(self) -> float:
-        """Where the tool comes back to: R (G99), or the level of the series above it (G98)."""
-        retract = self.g.get("retract")
-        top = max(self.level, self.r) if self.level == self.level and self.r == self.r else NAN
-        return self.r if retract == G99 else top if retract == G98 else NAN
-
-    def _begin_cycle(self, code: int, block: Sorted, along: str) -> None:
-        """Put a cycle in force, with the level of its series and its R."""
-        if self.cycle is None:
-            self.level, self.r = self.at[AXES.index(along)], NAN
-        elif self.cycle != code:
-            self.r = NAN
-        self.cycle = code
-        if "R" in block.values:
-            # Beside an X that is a diameter, R may be none.
-            radius = NAN if along == "X" and self.diameter is not False else 1.0
-            self.r = block.values["R"] * self.scale(along) * radius
 
 
 def _letters(axes: int) -> str:
