@@ -7,7 +7,7 @@ M6 are errors. M2 leaves G1, power-on G0: which of the two is in force at the st
 What plain grbl refuses and grblHAL (gcode.c) or FluidNC (GCode.cpp) run stands in `refused`: a
 block that holds such a code is executed or changes nothing at all (gc_execute_line returns before
 gc_state is written), and both are reckoned with. grblHAL's cutter compensation, scaling, diameters
-and macros are named so that nothing is taken for certain behind them.
+and macros are named so that nothing is taken for certain behind them. M7 needs ENABLE_M7.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ GRBL = Dialect(
     },
     refused=code_names(
         *("G43", "G43.2", "G64", "G98", "G99", "G41", "G41.1", "G42", "G42.1", "G50", "G51"),
-        *("G7", "G8", "M6", "M48", "M49", "M50", "M51", "M53", "M56"),
+        *("G7", "G8", "M6", "M7", "M48", "M49", "M50", "M51", "M53", "M56"),
         *(f"M{n}" for n in range(62, 69)),
     ),
     letters="FSTXYZABCDEHIJKLPQR",
