@@ -32,7 +32,7 @@ from gcodejerk.motion.search.ramps import design_symmetric
 from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.motion.search.unit_move import Move, Optimum, optimum_profiles
 from gcodejerk.planning.optima import Progress, Question, answers
-from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.plans import Plans, same_rows
 from gcodejerk.planning.task import Task, worst_in_band
 
 ALLOWED = 0.97
@@ -327,7 +327,10 @@ def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0
         require_solver()
     except PlanError:
         return None
-    return least_residuals(plans, progress, band)
+    if plans.machine.positioning != "linear":
+        return least_residuals(plans, progress, band)
+    first, like = same_rows(plans.displacement, plans.counts, plans.reason)
+    return least_residuals(plans.repeated(first), progress, band)[like]
 
 
 def _question(

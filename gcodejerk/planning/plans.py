@@ -7,7 +7,7 @@ thing here: a profile has a *share*, the displacement of every axis that it carr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,6 +191,62 @@ class Plans:
         """The profiles of a move."""
         begin, end = np.searchsorted(self.move, [move, move + 1])
         return range(int(begin), int(end))
+
+    def repeated(self, index: NDArray[np.int64]) -> Plans:
+        """These moves in another order, any of them more than once, or not at all."""
+        begin, end = (np.searchsorted(self.move, index, side=side) for side in ("left", "right"))
+        count = end - begin
+        move = np.repeat(np.arange(len(index)), count)
+        rows = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(move))
+        columns = (
+            *("reason", "displacement", "length", "conventional_time", "counts"),
+            *("worst_in_band", "most_in_band"),
+        )
+        return replace(
+            self,
+            **{name: getattr(self, name)[index] for name in columns},
+            move=move,
+            share=self.share[rows],
+            profiles=self.profiles.take(rows),
+            conventional=self.conventional.take(rows),
+            profile_counts=self.profile_counts[rows],
+            lasting=None if self.lasting is None else self.lasting[index],
+        )
+
+
+def same_rows(*columns: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The first of each sort of rows that agree in every bit, and the sort of each row.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n,) or (n, k)
+        What the rows consist of.
+
+    Returns
+    -------
+    first : ndarray of int, shape (s,)
+    like : ndarray of int, shape (n,)
+
+    Examples
+    --------
+    >>> first, like = same_rows(np.array([3.0, 5.0, 3.0, 3.0]), np.array([1, 1, 1, 2]))
+    >>> first.tolist(), like.tolist()
+    ([0, 1, 3], [0, 1, 0, 2])
+    """
+    count = len(columns[0])
+    flat = [np.ascontiguousarray(column).reshape(count, -1) for column in columns if count]
+    parts = [column.view(np.uint8).reshape(count, -1) for column in flat]
+    rows = np.concatenate(parts, axis=1) if parts else np.zeros((0, 1), dtype=np.uint8)
+    text, width = memoryview(rows.tobytes()), rows.shape[1]
+    sorts: dict[bytes, int] = {}
+    like = np.empty(count, dtype=np.int64)
+    first: list[int] = []
+    for k in range(count):
+        sort = sorts.setdefault(bytes(text[k * width : (k + 1) * width]), len(sorts))
+        like[k] = sort
+        if sort == len(first):
+            first.append(k)
+    return np.array(first, dtype=np.int64), like
 
 
 def path_length(displacement: Array, machine: Machine) -> Array:

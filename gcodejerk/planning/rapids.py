@@ -16,7 +16,7 @@ from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plan import PROFILES, plan_moves, rule_out
-from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
+from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length, same_rows
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 FARTHEST = 1e8
@@ -101,7 +101,10 @@ def plan_rapids(
     if only_gains and profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
         # Those keep the profile or save time; all others do nothing but keep modes still.
         rule_out(reason, length > 0.0, Reason.NO_MODE)
-    return plan_moves(
-        displacement, machine, profile,
-        reason=reason, progress=progress, speed=rapids.speed, lone=rapids.lone,
+    # Moves that agree in every bit of what planning looks at are planned once.
+    first, like = same_rows(displacement, rapids.speed, reason, rapids.lone)
+    plans = plan_moves(
+        displacement[first], machine, profile, reason=reason[first], progress=progress,
+        speed=rapids.speed[first], lone=rapids.lone[first],
     )  # fmt: skip
+    return plans if len(first) == len(rapids) else plans.repeated(like)

@@ -29,8 +29,8 @@ from gcodejerk.planning.conventional import conventional_limits, todays_profiles
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import Modes
 
-AT_ONCE = 1 << 21
-"""Residuals, of moves at frequencies, that are judged at a time: some 100 MB."""
+AT_ONCE = 1 << 18
+"""Residuals, of moves at frequencies, that are judged at a time: some 12 MB."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -94,3 +94,20 @@ def test_without_modes_nothing_is_left():
     one = np.ones((2, 3))
     assert (symmetric_worst(one, one, one, np.full(2, 8.0), objective) == 0.0).all()
     assert (cascade_worst((one, one, one), objective) == 0.0).all()
+
+
+def test_a_bound_gives_up_what_is_beyond_it_and_changes_nothing_else():
+    random = np.random.default_rng(15)
+    n, k = 7, 60
+    T1, Ta, T2 = (random.uniform(0.002, 0.02, (n, k)) for _ in range(3))
+    total = np.full(n, 0.2)
+    poles = mode_poles(random.uniform(20.0, 200.0, 9), random.uniform(0.0, 0.05, 9))
+    objective = Objective(poles, random.uniform(0.1, 1.0, (n, 9)), np.arange(9))
+    free = symmetric_worst(T1, Ta, T2, total, objective)
+    bound = np.median(free, axis=1, keepdims=True) * np.ones(k)
+    bound[:, ::11] = -1.0
+    found = symmetric_worst(T1, Ta, T2, total, objective, bound)
+    below = free <= bound
+    assert (found[below] == free[below]).all()
+    assert np.isinf(found[~below]).mean() > 0.5
+    assert np.isinf(found[:, ::11]).all()

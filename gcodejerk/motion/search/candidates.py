@@ -25,8 +25,22 @@ FEW_POLES = 12
 BLOCK = 1 << 14
 """Numbers in an array at a time, about: a dozen of them stay in the processor's cache."""
 
+BEYOND = 1.0 + 1e-5
+"""A candidate beyond a bound by this factor is given up: more than single precision errs."""
+WORTHWHILE = 0.7
+"""Share of the candidates that are left, up to which the others are taken out."""
+AT_ONCE = 3
+"""Poles after which candidates are compared with their bounds."""
 
-def symmetric_worst(T1: Array, Ta: Array, T2: Array, total: Array, objective: Objective) -> Single:
+
+def symmetric_worst(
+    T1: Array,
+    Ta: Array,
+    T2: Array,
+    total: Array,
+    objective: Objective,
+    bound: Array | None = None,
+) -> Single:
     r"""Largest residual displacement of symmetric profiles.
 
     Parameters
@@ -37,6 +51,10 @@ def symmetric_worst(T1: Array, Ta: Array, T2: Array, total: Array, objective: Ob
         T_SUM. [s]
     objective : Objective
         Of the n moves.
+    bound : ndarray, shape (n, k), optional
+        What leaves more may be said to leave anything: it is given up as soon as some of the modes
+        show that, and is infinite. What leaves less is as without a bound, to the last bit; below
+        zero nothing is evaluated. [mm]
 
     Returns
     -------
@@ -62,12 +80,17 @@ def symmetric_worst(T1: Array, Ta: Array, T2: Array, total: Array, objective: Ob
         for t, jerk in ((T1, -up), (T1 + Ta, -down), (ramp, down))
     ]
     middle = (0.5 * total).astype(np.float32)
-    found = _Worst(objective, n, k)
+    found = _Worst(objective, n, k, bound)
     for block, sigma, omega, scale in found.blocks():
+        if (kept := found.kept()) is not None:
+            up = up[kept]
+            pairs = [(t[kept], rest[kept], jerk[kept]) for t, rest, jerk in pairs]
+            if not len(up):
+                break
         # The first pair, at the beginning and the end, depends on the move alone.
         phase, late = middle * omega, np.exp(-sigma * (2.0 * middle))
-        real = np.repeat((late - 1.0) * np.cos(phase), k, axis=1) * up
-        imaginary = np.repeat((late + 1.0) * np.sin(phase), k, axis=1) * up
+        real = found.spread((late - 1.0) * np.cos(phase)) * up
+        imaginary = found.spread((late + 1.0) * np.sin(phase)) * up
         for t, rest, jerk in pairs:
             phase = (rest - t) * (np.float32(0.5) * omega)
             if not sigma.any():
@@ -120,20 +143,51 @@ def cascade_worst(widths: tuple[Array, ...], objective: Objective) -> Single:
 
 
 class _Worst:
-    """The largest of the groups of poles, of which a block at a time is evaluated."""
+    """The largest of the groups of poles, of which a block at a time is evaluated.
 
-    def __init__(self, objective: Objective, n: int, k: int) -> None:
+    With a bound, candidates beyond it are given up on the way.
+    """
+
+    def __init__(self, objective: Objective, n: int, k: int, bound: Array | None = None) -> None:
         self.poles, self.weights = objective.poles, objective.weights
         self.shape, self.each = (n, k), k
         self.starts = np.diff(objective.group, prepend=-1) != 0
         self.worst = np.zeros(n * k, dtype=np.float32)
         self.carried: Single = self.worst
+        self.index: NDArray[np.intp] | None = None
+        """Those that are left, where some were given up."""
+        self.bound: Array | None = None
+        # Of a group of several poles the sum alone tells.
+        if bound is not None and self.starts.all():
+            self.bound = np.where(bound < 0.0, -1.0, (bound * BEYOND) ** 2).ravel()
+
+    def kept(self) -> NDArray[np.intp] | None:
+        """Of the candidates at hand, those that go on; None where all do, or nearly all."""
+        if self.bound is None:
+            return None
+        kept = np.flatnonzero(self.worst <= self.bound)
+        if len(kept) > WORTHWHILE * len(self.worst):
+            return None
+        self.worst, self.bound = self.worst[kept], self.bound[kept]
+        self.index = kept if self.index is None else self.index[kept]
+        self.carried = self.worst
+        return kept
+
+    def spread(self, of_moves: Single) -> Single:
+        """Numbers of moves, shape (p, n), as those of their candidates."""
+        if self.index is None:
+            return np.repeat(of_moves, self.each, axis=1)
+        return of_moves[:, self.index // self.each]
 
     def blocks(self) -> Iterator[tuple[slice, Single, Single, Single]]:
         """Poles in blocks, with -Re, Im and modulus of each, shape (p, 1) [1/s]."""
-        size = max(1, BLOCK // max(self.worst.size, 1))
-        for begin in range(0, len(self.poles), size):
+        begin = 0
+        while begin < len(self.poles):
+            size = max(1, BLOCK // max(self.worst.size, 1))
+            if self.bound is not None:
+                size = min(size, AT_ONCE)
             block = slice(begin, begin + size)
+            begin += size
             poles = self.poles[block, np.newaxis]
             sigma, omega, scale = (
                 x.astype(np.float32) for x in (-poles.real, poles.imag, np.abs(poles))
@@ -146,7 +200,7 @@ class _Worst:
         Divided by the square of `scale`, shape (p, 1), they are squares of displacements.
         """
         weight = self.weights[:, block].T.astype(np.float32) / scale
-        square = square * np.repeat(weight * weight, self.each, axis=1)
+        square = square * self.spread(weight * weight)
         starts = self.starts[block].copy()
         continued, starts[0] = not starts[0], True
         together = square
@@ -160,5 +214,10 @@ class _Worst:
             np.maximum(self.worst, each, out=self.worst)
 
     def displacement(self) -> Single:
-        """The worst of each candidate [mm]."""
-        return np.sqrt(self.worst).reshape(self.shape)
+        """The worst of each candidate, infinite where it was given up [mm]."""
+        left = np.sqrt(self.worst)
+        if self.index is None:
+            return left.reshape(self.shape)
+        out = np.full(self.shape[0] * self.shape[1], np.inf, dtype=np.float32)
+        out[self.index] = left
+        return out.reshape(self.shape)

@@ -48,6 +48,8 @@ EFFORTS = (_Effort(20, 6, 22, 14, 8, 40), _Effort(12, 5, 12, 8, 4, 24))
 """For at most `FEW_POLES` frequencies, and for more."""
 SPREAD = 1.6
 """Power by which the grid is denser at short ramps."""
+EVERY = 5
+"""Of the grid, one in so many is looked at first: it bounds the others of its stretch."""
 GROWS, SHRINKS = 1.3, 0.7
 """What a descent's step is multiplied by where it has found something better, and where not."""
 
@@ -125,7 +127,7 @@ class _Search:
         """The grid, a descent from the best of each stretch of T1, and the leaders' to the end."""
         effort = self.effort
         points, stretch = self._candidates(known)
-        value = self._value(points)
+        value = self._best_of_stretches(points, stretch)
         each = [
             np.where(stretch == k, value, np.inf).argmin(axis=1) for k in range(stretch[-1] + 1)
         ]
@@ -138,6 +140,17 @@ class _Search:
         points, value, _ = self._descend(points, value, step, last)
         points, value = (x[:, 0] for x in _best(1, points, value))
         return self._profiles(points)[0], np.isfinite(value)
+
+    def _best_of_stretches(self, points: Array, stretch: NDArray[np.intp]) -> Array:
+        """Values of candidates; those may be infinite that are not the best of their stretch."""
+        some = np.arange(0, len(stretch), EVERY)
+        first = self._value(points[:, some])
+        least = np.full((len(points), int(stretch[-1]) + 1), np.inf)
+        for k in range(least.shape[1]):
+            here = stretch[some] == k
+            if here.any():
+                least[:, k] = first[:, here].min(axis=1)
+        return self._value(points, least[:, stretch])
 
     def _candidates(self, known: list[SymmetricProfiles]) -> tuple[Array, NDArray[np.intp]]:
         """Points of the grid, of four segments and of known profiles; each one's stretch of T1."""
@@ -194,7 +207,8 @@ class _Search:
             near = points[:, :, np.newaxis] + step[:, :, np.newaxis] * turned
             np.maximum(near[..., :2], self.interval, out=near[..., :2])
             np.clip(near[..., 2], 0.0, 1.0, out=near[..., 2])
-            found = self._value(near.reshape(len(near), -1, 3)).reshape(near.shape[:3])
+            bound = np.repeat(value, near.shape[2], axis=1)
+            found = self._value(near.reshape(len(near), -1, 3), bound).reshape(near.shape[:3])
             chosen = found.argmin(axis=2)[..., np.newaxis]
             least = np.take_along_axis(found, chosen, axis=2)[..., 0]
             better = least < value
@@ -204,8 +218,11 @@ class _Search:
             step = step * np.where(better, GROWS, SHRINKS)[..., np.newaxis]
         return points, value, step
 
-    def _value(self, points: Array) -> Array:
-        """Worst residual of candidates, shape (n, k); infinite where one is not legal."""
+    def _value(self, points: Array, bound: Array | None = None) -> Array:
+        """Worst residual of candidates, shape (n, k); infinite where one is not legal.
+
+        It may be infinite, too, where it is above its bound, of the same shape.
+        """
         profiles, legal = self._profiles(points)
         # What is not legal is evaluated as something harmless.
         T1, Ta, T2 = (
@@ -214,7 +231,8 @@ class _Search:
         )
         total = np.where(legal.any(axis=1), self.total, 4.0)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            worst = symmetric_worst(T1, Ta, T2, total, self.objective)
+            bound = np.where(legal, np.inf if bound is None else bound, -1.0)
+            worst = symmetric_worst(T1, Ta, T2, total, self.objective, bound)
             jerk = profiles.jerk
         # Where nothing vibrates the lowest jerk is the best.
         still = ~self.objective.weights.any(axis=1, keepdims=True)
