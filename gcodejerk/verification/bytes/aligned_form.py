@@ -66,7 +66,7 @@ class AlignedReader(StreamReader):
         """Motion codes of what leads into the points."""
         return (0,) if self.rapids.queued[self.i] else (0, 1, 0)
 
-    def _run(self, letters: str) -> re.Pattern[bytes]:
+    def run(self, letters: str) -> re.Pattern[bytes]:
         """Points with these axes, as many decimals as this form has."""
         decimals = INCH_DECIMALS if self.rapids.inch[self.i] else DECIMALS
         # LinuxCNC computes in doubles, in whatever dialect the program was written.

@@ -13,11 +13,12 @@ import numpy as np
 
 from gcodejerk.advice import STAMP_NOTES
 from gcodejerk.machine import Machine
-from gcodejerk.nc import CERTAIN, REASONS, Dialect, Program, Rapids, find_dialect
+from gcodejerk.nc import CERTAIN, REASONS, Dialect, Program, Rapids
 from gcodejerk.verification.bytes.aligned_form import AlignedReader
 from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
 from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.bytes.guarded_form import GuardedReader
+from gcodejerk.verification.bytes.recognised import Recognised
 from gcodejerk.verification.bytes.source import Window, skip_common
 from gcodejerk.verification.findings import Findings, Kind
 
@@ -30,6 +31,9 @@ ALIGNED = ("linuxcnc",)
 
 class Alignment:
     """One walk through an original and what was made of it."""
+
+    remembers = True
+    """Forms of replacements are read once."""
 
     def __init__(
         self,
@@ -48,10 +52,13 @@ class Alignment:
         """Indices of the rapids that have a stream."""
         self.block = b""
         """Text of the block whose stream was found last."""
-        self.dialect = find_dialect(program.dialect)
+        self.dialect = program.language
         self.decimals = decimals_of(machine)
         self.aligned = machine.controller in ALIGNED
         self.guarded = machine.controller_options.override_guard
+        self.recognised: Recognised | None = None
+        if self.remembers and not (self.aligned and self.guarded):
+            self.recognised = Recognised(processed, program.rapids, self.dialect)
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 
@@ -74,10 +81,7 @@ class Alignment:
                 self.kept += 1
             else:
                 text = block[: end - begin]
-                reader = self._reader(i, text)
-                if not self._is_stream(reader, block, i):
-                    return
-                stream = reader.read()
+                stream = self._read(i, block, text)
                 if stream is None:
                     return
                 self.replaced.append(i)
@@ -87,6 +91,26 @@ class Alignment:
             self.at += len(block)
         if self._same(None):
             self._end()
+
+    def _read(self, i: int, block: bytes, text: bytes) -> Stream | None:
+        """Read what stands in the place of a rapid; None where the walk ends."""
+        plain = self.recognised.plain(i, text) if self.recognised is not None else None
+        follows = self._follows(i)
+        if plain is not None and self.recognised is not None:
+            stream = self.recognised.read(i, plain, follows)
+            if stream is not None:
+                return stream
+        reader = self._reader(i, text)
+        if not self._is_stream(reader, block, i):
+            return None
+        before = len(self.found.violations)
+        self.processed.passed = [] if plain is not None else None
+        stream = reader.read()
+        passed, self.processed.passed = self.processed.passed, None
+        fine = stream is not None and passed is not None and len(self.found.violations) == before
+        if fine and self.recognised is not None and stream and plain and passed:
+            self.recognised.learn(reader, stream, plain, follows, b"".join(passed))
+        return stream
 
     def _reader(self, i: int, text: bytes) -> StreamReader:
         """What reads the stream of a rapid."""

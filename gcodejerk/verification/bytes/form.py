@@ -55,6 +55,8 @@ class Stream:
     """The points after these, by letter, F included."""
     lead: list[dict[str, Decimal]] = field(default_factory=list)
     """What stands in front of the points and moves an axis a little, by letter."""
+    own_end: bool = False
+    """The last point has the very words of the block, and the points name no other axes."""
 
     @property
     def ends(self) -> dict[str, Decimal]:
@@ -325,7 +327,7 @@ class StreamReader:
         window, size = self.window, 1 << 13
         while True:
             have = window.fill(size)
-            pattern = self._run(letters)
+            pattern = self.run(letters)
             end = _run_end(pattern, window.data, window.at, window.at + have)
             if have < size or end < window.at + have - 512 or size > LONGEST_STREAM:
                 break
@@ -348,7 +350,7 @@ class StreamReader:
             return None
         return ending, by_letter
 
-    def _run(self, letters: str) -> re.Pattern[bytes]:
+    def run(self, letters: str) -> re.Pattern[bytes]:
         """Points with these axes, spelled as they may be."""
         inch = bool(self.rapids.inch[self.i])
         return run_of(point_pattern(letters, self.decimals, self.dialect, inch), self.line_end)
@@ -370,7 +372,6 @@ class StreamReader:
             self.complain(Kind.FORM, f"{shown} has no decimal point: the control may scale it")
 
     def _tail(self) -> bool:
-        stops = list(self.allowed.behind)
         line = self.window.peek_line().rstrip(b"\r\n")
         words = read_words(line)
         problem = "the modes are not restored" if words is None else self._apply(words)
@@ -387,7 +388,7 @@ class StreamReader:
             self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
         if number := too_long_a_number(line, b""):
             self.complain(Kind.FORM, f"{number[:20].decode()}... has more digits than any word")
-        self.last(more=bool(stops))
+        self.last(more=bool(self.allowed.behind))
         return self._stops()
 
     def _stops(self) -> bool:

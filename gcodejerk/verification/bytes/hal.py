@@ -61,6 +61,7 @@ class Beside:
 class HalAlignment(Alignment):
     """The walk through both programs, for one that asks for rapids by number."""
 
+    remembers = False
     beside: Beside
     opened = False
     """The lines that name the file of samples were read."""

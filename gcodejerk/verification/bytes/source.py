@@ -20,7 +20,7 @@ _SUM = re.compile(rb"gcodejerk stamp [ -~]{1,40}? sum:([0-9a-f]{16})")
 class Window:
     """A place in a file, with what follows it."""
 
-    __slots__ = ("_begun", "_digest", "_ended", "at", "claimed", "data", "file", "line")
+    __slots__ = ("_begun", "_digest", "_ended", "at", "claimed", "data", "file", "line", "passed")
 
     def __init__(self, file: BinaryIO) -> None:
         self.file = file
@@ -32,6 +32,8 @@ class Window:
         self._ended = False
         self._digest = hashlib.blake2b(digest_size=8)
         self._begun = False
+        self.passed: list[bytes] | None = None
+        """Takes what is passed, where somebody wants to know."""
         self.claimed: str | None = None
         """The sum of the whole file, as its stamp states it."""
 
@@ -73,6 +75,8 @@ class Window:
     def skip(self, size: int) -> None:
         """Go on by bytes that are in memory."""
         self.line += self.data.count(b"\n", self.at, self.at + size)
+        if self.passed is not None:
+            self.passed.append(self.data[self.at : self.at + size])
         self.at += size
 
     def take(self, size: int) -> bytes:

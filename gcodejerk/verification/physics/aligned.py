@@ -238,6 +238,10 @@ def _judge_played(motion: _Motion, machine: Machine, found: Findings, reported: 
     _complain(found, played, Kind.PROFILE, off, problem, of_points=False)
     excess = leaves_more(played, machine, moment, rapid_limits(paths, machine))
     for k, left, allowed in zip(*excess.columns(), strict=True):
+        # A copy of today's rapid, asked for by its name: its blocks end on servo periods, where
+        # the rapid's own segments do not, so that it is as good as that only where both settle.
+        if machine.design.profile == "conventional" and left <= machine.design.tolerance:
+            continue
         problem = (
             f"leaves {1e3 * left:.3g} um of vibration, at most {1e3 * allowed:.3g} um are "
             "left by the controller's own rapid"

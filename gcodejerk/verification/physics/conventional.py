@@ -117,16 +117,23 @@ def box_widths(
 
 
 def rapid_position(
-    t: Array, velocity: Array, acceleration: Array, jerk: Array, *, bell: bool = False
+    t: Array,
+    velocity: Array,
+    acceleration: Array,
+    jerk: Array,
+    *,
+    bell: bool = False,
+    owner: NDArray[np.int64],
 ) -> Array:
-    """Position [-] of such moves at moments t since their start."""
+    """Position [-] of such moves at moments t since their start; `owner` is the move of each."""
     peak = peak_velocity(velocity, acceleration, jerk, bell=bell)
     if bell:
-        width = acceleration / jerk
+        peak, acceleration, width = peak[owner], acceleration[owner], (acceleration / jerk)[owner]
         total = 1.0 / peak + peak / acceleration + width
         before, now = (_trapezoid(at, peak, acceleration, 3) for at in (t - width, t))
         return np.where(t >= total, 1.0, (now - before) / width)
-    wide, narrow, rise = box_widths(velocity, acceleration, jerk)
+    widths = box_widths(velocity, acceleration, jerk)
+    peak, wide, narrow, rise = (column[owner] for column in (peak, *widths))
     ramp, total = narrow + rise, wide + narrow + rise
     u = np.clip(np.minimum(t, total - t), 0.0, None)
     full = peak / narrow

@@ -71,9 +71,15 @@ class Paths:
         """Blocks of each stream."""
         return self.end - self.begin - 1
 
+    def rows_of(self, streams: Index) -> Index:
+        """Rows of some of the streams, one stream behind the other."""
+        size = self.end[streams] - self.begin[streams]
+        out: Index = np.repeat(self.begin[streams] - np.cumsum(size) + size, size)
+        return out + np.arange(len(out))
+
     def take(self, streams: Index) -> Paths:
         """Some of the streams."""
-        rows = np.concatenate([np.arange(self.begin[k], self.end[k]) for k in streams.tolist()])
+        rows = self.rows_of(streams)
         size = self.end[streams] - self.begin[streams]
         end = np.cumsum(size)
         return Paths(
@@ -112,6 +118,8 @@ class Reader:
 
     def check_end(self, stream: Stream, block: bytes) -> bool:
         """Compare axes and end with the words of the block, exactly; whether the axes are right."""
+        if stream.own_end and not int(self.rapids.words[stream.rapid]) & ~self.known:
+            return True
         wanted = self._wanted(stream.rapid, block)
         line = stream.line + len(stream.lead) + stream.text.count(b"\n") + len(stream.rest) - 1
         used = set(stream.letters).union(*stream.rest, *stream.lead) - {"F"}
@@ -143,7 +151,7 @@ class Reader:
             scaled = word.whole and word.value and self.dialect.whole_numbers == "machine"
             if axis is not None:
                 wanted[axis] = self._programmed(i, axis, incremental=False)
-            elif word.letter in AXES and scaled:
+            elif word.letter in AXES and (scaled or word.value is None or word.function):
                 increments = bool(self.rapids.incremental[i])
                 wanted[word.letter] = self._programmed(i, word.letter, increments)
             elif word.letter in AXES:

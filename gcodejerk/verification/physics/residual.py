@@ -89,18 +89,22 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
     suspects = np.flatnonzero(left > allowed)
     if not len(suspects):
         return none
+    band = streams.band(modes)
+    rows = paths.rows_of(suspects)
+    part, left, allowed = paths.take(suspects), left[suspects], allowed[suspects]
+    streams = _Streams(part, machine, moment[rows], limits[:, suspects], straight)
     own = streams.lines(modes, streams.own_positions())
     sampled = streams.largest(modes, np.abs(own))
     allowed = np.maximum(allowed, (1.0 + RELATIVE) * sampled + streams.noise(modes))
     if not straight:
         allowed = allowed + streams.largest(modes, streams.coarseness(modes))
-    for factor in streams.band(modes):
+    for factor in band:
         if (left <= allowed).all():
             return none
         near = streams.largest(modes, np.abs(streams.own(modes.at(float(factor)))))
         allowed = np.maximum(allowed, (1.0 + RELATIVE) * near)
-    suspects = np.flatnonzero(left > allowed)
-    return Excess(suspects.astype(np.int64), left[suspects], allowed[suspects])
+    bad = np.flatnonzero(left > allowed)
+    return Excess(suspects[bad].astype(np.int64), left[bad], allowed[bad])
 
 
 class _Streams:
@@ -215,7 +219,7 @@ class _Streams:
                 out[:, a] = self.paths.start[self.owner, a] + share * D[self.owner]
                 continue
             bell = self.machine.planner == BELL
-            share = rapid_position(t, *(column[self.owner] for column in (V, A, J)), bell=bell)
+            share = rapid_position(t, V, A, J, bell=bell, owner=self.owner)
             out[:, a] = self.paths.start[self.owner, a] + share * D[self.owner]
         return out
 

@@ -1,0 +1,288 @@
+"""Replacements whose lines are those of one that was read before, but for the numbers.
+
+Reading a replacement line by line asks what each word would do. The answer depends on the words, on
+the dialect, and on what the columns of the rapids say; where all of that is as it was, and only
+numbers of axes and of F differ, the answer is known. This module owns when that is so: the block is
+plain axis words, in the same order; every column of the rapid, but for its places, is the same; the
+lines around the points are the same to the byte; and the points are spelled as the pattern of
+`form` has it, which they have to match as ever.
+
+Rule: what is not recognised is read line by line, as if this module were not there. What was
+complained of is never learned.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, fields
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc import Dialect, Rapids
+from gcodejerk.verification.bytes.allowed import STANDSTILL
+from gcodejerk.verification.bytes.form import COMMENT_LENGTH, LINE_ENDS, Stream, StreamReader
+from gcodejerk.verification.bytes.source import Window
+
+PLACES = ("line", "begin", "end", "start", "target", "offset")
+"""Columns that say where, and nothing else that the form of a stream depends on."""
+MOST = 500
+"""Forms that are remembered."""
+LONGEST_BLOCK = 60
+AHEAD = 1 << 15
+"""Text in which the end of a stream is looked for. [bytes]"""
+_BLOCK = re.compile(rb"(?:N[0-9]{1,9} ?)?(?:G0?0 ?)?((?:[XYZABCUVW]-?[0-9]{0,9}\.?[0-9]{0,12} ?)+)")
+_AXIS = re.compile(rb"([XYZABCUVW])(-?(?:[0-9]{1,9}\.?[0-9]{0,12}|\.[0-9]{1,12}))(?= |[A-Z]|$)")
+_NUMBERS = re.compile(rb"[-0-9.]+")
+_WORD = re.compile(rb"(?<=[NGXYZABCUVW0-9.])(?=[A-Z])| +")
+_LEAD = re.compile(
+    rb"(G[01]) ([XYZABCUVW])(-?[0-9]{1,9}\.?[0-9]{0,12})(?: (F)([0-9]{1,9}\.[0-9]{1,12}))?"
+)
+_END = re.compile(
+    rb"(G[01](?: G[0-9]{1,3}(?:\.[0-9])?)?)((?: [XYZABCUVW]-?[0-9]{0,9}\.?[0-9]{0,12})+)"
+    rb"(?: F([0-9]{1,9}\.[0-9]{1,12}))?"
+)
+_NUMBER = rb"(-?[0-9]{1,9}\.?[0-9]{0,12})"
+_FEED = rb"([0-9]{1,9}\.[0-9]{1,12})"
+
+
+@dataclass(frozen=True, slots=True)
+class Plain:
+    """A block of nothing but its number, G0 and axis words."""
+
+    key: bytes
+    """The block without its numbers."""
+    head: bytes
+    """The block without its axis words."""
+    axes: tuple[tuple[bytes, bytes], ...]
+    """Letters and numbers, as written."""
+    comment: bytes
+    """What names it, without the brackets."""
+    text: bytes
+
+    @classmethod
+    def of(cls, text: bytes) -> Plain | None:
+        """Take a block apart; None where it is another."""
+        if len(text) > LONGEST_BLOCK:
+            return None
+        match = _BLOCK.fullmatch(text)
+        if match is None:
+            return None
+        axes = _AXIS.findall(match[1])
+        letters = [letter for letter, _ in axes]
+        if len(set(letters)) < len(letters) or len(b"".join(map(b"".join, axes))) != len(
+            match[1].replace(b" ", b"")
+        ):
+            return None
+        head = text[: match.start(1)]
+        return cls(
+            _NUMBERS.sub(b"#", text) + bytes(b"." in number for _, number in axes),
+            head + _AXIS.sub(b"", match[1]),
+            tuple(axes),
+            b" ".join([*_WORD.sub(b" ", head).split(), *(a + number for a, number in axes)]),
+            text,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Form:
+    """Lines of replacements, with holes where numbers stand."""
+
+    commented: bool
+    head: int
+    """0 without the block's other words, 1 as they stand, 2 without blanks at the end."""
+    pattern: re.Pattern[bytes]
+    """Of all behind these."""
+    letters: str
+    lead: tuple[tuple[str, ...], ...]
+    """Letters of the numbers in each line in front of the points."""
+    last: tuple[bytes, ...]
+    """Letters of the axes in the last point."""
+    fed: bool
+    """F stands there."""
+    limit: int
+    """Longest line of points, if their pattern allows longer ones; else 0."""
+
+
+class Recognised:
+    """What was read before, and what is like it."""
+
+    def __init__(self, window: Window, rapids: Rapids, dialect: Dialect) -> None:
+        self.window, self.rapids, self.dialect = window, rapids, dialect
+        self.forms: dict[tuple[bytes, bytes, bool], _Form] = {}
+        self.states = _states(rapids)
+        writing = dialect.writing
+        self.comment = (b"", b"") if writing is None else writing.comment
+        self.usable = writing is not None
+
+    def _key(self, i: int, plain: Plain, follows: bool) -> tuple[bytes, bytes, bool]:
+        """What the form of a replacement depends on, but for its own text."""
+        return self.states[i].tobytes(), plain.key, follows
+
+    def plain(self, i: int, text: bytes) -> Plain | None:
+        """The block of a rapid, if it is one that this module knows about."""
+        if not self.usable or not LINE_ENDS[int(self.rapids.terminator[i])].endswith(b"\n"):
+            return None
+        plain = Plain.of(text)
+        if plain is None:
+            return None
+        if any(letter.decode() in self.dialect.increments for letter, _ in plain.axes):
+            return None
+        if self._points_needed and not all(b"." in number for _, number in plain.axes):
+            return None
+        return plain
+
+    def read(self, i: int, plain: Plain, follows: bool) -> Stream | None:
+        """Read a replacement; None, with nothing passed, where it is not recognised."""
+        form = self.forms.get(self._key(i, plain, follows))
+        if form is None:
+            return None
+        window, line_end = self.window, LINE_ENDS[int(self.rapids.terminator[i])]
+        have = window.fill(AHEAD)
+        data, at = window.data, window.at
+        if data.startswith(plain.text, at):
+            return None
+        opening = b""
+        if form.commented:
+            opening = self.comment[0] + b"gcodejerk: " + plain.comment + self.comment[1]
+            if len(opening) > COMMENT_LENGTH:
+                return None
+            opening += line_end
+        if form.head:
+            opening += (plain.head if form.head == 1 else plain.head.rstrip()) + line_end
+        if not data.startswith(opening, at):
+            return None
+        match = form.pattern.match(data, at + len(opening), at + have)
+        if match is None:
+            return None
+        text = match["points"]
+        if form.limit and max(map(len, text.splitlines())) > form.limit:
+            return None
+        groups = match.groups()
+        lead, k = [], 0
+        for letters in form.lead:
+            lead.append({a: Decimal(groups[k + j].decode()) for j, a in enumerate(letters)})
+            k += len(letters)
+        numbers = groups[k + 1 :]
+        rest = {a.decode(): Decimal(n.decode()) for a, n in zip(form.last, numbers, strict=False)}
+        if form.fed:
+            rest["F"] = Decimal(numbers[len(form.last)].decode())
+        own = [number for _, number in plain.axes]
+        line = (
+            window.line
+            + opening.count(b"\n")
+            + data.count(b"\n", at + len(opening), match.start(1))
+        )
+        ends = list(numbers[: len(own)]) == own and not self.rapids.incremental[i]
+        stream = Stream(i, int(self.rapids.line[i]), line, form.letters, text, [rest], lead)
+        window.skip(match.end() - at)
+        stream.own_end = ends
+        return stream
+
+    def learn(
+        self, reader: StreamReader, stream: Stream, plain: Plain, follows: bool, text: bytes
+    ) -> None:
+        """Remember the form of a replacement that was read without complaint.
+
+        Parameters
+        ----------
+        reader : StreamReader
+            It has read it.
+        stream : Stream
+            What it read.
+        plain : Plain
+            The block.
+        follows : bool
+            As for `read`.
+        text : bytes
+            All of the replacement.
+        """
+        form = self._form(reader, stream, plain, text)
+        if form is None:
+            return
+        if len(self.forms) >= MOST:
+            self.forms.clear()
+        self.forms[self._key(stream.rapid, plain, follows)] = form
+
+    def _form(
+        self, reader: StreamReader, stream: Stream, plain: Plain, text: bytes
+    ) -> _Form | None:
+        """Make holes where the numbers stand."""
+        end = reader.line_end
+        words = [(w.letter, w.begin) for w in reader.block.words if w.letter not in "NG"]
+        points = stream.text
+        if not stream.rest:
+            # The last point is spelled as the others are.
+            points = points[: points.rstrip(b"\r\n").rfind(b"\n") + 1]
+        if (
+            reader.block.comments
+            or [a for a, _ in words] != [a.decode() for a, _ in plain.axes]
+            or not points
+            or len(stream.rest) > 1
+            or text.count(points) != 1
+        ):
+            return None
+        before, _, behind = text.partition(points)
+        front, back = before.split(end)[:-1], behind.split(end)[:-1]
+        opens, closes = self.comment
+        commented = front[:1] == [opens + b"gcodejerk: " + plain.comment + closes]
+        front = front[commented:]
+        head = 0
+        if plain.head.strip() not in (b"", b"G0", b"G00"):
+            head = 1 if front[:1] == [plain.head] else 2
+            if front[:1] != [plain.head if head == 1 else plain.head.rstrip()]:
+                return None
+            front = front[1:]
+        cut = len(front) - len(stream.lead)
+        setup, lead_lines = front[:cut], front[cut:]
+        lead = [_LEAD.fullmatch(line) for line in lead_lines]
+        last = _END.fullmatch(back[0]) if back else None
+        if last is None or None in lead or any(b"gcodejerk" in line for line in setup):
+            return None
+        letters = [word[:1] for word in last[2].split()]
+        moving = set(stream.letters).union(*stream.lead) - {"F"}
+        if letters != [a for a, _ in plain.axes] or not moving <= {a.decode() for a in letters}:
+            return None
+        number = _NUMBER.replace(rb"\.?", rb"\.") if self._points_needed else _NUMBER
+        pattern = b"".join(re.escape(line + end) for line in setup)
+        for one in lead:
+            assert one is not None
+            pattern += re.escape(one[1] + b" " + one[2]) + _NUMBER
+            pattern += (b" F" + _FEED if one[4] else b"") + re.escape(end)
+        run = reader.run(stream.letters).pattern
+        pattern += rb"(?P<points>" + run + rb")" + re.escape(last[1])
+        pattern += b"".join(b" " + letter + number for letter in letters)
+        pattern += (b" F" + _FEED if last[3] else b"") + re.escape(end)
+        pattern += b"".join(re.escape(line + end) for line in back[1:])
+        widest = 25 * len(AXES) + 40
+        return _Form(
+            commented,
+            head,
+            re.compile(pattern),
+            stream.letters,
+            tuple((one[2].decode(), *("F" if one[4] else "")) for one in lead if one),
+            tuple(letters),
+            bool(last[3]),
+            0 if reader.allowed.limit >= widest else reader.allowed.limit,
+        )
+
+    @property
+    def _points_needed(self) -> bool:
+        """Whether every number has to have its decimal point."""
+        return self.dialect.whole_numbers == "machine"
+
+
+def _states(rapids: Rapids) -> NDArray[np.uint8]:
+    """All that the columns say of each rapid but for its places, shape (n, bytes)."""
+    count = len(rapids)
+    step = np.abs(rapids.target - rapids.start)
+    columns = [np.packbits(step > STANDSTILL, axis=1), np.isnan(step).any(axis=1)]
+    for one in fields(rapids):
+        if one.name not in PLACES:
+            columns.append(getattr(rapids, one.name))
+    if not count:
+        return np.zeros((0, 0), dtype=np.uint8)
+    parts = [np.ascontiguousarray(c).view(np.uint8).reshape(count, -1) for c in columns]
+    return np.ascontiguousarray(np.concatenate(parts, axis=1))

@@ -1,0 +1,154 @@
+"""Thousands of streams that are alike: what is judged once must not hide the one that is not."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcodejerk import Machine, find_machine, process, verify
+from gcodejerk.verification import proof
+from gcodejerk.verification.bytes.alignment import Alignment
+from gcodejerk.verification.physics.alike import Alike
+
+VMC = Machine.load(find_machine("vmc"))
+HOLES = 400
+AT = 250
+
+
+def drilling(incremental=False):
+    """Holes in a row, the same way from one to the next."""
+    lines = [b"%", b"G21 G90 G94 G17 G40 G49 G64", b"G0 Z5", b"G0 X-450 Y-100", b"F600"]
+    lines += [b"G91"] if incremental else []
+    for k in range(HOLES):
+        x = b"1.000" if incremental else b"%.3f" % (-449 + k)
+        z = b"8." if incremental else b"5."
+        lines += [
+            b"N%d G0 X%s" % (4 * k + 10, x) if k % 2 else b"G0 X" + x,
+            b"G1 Z%s" % (b"-8." if incremental else b"-3."),
+            b"G0 Z" + z,
+        ]
+    return b"\n".join([*lines, b"M2", b"%", b""])
+
+
+def processed(controller, program):
+    machine = replace(VMC, controller=controller)
+    return machine, process(program, machine, controller=controller, verify=False).output
+
+
+@pytest.fixture
+def one_by_one(monkeypatch):
+    """Verification without anything that is judged once for many."""
+
+    def turn_on():
+        monkeypatch.setattr(Alike, "judge", lambda self, paths, judge, found: judge(paths, found))
+        monkeypatch.setattr(Alignment, "remembers", False)
+
+    return turn_on
+
+
+def digit(output, at):
+    """Another digit in the place of one."""
+    new = b"%d" % ((output[at] - 48 + 4) % 10)
+    return output[:at] + new + output[at + 1 :]
+
+
+def in_point(output, begin, word, place, point):
+    """Change a digit of a word of a point."""
+    lines = [m for m in re.finditer(rb"\nG1 [XZ](-?[0-9.]+) F([0-9.]+)", output[begin:])]
+    at = lines[point].end(word) - place if place else lines[point].start(word)
+    return digit(output, begin + at)
+
+
+DAMAGES = {
+    "a point by thousands of its last digits": lambda out, b: in_point(out, b, 1, 3, 5),
+    "F of a point": lambda out, b: in_point(out, b, 2, None, 7),
+    "the comment": lambda out, b: digit(out, out.index(b")", b) - 1),
+    "two points change places": lambda out, b: _swapped(out, b),
+    "a point is missing": lambda out, b: _without(out, b),
+    "a line in front of the points": lambda out, b: _insert(out, b, b"G61\n"),
+    "a line end": lambda out, b: out[: out.index(b"\n", b)] + b"\r" + out[out.index(b"\n", b) :],
+}
+
+
+def _points(out, b):
+    return [m.span() for m in re.finditer(rb"G1 [XZ]-?[0-9.]+ F[0-9.]+\n", out[b : b + 4000])]
+
+
+def _swapped(out, b):
+    (p, q), (r, s) = _points(out, b)[4:6]
+    return (
+        out[: b + p] + out[b + r : b + s] + out[b + q : b + r] + out[b + p : b + q] + out[b + s :]
+    )
+
+
+def _without(out, b):
+    p, q = _points(out, b)[6]
+    return out[: b + p] + out[b + q :]
+
+
+def _insert(out, b, line):
+    p, _ = _points(out, b)[0]
+    return out[: b + p] + line + out[b + p :]
+
+
+@pytest.mark.parametrize("incremental", [False, True])
+@pytest.mark.parametrize("controller", ["linuxcnc", "haas"])
+def test_one_damaged_stream_among_hundreds_alike_is_found(controller, incremental, one_by_one):
+    program = drilling(incremental)
+    machine, output = processed(controller, program)
+    begins = [m.start() for m in re.finditer(rb"\(gcodejerk: ", output)]
+    assert len(begins) >= 2 * HOLES - 2
+    assert verify(program, output, machine).ok
+    damaged = {}
+    for name, damage in DAMAGES.items():
+        begin = begins[AT + len(damaged) % 2]
+        bad = damage(output, begin)
+        damaged[name] = bad, output.count(b"\n", 0, begin) + 1
+    found = {name: verify(program, bad, machine) for name, (bad, _) in damaged.items()}
+    for name, result in found.items():
+        assert not result.ok, name
+        assert 0 <= result.violations[0].line - damaged[name][1] < 60, name
+    one_by_one()
+    for name, (bad, _) in damaged.items():
+        assert verify(program, bad, machine) == found[name], name
+
+
+def test_what_is_alike_is_judged_once(monkeypatch):
+    program = drilling()
+    machine, output = processed("haas", program)
+    seen = []
+    judge = proof.check_line
+    monkeypatch.setattr(
+        proof,
+        "check_line",
+        lambda paths, *rest: (seen.append(len(paths.begin)), judge(paths, *rest)),
+    )
+    assert verify(program, output, machine).ok
+    assert sum(seen) < 10
+
+
+@pytest.mark.parametrize(
+    "column", ["position", "feed", "displacement", "unit", "speed", "step", "lone", "lead"]
+)
+def test_whatever_enters_the_judgement_is_in_the_key(column):
+    """A change of any column of a stream, in the last digit that is judged, is another stream."""
+    machine, output = processed("haas", drilling())
+    kept = []
+
+    class Spy(Alike):
+        def keys(self, paths):
+            kept.append(paths)
+            return super().keys(paths)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(proof, "Alike", Spy)
+        verify(drilling(), output, machine)
+    paths = kept[0]
+    before = Alike({}).keys(paths)
+    values = np.array(getattr(paths, column))
+    of_rows = column in ("position", "feed")
+    at = (int(paths.begin[7]) + 3 if of_rows else 7, *([0] if values.ndim == 2 else []))
+    values[at] = ~values[at] if column == "lone" else values[at] + 2e-9 if of_rows else 7.0
+    after = Alike({}).keys(replace(paths, **{column: values}))
+    assert [k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b] == [7]
