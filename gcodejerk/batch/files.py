@@ -18,6 +18,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
@@ -30,6 +31,7 @@ PREFIX = ".~gcodejerk-"
 STAMP_WITHIN = 1 << 20
 """A stamp that stands farther from the top is not looked for. [bytes]"""
 _STAMP = re.compile(rb"^[(;] ?gcodejerk stamp [0-9]", re.MULTILINE)
+_PACKED = b"\x1f\x8b"
 _REPORT = re.compile(rb'\s*\{\s*"gcodejerk"\s*:|<!doctype html>\n<!-- gcodejerk report ')
 SPOOL = 8 << 20
 """Standard input and output are held in memory up to this size, then on disk."""
@@ -272,7 +274,13 @@ def is_ours(path: str) -> bool:
 
 def is_report(path: str) -> bool:
     """Whether a file is a report of gcodejerk's."""
-    return _REPORT.match(_head(path)) is not None
+    head = _head(path)
+    if head.startswith(_PACKED):
+        try:
+            head = zlib.decompressobj(wbits=31).decompress(head, len(head))
+        except zlib.error:
+            return False
+    return _REPORT.match(head) is not None
 
 
 def same_content(path: str, file: BinaryIO) -> bool:

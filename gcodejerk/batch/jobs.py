@@ -13,8 +13,8 @@ from __future__ import annotations
 import os
 import tempfile
 import traceback
-from collections.abc import Generator
-from contextlib import ExitStack, closing
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import BinaryIO
@@ -39,6 +39,7 @@ from gcodejerk.errors import EmitError, GcodejerkError
 from gcodejerk.machine import Machine
 from gcodejerk.planning.designs import known_limits
 from gcodejerk.reasons import REASONS
+from gcodejerk.report.columns import FEW, PACKED, packed, write_rapids
 from gcodejerk.report.difference import difference
 from gcodejerk.report.page.document import is_page, write_page
 from gcodejerk.report.records import Record, dump, process_record, summary_of
@@ -241,7 +242,9 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
                 written = sum(file.seek(0, 2) for file in (target, beside) if file is not None)
                 write_page(report, result, machine, job.output, source, written)
             else:
-                report.write(dump(record_of(result, machine, job.output, source, progress)))
+                packs = (job.report or "").lower().endswith(PACKED)
+                with packed(report) if packs else nullcontext(report) as file:
+                    write_report(file, result, machine, job.output, source, progress)
             report.flush()  # a full disk shows here, and not when the output is in its place
         if job.mode == "write" and not (job.in_place or settings.force):
             _refuse_foreign(job, source, target)
@@ -284,6 +287,35 @@ def _left_at(result: Result) -> tuple[tuple[str, tuple[int, ...], int], ...]:
     )
 
 
+def write_report(
+    file: BinaryIO,
+    result: Result,
+    machine: Machine,
+    output: str | None,
+    source: BinaryIO,
+    progress: Progress | None = None,
+) -> None:
+    """Write the JSON report on a result; parameters as for `record_of`."""
+    if len(result.plans) <= FEW:
+        file.write(dump(record_of(result, machine, output, source, progress)))
+        return
+    report = progress or silent
+    limit = known_limits(result.plans, lambda done, total: report("bounds", done, total))
+    more = {} if result.settings is None else settings_record(result.settings)
+    write_rapids(
+        file, result, machine, output, _blocks(result, source), limit, more,
+        lambda done, total: report("reporting", done, total),
+    )  # fmt: skip
+
+
+def _blocks(result: Result, source: BinaryIO) -> Iterator[str]:
+    """The text of each rapid's block."""
+    rapids = result.program.rapids
+    for begin, end in zip(rapids.begin.tolist(), rapids.end.tolist(), strict=True):
+        source.seek(begin)
+        yield source.read(end - begin).decode("latin-1").strip()
+
+
 def record_of(
     result: Result,
     machine: Machine,
@@ -314,11 +346,7 @@ def record_of(
     dict
         Section 4 of the contract.
     """
-    rapids = result.program.rapids
-    blocks = []
-    for begin, end in zip(rapids.begin.tolist(), rapids.end.tolist(), strict=True):
-        source.seek(begin)
-        blocks.append(source.read(end - begin).decode("latin-1").strip())
+    blocks = list(_blocks(result, source))
     limit = None
     if bounds:
         report = progress or silent

@@ -59,9 +59,12 @@ class Outputs:
             raise typer.BadParameter(
                 "-o and --report FILE take one program; use --output-dir and --report DIR/"
             )
-        if one_report is not None and not one_report.lower().endswith((".json", SUFFIX)):
+        if one_report is not None and not one_report.lower().endswith(
+            (".json", ".json.gz", SUFFIX)
+        ):
             raise typer.BadParameter(
-                f"--report {one_report}: a report is a file .json, or a page .html to look at"
+                f"--report {one_report}: a report is a file .json.gz or .json, or a page .html to "
+                "look at"
             )
 
     def jobs(

@@ -64,7 +64,7 @@ def process(
         str | None,
         typer.Option(
             metavar="FILE",
-            help="write a report: .html to look at, .json for programs; DIR/: a .json for each",
+            help="write a report: .html to look at, .json(.gz) for programs; DIR/: one for each",
         ),
     ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,

@@ -275,15 +275,13 @@ def process_record(
     )
     rapids = result.program.rapids
     rows = [
-        {
-            "line": int(rapids.line[row]),
-            "block": blocks[row],
-            "start": _positions(rapids, rapids.start[row], row),
-            "end": _positions(rapids, rapids.target[row], row),
-        }
-        | records.motion(row)
-        for row in range(len(rapids))
+        place_record(rapids, row, blocks[row]) | records.motion(row) for row in range(len(rapids))
     ]
+    return process_head(result, machine, output) | {"rapids": rows}
+
+
+def process_head(result: Result, machine: Machine, output: str | None) -> Record:
+    """The report on one processed program, but for its rapids."""
     return _head(machine, result.controller, result.form, result.profile) | {
         "input": result.program.name,
         "output": output,
@@ -291,7 +289,16 @@ def process_record(
         "summary": summary_of(result),
         "notes": list(result.notes),
         "verified": None if result.verification is None else result.verification.ok,
-        "rapids": rows,
+    }
+
+
+def place_record(rapids: Rapids, row: int, block: str) -> Record:
+    """Where a rapid stands in its program, and from where to where it leads."""
+    return {
+        "line": int(rapids.line[row]),
+        "block": block,
+        "start": _positions(rapids, rapids.start[row], row),
+        "end": _positions(rapids, rapids.target[row], row),
     }
 
 

@@ -1,5 +1,7 @@
 """The JSON report: its schema, its numbers, and strict JSON."""
 
+import gzip
+import io
 import json
 from importlib.resources import files
 from pathlib import Path
@@ -7,9 +9,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from gcodejerk.batch import jobs
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.planning.move import plan_move
 from gcodejerk.reasons import Reason
+from gcodejerk.report import columns
 from gcodejerk.report.records import dump, move_record, process_record, stream_csv
 from gcodejerk.rewrite.pipeline import process
 
@@ -83,3 +87,23 @@ def test_independent_positioning_reports_segments_for_each_axis():
     segments = record["rapids"][0]["segments"]
     assert set(segments) == {"X", "Z"}
     assert sum(s["duration"] for s in segments["Z"]) < sum(s["duration"] for s in segments["X"])
+
+
+@pytest.mark.parametrize("machine", ["vmc", "router"])
+def test_report_of_a_large_program_says_the_same_line_by_line(machine, monkeypatch):
+    machine = Machine.load(find_machine(machine))
+    program = b"G21 G90 G94 G17 G40 G64\nG0 X0 Y0 Z0\nF600\n" + b"".join(
+        b"G0 X-%d Y-%d\nG1 Z-3\nG0 Z0 ; \xe9\n" % (5 * (k % 7), k % 3) for k in range(40)
+    )
+    result, source = process(program, machine), io.BytesIO(program)
+    whole = dump(jobs.record_of(result, machine, "out", source))
+    monkeypatch.setattr(jobs, "FEW", 10)
+    monkeypatch.setattr(columns, "AT_ONCE", 17)
+    monkeypatch.setattr(columns, "REMEMBERED", 5)
+    plain, squeezed = io.BytesIO(), io.BytesIO()
+    jobs.write_report(plain, result, machine, "out", source)
+    with columns.packed(squeezed) as file:
+        jobs.write_report(file, result, machine, "out", source)
+    assert json.loads(plain.getvalue()) == json.loads(whole)
+    assert gzip.decompress(squeezed.getvalue()) == plain.getvalue()
+    assert plain.getvalue().count(b"\n") == len(result.plans) + 2
