@@ -89,7 +89,7 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.EXPRESSION: Explanation(
         "an axis word is a variable or an expression; where it ends is known if every variable is",
-        "write the numbers: post without variables (a computed X is rewritten nowhere)",
+        "let the program set its variables, to whole increments; LinuxCNC: write the numbers",
     ),
     Reason.DECIMAL_POINT: Explanation(
         "X100 is 100 mm or 0.1 mm, as a parameter of the control decides",
@@ -101,13 +101,14 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.FRAME_CHANGE: Explanation(
         "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
-        "give G43, G54.. and their kin a block of their own and state `program.offsets`; retract "
-        "with a plain G0 instead of G28, G30 and G53",
+        "give G43 and its kin a block of its own and state `program.offsets`, with which G54.. may "
+        "stand beside a rapid; retract with a plain G0 instead of G28, G30 and G53",
     ),
     Reason.NOT_FOLLOWED: Explanation(
-        "what runs there may have changed every mode, and since then nobody has said G40",
+        "what runs there may have changed every mode, and since then nobody has said G40; or it is "
+        "a synchronized action of Siemens, which may act at any time",
         "the notes name the line: state G40 and the other modes (G90, G21, the work system) behind "
-        "it",
+        "it; take synchronized actions out",
     ),
     Reason.CUTTER_COMPENSATION: Explanation(
         "G41 or G42 is, or may be, in force: the real path differs from the programmed one",
@@ -161,8 +162,8 @@ EXPLAINED: dict[Reason, Explanation] = {
         "no absolute word has yet said where an axis stands, or something may have moved it: tool "
         "change, offset, homing, probing, somebody who jogs at M0 or M1",
         "usual for the first move of each axis; `program.start` says where the axes stand, "
-        "`program.offsets` what work offsets and tool lengths are, `program.resume_after_stop` "
-        "what happens at M0",
+        "`program.offsets` what work offsets and tool lengths are, `program.home` where G28 leads, "
+        "`program.tool_change` where M6 does, `program.resume_after_stop` what happens at M0",
     ),
     Reason.ROTARY_WAY: Explanation(
         "an absolute rapid of A, B or C, which may go the short way round, or by the sign of its "
@@ -177,7 +178,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.OTHER_WORDS: Explanation(
         "a word of which the dialect's table does not know whether the control runs it before the "
         "motion or behind it: M5 on Fanuc, Haas and Siemens, where the builder chooses",
-        "give the other words a block of their own",
+        "say when the M code runs (`program.m_before`, `program.m_after`), or give it a block of "
+        "its own",
     ),
     Reason.FEED_UNKNOWN: Explanation(
         "a later feed move relies on an F, or on G94 or G95, that is not known here",

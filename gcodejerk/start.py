@@ -79,6 +79,14 @@ class Start:
     spindle: str | None = None
     """What M3 turns on: a ``mill``, or a beam: ``laser``, ``plasma``; None: unknown where the
     dialect's controls drive beams too, a mill elsewhere."""
+    home: Mapping[str, float] = field(default_factory=dict)
+    """Axis -> where G28 leads it, in machine coordinates [mm, deg]."""
+    tool_change: Mapping[str, float] | None = None
+    """Axis -> where it stands behind M6, in machine coordinates [mm, deg]; the others do not move.
+    None: nobody knows where the axes stand."""
+    m_before: frozenset[int] = frozenset()
+    m_after: frozenset[int] = frozenset()
+    """M codes that the control runs before the motion of their block, and behind it."""
     harmless: frozenset[str] = frozenset()
     """Codes, for example ``M150``, of which the owner says that they move nothing and change no
     mode and no frame; one that the dialect's table knows means what it says there."""

@@ -242,6 +242,13 @@ class ProgramStart:
     """Where the axes stand behind M0 and M1: ``same``, ``unknown``, None: as usual there."""
     harmless: tuple[str, ...] = ()
     """Codes (``M62``, ``G187``) that move nothing and change nothing that a rapid rests on."""
+    home: Mapping[str, float] = field(default_factory=dict, hash=False)
+    """Axis -> where G28 leads it, in machine coordinates. [mm] or [deg]"""
+    tool_change: Mapping[str, float] | None = field(default=None, hash=False)
+    """Axis -> where it stands behind M6, in machine coordinates; None unknown. [mm] or [deg]"""
+    m_before: tuple[str, ...] = ()
+    m_after: tuple[str, ...] = ()
+    """Codes (``M8``) that the control runs before the motion of their block, and behind it."""
 
 
 @dataclass(frozen=True, slots=True)

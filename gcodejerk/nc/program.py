@@ -20,10 +20,11 @@ from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.outline import find_outline, read_body, refers, seekable
 from gcodejerk.nc.flow.subprograms import Calls
+from gcodejerk.nc.following_reader import FollowingReader, worth_following
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.neighbours import with_neighbours
 from gcodejerk.nc.interpreter.rapids import Rapids
-from gcodejerk.nc.interpreter.runner import Finding
+from gcodejerk.nc.interpreter.runner import Finding, Runner
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.block import Block, Line
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK, Chunk, read_chunks
@@ -44,6 +45,8 @@ class Program:
 
     name: str
     dialect: str
+    language: Dialect
+    """That dialect, as the machine's owner says that his control runs it."""
     size: int
     """Of the file, in bytes."""
     digest: bytes
@@ -51,6 +54,8 @@ class Program:
     lines: int
     blocks: int
     """Lines that hold at least one word."""
+    steps: int
+    """Blocks that were run one by one, every pass of a loop counted: what reading costs."""
     newline: bytes
     """The first line end, b"\\n" where there is none."""
     stamp: int | None
@@ -144,9 +149,9 @@ def read_program(
     reader, file = open_reader(file, name, dialect, start)
     origin = file.tell() if neighbours else 0
     program = follow(read_chunks(file, name), reader, progress, fast)
-    if not neighbours:
-        return program
-    return replace(program, rapids=with_neighbours(file, origin, program.rapids))
+    if neighbours:
+        program = replace(program, rapids=with_neighbours(file, origin, program.rapids))
+    return program
 
 
 def open_reader(
@@ -168,16 +173,23 @@ def open_reader(
             f"choose the dialect of the lathe's control: {', '.join(lathe_dialects())}",
             Place(name),
         )
-    reader = Reader(name, chosen, start)
-    if why:
-        reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
-    if refers(chosen):
+    if not refers(chosen):
+        reader = Reader(name, chosen, start)
+    else:
         file = source = seekable(file)
         origin = source.tell()
         outline = find_outline(source, chosen, name)
-        reader.refer(
-            Calls(reader.runner, outline, lambda mark: read_body(source, origin, mark, chosen))
-        )
+
+        def calls(runner: Runner) -> Calls:
+            return Calls(runner, outline, lambda mark: read_body(source, origin, mark, chosen))
+
+        if worth_following(source, chosen):
+            reader = FollowingReader(name, chosen, start, calls)
+        else:
+            reader = Reader(name, chosen, start)
+            reader.refer(calls(reader.runner))
+    if why:
+        reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
     return reader, file
 
 
@@ -207,10 +219,12 @@ def follow(
     return Program(
         name=name,
         dialect=chosen.name,
+        language=chosen,
         size=size,
         digest=digest.digest(),
         lines=lines,
         blocks=reader.blocks,
+        steps=reader.runner.steps,
         newline=newline,
         stamp=stamp,
         insert_at=reader.insert_at,

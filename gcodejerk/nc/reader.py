@@ -38,7 +38,7 @@ class Reader:
 
     def __init__(self, name: str, dialect: Dialect, start: Start) -> None:
         self.name = name
-        self.dialect = dialect = dialect.with_harmless(start.harmless)
+        self.dialect = dialect = dialect.set_up(start)
         self.runner = Runner(name, dialect, start)
         self._spindle = start.spindle
         self.flow = Flow()
@@ -283,12 +283,16 @@ class Reader:
 
     def finish(self) -> None:
         """Take the end of the file."""
-        log = self.log
-        log.dark = darkness(self.dialect, self._spindle, log.habits, log.outputs)
+        self._finish_log()
         if self._structure:
             self._replay()
         if self.calls is not None:
             self.calls.finish()
+
+    def _finish_log(self) -> None:
+        """Say what only the whole program tells."""
+        log = self.log
+        log.dark = darkness(self.dialect, self._spindle, log.habits, log.outputs)
 
     def findings(self, rapids: Rapids) -> tuple[Finding, ...]:
         """Collect what the user should know."""

@@ -144,6 +144,25 @@ VOCABULARIES: dict[str, Vocabulary] = {
         "M2",
         beside=("M8", "M3 S500", "F77", ""),
     ),
+    "rs274": Vocabulary(
+        ("G21 G90 G17 G94", "G0 X0 Y0 Z5 F200"),
+        (
+            *("G90", "G91", "G54", "G55", "G93", "G94", "G17", "G18", "G4 P1", "M9", "G20", "G21"),
+            *("G28 Z5", "G53 G0 Z0", "G92 X0", "G92.1", "G43 H1", "G49", "G80", "G61", "G64"),
+            *("G64 P0.1 G91", "G2 X5 Y5 R20 F60", "/G1 X5 F90", "G10 L2 P1 X0", "T1 M6", "M3 S90"),
+            *("M5", "M0", "G41 D1", "G40", "G51 X2", "G50", "G7", "G8", "G98 G0 X7", "G187", "F90"),
+        ),
+        (*_ROUND, "; X99"),
+        "M30",
+    ),
+    "iso-mill": Vocabulary(
+        ("O1234 (part)", "G21 G17 G40 G49 G80 G90 G94 G64", "G0 X0. Y0. Z5. F200."),
+        (*_FANUC_MODES, "M31", "G103 P1", "G103", "M97 P20", "G12 I5. D1"),
+        _ROUND,
+        "M30",
+        point=True,
+        drills=True,
+    ),
     "mach": Vocabulary(
         ("G21 G90 G17 G94 G64", "G0 X0 Y0 Z5 F200"),
         (

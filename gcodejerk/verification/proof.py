@@ -6,6 +6,7 @@ own docstring (`gcodejerk.verification`).
 
 from __future__ import annotations
 
+import hashlib
 import io
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -15,7 +16,7 @@ from typing import BinaryIO
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Dialect, Program, Start, find_dialect, read_program
+from gcodejerk.nc import Dialect, Program, Start, read_program
 from gcodejerk.verification.bytes.alignment import Alignment
 from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.bytes.guarded_form import check_guarded
@@ -24,6 +25,7 @@ from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
 from gcodejerk.verification.findings import Findings, Kind, Verification
 from gcodejerk.verification.physics.aligned import Reported, check_aligned, in_own_steps
+from gcodejerk.verification.physics.alike import Alike
 from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
 from gcodejerk.verification.rows.files import RowsFile, rows_format
@@ -150,6 +152,7 @@ def verify_files(
     table: bool = False,
     reported: Reported | None = None,
     beside: BinaryIO | None = None,
+    program: Program | None = None,
 ) -> Verification:
     """Compare open files; see `verify`.
 
@@ -175,6 +178,9 @@ def verify_files(
         along the path [mm/s^3]; streams for LinuxCNC are held to it.
     beside : BinaryIO, optional
         The file of samples that stands beside the processed program (controller `linuxcnc-hal`).
+    program : Program, optional
+        The original as `nc` reads it with the same dialect, start and machine, for who has just
+        read it; taken if the file still has its digest, and read anew if not.
 
     Returns
     -------
@@ -188,7 +194,8 @@ def verify_files(
     """
     start = machine.program_start() if start is None else start
     begin = original.tell()
-    program = _read(original, machine, names[0], dialect, start)
+    if program is None or _digest(original) != program.digest:
+        program = _read(original, machine, names[0], dialect, start)
     found = Findings(most)
     control = None if table else settings_note(processed)
     if control is not None:
@@ -218,17 +225,26 @@ def _judge_program(
 ) -> tuple[list[int], int]:
     """Compare programs; which rapids were replaced, and how many lines were kept."""
     alignment = Alignment(Window(original), Window(processed), program, machine, found)
-    reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
+    reader = Reader(program.rapids, machine, found, program.language)
     stride = stride_of(machine)
+    alike = Alike(reported if alignment.aligned else {})
+
+    def judge(paths: Paths, found: Findings) -> bool:
+        check_line(paths, machine, found)
+        if alignment.aligned:
+            check_aligned(paths, machine, found, reported)
+        elif not _moves(paths):
+            return False
+        else:
+            check_dynamics(paths, machine, stride, found)
+        return True
+
     for streams in _batches(_checked(alignment, reader)):
         paths = reader.paths(streams)
         if alignment.aligned:
             paths = in_own_steps(paths)
-        _check_lines(paths, program, machine, found)
-        if alignment.aligned:
-            check_aligned(paths, machine, found, reported)
-        elif _moves(paths):
-            check_dynamics(paths, machine, stride, found)
+        check_rapids(paths, program.rapids, machine, found)
+        alike.judge(paths, judge, found)
     if alignment.guarded and alignment.aligned:
         lines = program.rapids.line[alignment.replaced].tolist()
         check_guarded(original, program.dialect, lines, found)
@@ -258,7 +274,7 @@ def _judge_pair(
         return [], 0
     alignment = HalAlignment(Window(original), Window(processed), program, machine, found)
     alignment.beside = about
-    reader = Reader(program.rapids, machine, found, find_dialect(program.dialect))
+    reader = Reader(program.rapids, machine, found, program.language)
     samples = SampleReader(beside, about, program.rapids, machine, found)
     for streams in _batches(_checked(alignment, reader), HAL_BYTES):
         written = reader.paths(streams)
@@ -305,6 +321,16 @@ def _read(
     )
     original.seek(begin)
     return program
+
+
+def _digest(original: BinaryIO) -> bytes:
+    """What the rest of a file holds, as `Program.digest` has it; it stands where it stood."""
+    begin = original.tell()
+    digest = hashlib.blake2b(digest_size=16)
+    while data := original.read(BATCH_BYTES):
+        digest.update(data)
+    original.seek(begin)
+    return digest.digest()
 
 
 def _checked(alignment: Alignment, reader: Reader) -> Iterator[Stream]:

@@ -6,13 +6,18 @@ segments of those that have one law for all axes.
 
 from __future__ import annotations
 
+import gzip
 import json
+import zlib
 from pathlib import Path
 
 import numpy as np
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.verification.physics.aligned import Reported
+
+PACKED = b"\x1f\x8b"
+"""How gzip begins."""
 
 
 def read_reported(path: str | Path) -> Reported:
@@ -34,7 +39,9 @@ def read_reported(path: str | Path) -> Reported:
         The file cannot be read, or is no such report.
     """
     try:
-        rapids = json.loads(Path(path).read_text(encoding="utf-8"))["rapids"]
+        data = Path(path).read_bytes()
+        data = gzip.decompress(data) if data.startswith(PACKED) else data
+        rapids = json.loads(data.decode("utf-8"))["rapids"]
         return {
             int(rapid["line"]): np.array(
                 [[float(s["duration"]), float(s["jerk"])] for s in rapid["segments"]]
@@ -46,7 +53,7 @@ def read_reported(path: str | Path) -> Reported:
         raise VerifyError(
             f"cannot read '{path}': {error.strerror}", "give the name of a file that can be read"
         ) from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, EOFError, zlib.error) as error:
         raise VerifyError(
             f"'{path}' is no report of process ({type(error).__name__}: {error})",
             "give the file that `process --report FILE.json` wrote",

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 from gcodejerk.machine import Axis, Machine
-from gcodejerk.nc import Dialect, Program, find_dialect
+from gcodejerk.nc import Dialect, Program
 from gcodejerk.verification.bytes.settings_form import CONTROLS, PATH, Control, Key, Values
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.findings import Findings, Kind
@@ -87,7 +87,7 @@ class _Walk:
     ) -> None:
         self.original, self.processed = original, processed
         self.program, self.machine, self.control, self.found = program, machine, control, found
-        self.dialect = find_dialect(program.dialect)
+        self.dialect = program.language
         self.newline = program.newline
         self.prefix: list[bytes] = []
         self.restore: list[bytes] = []

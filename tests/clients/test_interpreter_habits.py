@@ -145,3 +145,17 @@ def test_a_rotary_axis_turns_as_the_interpreter_turns_it(tmp_path_factory, words
         assert rapids.target[certain, 3] == pytest.approx(
             [real[line - 2] for line in rapids.line[certain]], abs=1e-4
         )
+
+
+@pytest.mark.parametrize(
+    "way", ["G28", "G28 X5 Y5 Z9", "G91 G28 Z0\nG90\nG28 X5 Y5", "G91 G28 X1 Y2 Z3\nG90"]
+)
+def test_g28_leads_home_from_everywhere(way, tmp_path):
+    """Its parameters are all 0 here, and where that is, the work offset says."""
+    offsets = {"X": -100.0, "Y": -50.0, "Z": -20.0}
+    head = "G10 L2 P1 X-100 Y-50 Z-20\nG54\nG0 X5 Y5 Z5\n"
+    home = ends(f"{head}{way}\nM2\n", tmp_path, "home.ngc")
+    start = replace(AT_ZERO, offsets={"G54": offsets}, home=dict.fromkeys("XYZ", 0.0))
+    *_, (_, positions, _), _ = trace(io.BytesIO(f"G0 X5 Y5 Z5\n{way}\nM2\n".encode()), start=start)
+    assert home == pytest.approx(positions[:3])
+    assert home == pytest.approx((100.0, 50.0, 20.0))

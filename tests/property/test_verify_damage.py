@@ -488,7 +488,8 @@ STRIDE = 2
 def missed(dialect, program, pick, stride=1):
     """Kinds of damage to a processed program that nobody notices; None if it has no room for it."""
     # The form of LinuxCNC's own streams has damages of its own.
-    machine, controller = machine_for(dialect), dialect.split("-")[0].replace("linuxcnc", "mach")
+    own = {"linuxcnc": "mach", "rs274": "mach", "iso-mill": "haas"}
+    machine, controller = machine_for(dialect), own.get(dialect, dialect.split("-")[0])
     output = process(program, machine, verify=False, controller=controller, dialect=dialect).output
     text = Damaged(program, output, dialect)
     if not (text.inner and text.tails and text.kept):

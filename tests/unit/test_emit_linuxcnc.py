@@ -3,10 +3,13 @@
 import re
 from decimal import Decimal
 from itertools import pairwise
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from gcodejerk import Machine, plan_move, process
+from gcodejerk.emit import linuxcnc
 from gcodejerk.errors import EmitError
 
 TEXT = """
@@ -386,3 +389,18 @@ def test_what_the_machine_file_says_of_the_control_is_not_asked_for_again():
         for machine in map(Machine.loads, (text, text + OPTIONS % "max_acceleration: {X: 2520}"))
     ]
     assert raised == [True, False]
+
+
+@pytest.mark.parametrize("speed", [20.0, 600.0, 1023.9, 1031.506, 2060.1, 9000.0])
+@pytest.mark.parametrize("inch", [False, True])
+def test_blocks_of_one_speed_have_feeds_that_are_two_speeds_for_the_control(speed, inch):
+    knots = np.array([[0, 0, 2, 4, 6, 8]])
+    batch = SimpleNamespace(
+        path_speed=np.full((1, 6), speed), grid=SimpleNamespace(knots=knots), moves=np.array([0])
+    )
+    feed = linuxcnc._feeds(batch, SimpleNamespace(inch=np.array([inch])))[0, 2:]
+    decimals = linuxcnc.INCH_FEED_DECIMALS if inch else linuxcnc.FEED_DECIMALS
+    told = [float(str(Decimal(int(f)).scaleb(-decimals))) for f in feed]
+    speeds = [f * (25.4 if inch else 1.0) / 60.0 for f in told]
+    assert all(a != b for a, b in pairwise(speeds))
+    assert speeds == pytest.approx([speed] * 4, abs=1e-9)

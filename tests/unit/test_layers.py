@@ -65,6 +65,7 @@ ROOMS = {
  <- interpreter
  <- flow
  <- reader
+ <- following_reader
  <- program
  <- feed_moves
 """),
@@ -82,7 +83,10 @@ NEVER = {
     "emit": {"verification", "report"},
 }
 """What the picture alone would allow, or what matters enough to be said twice."""
-SECOND_READER = ("reading", "sorting", "known", "coding", "drilling", "tracking")
+SECOND_READER = (
+    *("reading", "sorting", "known", "coding", "drilling", "tracking"),
+    *("operating", "computing", "routes", "walking"),
+)
 """Modules of `verification` that read programs without the help of `nc`, but for its tables."""
 FOREIGN = {
     "yaml": {"machine"},

@@ -35,6 +35,9 @@ SHARED = Path(__file__).resolve().parents[2].parent / "shared"
         (b"%\nO1\nN10G90G5.1Q1\nN70IF[#101GT10.]GOTO100\n", "fanuc"),
         (b'N30MSG("A")\nG0X1\n', "siemens"),
         (b"(Post Processor: mach3_mach4_post)\nG0 X1\n", "mach"),
+        (b"%\nO1000\nT0101\nG50 S2500\nG0 X1.\n", "fanuc-lathe-a"),
+        (b"%O1200(PART)\nG92 S500\nG97 S300 M3\nG90 G0 X1.\n", "fanuc-lathe-b"),
+        (b"(made for LinuxCNC)\n(keeps compatibility with Mach3)\nG0 X1\n", "linuxcnc"),
     ],
 )
 def test_the_dialect_is_found(text, dialect):
@@ -44,10 +47,39 @@ def test_the_dialect_is_found(text, dialect):
 
 
 @pytest.mark.parametrize(
+    ("text", "dialect"),
+    [
+        (b"%\r\nO1000\r\nG90 G0 X1.\r\n", "iso-mill"),
+        (b"%\n\nO1000 (PART)\nG90 G0 X1.\n", "iso-mill"),
+        (b"(Exported by a program)\nG90 G0 X1\n", "rs274"),
+        (b"; roughing\nG90 G0 X1\n", "rs274"),
+        (b"G21\r\nG90\r\nG0 X1\r\n", "rs274"),
+        (b"G0 X1.23456 Y2\n", "rs274"),
+        (b"G17 G91.1 G90\nG0 X1.\n", "rs274"),
+    ],
+)
+def test_what_several_read_alike_is_read_so(text, dialect):
+    found, why = detect_dialect(text, "part.nc")
+    assert found.name == dialect
+    assert "alike" in why
+    with pytest.raises(ProgramError, match="cannot be told"):
+        detect_dialect(text, "part.nc", lathe=True)
+
+
+def test_commands_of_other_programs_are_none_of_grbls():
+    """An editor's own lines begin with a $, too."""
+    text = b"%\n$AddRegPart 1 X2.925\n$Inches (Alarm)\n{$HOLES1=8}\nG0 X1.\n"
+    with pytest.raises(ProgramError, match="cannot be told"):
+        detect_dialect(text, "part.nc")
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         (b"G21 G90\nG0 X1\nM30\n", "cannot be told"),
-        (b"%\nO1000\nG21 G90\nG0 X1.\nM30\n%\n", "fanuc, haas and mach"),
+        (b"G21\nG90\nG0 X1\nL20\nCALLSUB(5)\n", "cannot be told"),
+        (b"O1000\nG21 G90\nG0 X1.\nM30\n", "cannot be told"),
+        (b"%\nO1000\nG21 G90\nT0101\nG96 S100\nG0 X1.\nM30\n%\n", "cannot be told"),
         (b"M82\nM104 S200\nG0 X1\n", "klipper: printer codes"),
         (b"(FANUC OR SIEMENS)\nG0 X1\n", "several dialects"),
         (b"0 BEGIN PGM PART MM\n1 L X+1 FMAX\n", "Klartext"),

@@ -190,10 +190,15 @@ def test_the_number_of_repeats_has_the_letter_of_the_dialect():
 def test_g28_leaves_only_the_named_axes_unknown():
     program = b"G0 X5. Y5. Z5.\nG91 G28 Z0.\n"
     for dialect in ("fanuc", "haas", "mach", "grbl"):
-        # Haas cancels the tool length, which may have been that of any axis.
-        stands = (5.0, 5.0, NOWHERE) if dialect != "haas" else (NOWHERE, NOWHERE, NOWHERE)
-        assert same(end(program, dialect), stands), dialect
+        assert same(end(program, dialect), (5.0, 5.0, NOWHERE)), dialect
         assert same(end(program + b"G90 X7. Y7.\n", dialect), (7.0, 7.0, NOWHERE)), dialect
+
+
+def test_g28_of_haas_cancels_a_tool_length_that_may_have_been_that_of_any_axis():
+    program = b"G0 X5. Y5. Z5.\nG91 G28 Z0.\n"
+    start = replace(KNOWN, positions={}, offsets={}, startup="G90 G21")
+    assert same(end(program, "fanuc", start), (5.0, 5.0, NOWHERE))
+    assert same(end(program, "haas", start), (NOWHERE, NOWHERE, NOWHERE))
 
 
 def test_g28_on_the_line_of_g0_is_fanucs_and_no_linuxcncs():
@@ -294,7 +299,8 @@ def test_axis_letters_of_other_commands_move_nothing():
 def test_siemens_words_with_names():
     at = end(b"G90\nG0 X10 Y5 Z3\nG0 X=IC(5) Y=AC(7)\n", "siemens", SIEMENS)
     assert same(at, (15.0, 7.0, 3.0))
-    assert math.isnan(end(b"G90\nG0 X10\nTRANS X5\n", "siemens", SIEMENS)[0])
+    assert end(b"G90\nG0 X10\nTRANS X5\n", "siemens", SIEMENS)[0] == 5.0
+    assert math.isnan(end(b"G90\nG0 X10\nROT Z5\n", "siemens", SIEMENS)[0])
     assert math.isnan(end(b"G90\nG0 X10\nMYSUB(3)\n", "siemens", SIEMENS)[0])
     assert end(b'G90\nG0 X10\nMSG("G0 X5")\n', "siemens", SIEMENS)[0] == 10.0
     turned = Start(positions={"X": 0.0, "Z": 0.0}, startup="G71 G90")

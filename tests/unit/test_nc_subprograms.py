@@ -68,7 +68,7 @@ def test_rapids_whose_start_differs_between_calls_are_left_alone():
 
 @pytest.mark.parametrize(
     "line",
-    [b"M98 P2000", b"M98 P#1", b"M98", b"G65 P1000 X1.", b"G66 P9000", b"M98 P1000 Q5", b"M198 P1"],
+    [b"M98 P2000", b"M98 P#1", b"M98", b"G65 P2000 X1.", b"G66 P9000", b"M98 P1000 Q5", b"M198 P1"],
 )
 def test_what_cannot_be_followed_leaves_nothing_known(line):
     found = reasons(line + b"\nG90 G21 G17 G40 G0 X3.\n" + SUB)
@@ -128,7 +128,10 @@ def test_behind_a_target_holds_what_is_stated_there():
     found = reasons(text)
     assert certain(found, 1)
     assert not certain(found, 3)
-    assert (found[5], found[6]) == (Reason.START_UNKNOWN, None)
+    assert (found[5], found[6]) == (None, None)
+    # ... and so it is where a jump leads to nowhere, and nothing is followed
+    found = reasons(b"IF [#1 EQ 1] GOTO 99\n" + text)
+    assert (found[6], found[7]) == (Reason.START_UNKNOWN, None)
 
 
 def test_computed_jump_may_lead_to_every_number():
@@ -141,7 +144,7 @@ def test_loop_knows_what_it_states():
     text = b"WHILE [#1 LT 3] DO 1\nG0 X1.\nG21 G90 G94 G17 G40\nG0 X0. F9.\nX2.\n#1=#1+1\n"
     text += b"END 1\nG0 X9.\n"
     found = reasons(text)
-    assert (found[4], found[5]) == (Reason.START_UNKNOWN, None)
+    assert (found[4], found[5]) == (None, None), "X stands at 1 on every pass"
     assert not certain(found, 2)
     assert not certain(found, 8)
 
@@ -196,7 +199,7 @@ def test_siemens_label_is_a_comment_unless_something_jumps():
     found = reasons(text + b"IF R1>5 GOTOB LABEL1\nX4\n", "siemens", SIEMENS)
     assert certain(found, 1)
     assert not certain(found, 3)
-    assert not certain(found, 6)
+    assert certain(found, 6), "on every way that leads there, X stands at 3"
 
 
 def test_siemens_condition_keeps_what_is_known_where_it_goes_on():

@@ -1,8 +1,11 @@
 """One line at a time: words, comments, and what is wrong with it."""
 
+import numpy as np
 import pytest
 
-from gcodejerk.nc import parse_block
+from gcodejerk.nc import find_dialect, parse_block
+from gcodejerk.nc.dialects import DIALECTS
+from gcodejerk.nc.text import tokenizer
 
 
 def words(text):
@@ -88,3 +91,23 @@ def test_o_words(text, keyword, name):
 
 def test_assignments_are_listed():
     assert parse_block(b"#1=5 #<a>=[#1+1] X1").assigns == ("1", "<a>")
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_plain_blocks_are_read_the_quick_way_as_the_careful_one_reads_them(dialect):
+    random = np.random.default_rng(12)
+    taken = 0
+    for _ in range(300):
+        words = [f"N{random.integers(1, 10**6)}"] * (random.random() < 0.4)
+        words += [f"G{random.choice(['0', '00', '1', '01', '2', '53', '90'])}"] * (
+            random.random() < 0.7
+        )
+        for letter in random.permutation(list("XYZ"))[: random.integers(1, 4)]:
+            number = random.choice(["5", "-5.", "12.345", "-0.001", "0", "007.50", "123456"])
+            words.append(f"{letter}{number}")
+        text = (" " if random.random() < 0.7 else "").join(words).encode()
+        text += b" " * int(random.random() < 0.2)
+        taken += tokenizer._PLAIN.fullmatch(text) is not None
+        quick = tokenizer.parse_line(text, find_dialect(dialect))
+        assert quick == tokenizer._parse_carefully(text, find_dialect(dialect)), text
+    assert taken == 300

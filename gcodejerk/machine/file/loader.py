@@ -65,6 +65,7 @@ def load_text(text: str, name: str) -> Description:
     spectra = _spectra(values, Path(name).parent, checker)
     _check_frequencies(values, checker)
     _check_participations(values, checker)
+    _check_m_codes(values, checker)
     planners = choose_planners(values, checker)
     problems.raise_any()
     return _machine(values, spectra, planners, name, checker)
@@ -129,6 +130,19 @@ def _modes(values: dict[str, Any]) -> list[tuple[KeyPath, dict[str, Any]]]:
     for name, axis in values.get("axes", {}).items():
         found += [(("axes", name, "modes", i), mode) for i, mode in axis.get("modes", {}).items()]
     return found + [(("modes", i), mode) for i, mode in values.get("modes", {}).items()]
+
+
+def _check_m_codes(values: dict[str, Any], checker: Checker) -> None:
+    """Refuse an M code that runs before the motion of its block, and behind it."""
+    program = values.get("program", {})
+    before = _codes(program, "m_before")
+    for i, name in program.get("m_after", {}).items():
+        if _code(name) in before:
+            checker.problems.add(
+                checker.place(("program", "m_after", i)),
+                f"program.m_after holds {name}, which program.m_before holds, too",
+                "name it once: the control runs it before the motion of its block, or behind it",
+            )
 
 
 def _check_participations(values: dict[str, Any], checker: Checker) -> None:
@@ -322,6 +336,11 @@ def _code(name: str) -> str:
     return f"{name[0].upper()}{float(name[1:]):g}"
 
 
+def _codes(values: dict[str, Any], key: str) -> tuple[str, ...]:
+    """The codes of a list, each once."""
+    return tuple(sorted({_code(name) for name in values.get(key, {}).values()}))
+
+
 def _program(values: dict[str, Any]) -> ProgramStart:
     offsets = values.get("offsets", {})
     return ProgramStart(
@@ -333,5 +352,9 @@ def _program(values: dict[str, Any]) -> ProgramStart:
         startup=values["startup"],
         decimal_point=values.get("decimal_point"),
         resume_after_stop=values.get("resume_after_stop"),
-        harmless=tuple(sorted({_code(name) for name in values.get("harmless", {}).values()})),
+        harmless=_codes(values, "harmless"),
+        home=values.get("home", {}),
+        tool_change=values.get("tool_change"),
+        m_before=_codes(values, "m_before"),
+        m_after=_codes(values, "m_after"),
     )

@@ -71,6 +71,7 @@ _LENGTH = Number("mm")
 _LETTERS = f"[{AXES}]"
 _AXIS_NAMES = f"an axis: {', '.join(AXES)}"
 _POSITIONS = Table(((_LETTERS, _LENGTH),), _AXIS_NAMES, tuple(AXES))
+_M_CODES = ListOf(Text(r"[Mm][0-9]{1,4}", "a code such as M8"), at_most=100)
 
 
 _PLANNER = Key("planner", Choice(PLANNERS),
@@ -261,6 +262,20 @@ _PROGRAM = Section(
             "Codes of the machine's builder that move no axis and change no mode and no frame: "
             "lamps, doors, chip conveyors, counters. One that the dialect itself knows keeps its "
             "meaning.", example="[M62, M150, G187]"),
+        Key("home", _POSITIONS,
+            "Where G28 leads the axes, in machine coordinates (LinuxCNC: parameters 5161 to 5169).",
+            example="{X: 0, Y: 0, Z: 0}"),
+        Key("tool_change", _POSITIONS,
+            "Where the axes stand behind M6, in machine coordinates; an axis that is not named has "
+            "not moved, and T alone moves nothing; {} where a tool change moves nothing at all. "
+            "Left out: nobody knows where the axes stand behind M6.",
+            example="{Z: 0}"),
+        Key("m_before", _M_CODES,
+            "M codes that the control runs before the motion of their block, where the builder of "
+            "the machine decides (Fanuc, Haas, Siemens).", example="[M3, M4]"),
+        Key("m_after", _M_CODES,
+            "M codes that it runs when the motion of their block has ended.",
+            example="[M5, M9]"),
         Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*", "G-code words"),
             "The codes in force when a program starts (LinuxCNC: RS274NGC_STARTUP_CODE).",
             default="", example='"G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"'),

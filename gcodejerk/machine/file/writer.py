@@ -23,6 +23,7 @@ from gcodejerk.machine.parts import (
     Filter,
     Limits,
     Mode,
+    ProgramStart,
     Spectrum,
 )
 
@@ -80,10 +81,22 @@ def machine_yaml(machine: Description) -> str:
                 if program.resume_after_stop is not None
                 else []
             ),
-            *([f"  harmless: [{', '.join(program.harmless)}]"] if program.harmless else []),
+            *_lists(program),
+            *([f"  home: {_flow(program.home)}"] if program.home else []),
+            *(
+                [f"  tool_change: {_flow(program.tool_change)}"]
+                if program.tool_change is not None
+                else []
+            ),
             "",
         ]
     )
+
+
+def _lists(program: ProgramStart) -> list[str]:
+    """Lists of codes, where there are any."""
+    lists = {name: getattr(program, name) for name in ("harmless", "m_before", "m_after")}
+    return [f"  {name}: [{', '.join(codes)}]" for name, codes in lists.items() if codes]
 
 
 def _controller_options(options: ControllerOptions) -> list[str]:

@@ -15,10 +15,12 @@ from gcodejerk.nc.dialects.fanuc import FANUC, FANUC_LATHE_A, FANUC_LATHE_B
 from gcodejerk.nc.dialects.grbl import GRBL
 from gcodejerk.nc.dialects.haas import HAAS
 from gcodejerk.nc.dialects.heidenhain_iso import HEIDENHAIN_ISO
+from gcodejerk.nc.dialects.iso_mill import ISO_MILL
 from gcodejerk.nc.dialects.klipper import KLIPPER
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 from gcodejerk.nc.dialects.mach import MACH
 from gcodejerk.nc.dialects.marlin import MARLIN
+from gcodejerk.nc.dialects.rs274 import RS274
 from gcodejerk.nc.dialects.siemens import SIEMENS
 
 GROUP = "gcodejerk.dialects"
@@ -29,7 +31,7 @@ DIALECTS: dict[str, Dialect] = {
     dialect.name: dialect
     for dialect in (
         *(LINUXCNC, FANUC, FANUC_LATHE_A, FANUC_LATHE_B, HAAS, SIEMENS, HEIDENHAIN_ISO),
-        *(GRBL, MACH, MARLIN, KLIPPER),
+        *(GRBL, MACH, MARLIN, KLIPPER, RS274, ISO_MILL),
     )
 }
 """Ours, by name."""

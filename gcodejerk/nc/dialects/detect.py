@@ -57,7 +57,7 @@ COMMENTS = tuple(
 )
 CODE = (
     _code("siemens", rb"^%_N_", "a program name %_N_"),
-    _code("siemens", rb"(?<![A-Z_])(MSG|MCALL|CYCLE\d+|HOLES[12]|POCKET\d)\b",
+    _code("siemens", rb"(?<![A-Z_$])(MSG|MCALL|CYCLE\d+|HOLES[12]|POCKET\d)\b(?!\s*=)",
           "a Siemens cycle or MSG"),
     _code("siemens", rb"(?<![A-Z_])(DIAMON|DIAMOF|DIAM90|A?TRANS|AROT|GOTOF|GOTOB|SUPA|LIMS)\b",
           "a Siemens word"),
@@ -77,7 +77,7 @@ CODE = (
     _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
     # increments U and W, which system A alone has, in a block that no mill has
     _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
-    _code("grbl", rb"^\s*\$(\$|#|G|I|N|X|H|C|J=|\d+=)", "a $ command of grbl"),
+    _code("grbl", rb"^\s*\$([$#GINXHC]\s*$|N\d*=|J=|\d+=)", "a $ command of grbl"),
     *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
       for name in ("marlin", "klipper")),
     _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
@@ -92,8 +92,31 @@ LATHE = (
     (_in_line(rb"^[^Y\n]*(?<![A-Z_])G7[1-6](?!\d)[^Y\n]*$"), "a turning cycle"),
 )
 """What programs of lathes hold, and hardly any program of a mill that reads Fanuc's language."""
+_SPEED_LIMITS = tuple(
+    (dialect, _in_line(rb"(?<![A-Z_])G%d\s*S\s*\d" % code, re.IGNORECASE), f"G{code} S")
+    for dialect, code in (("fanuc-lathe-a", 50), ("fanuc-lathe-b", 92))
+)
+_TOOL_OF_LATHE = _in_line(rb"(?<![A-Z_])T\d{4}(?!\d)", re.IGNORECASE)
+_SURFACE = _in_line(rb"(?<![A-Z_])G9[67](?!\d)", re.IGNORECASE)
+_Y = _in_line(rb"(?<![A-Z_])Y\s*[-+.\d]", re.IGNORECASE)
 _TURNING = re.compile(rb"\b(LATHE|TURN(?:ING)?|TURN POST)\b")
 _O_PROGRAM = _in_line(rb"^\s*[O:]\d+")
+_TAPE = re.compile(rb"\s*%[^\n]*\n(?:\s*\n)*\s*[O:]\d+", re.IGNORECASE)
+"""How a program begins that is read as a tape."""
+_BLOCK = _in_line(rb"(?<![A-Z_])G0*[0-3](?!\d|\.)", re.IGNORECASE)
+_PC_CONTROL = (
+    (_in_line(rb"(?<![A-Za-z_])[XYZxyz]\s*[-+]?\d*\.\d{5}"), "a length with five decimals"),
+    (
+        _in_line(rb"(?<![A-Z_])G(9[01]\.1|64\s*P|61\.1|43\.1)", re.IGNORECASE),
+        "G91.1, G64 P or G61.1",
+    ),
+    (_in_line(rb"^\s*(N\d+\s*)?G2[01]\s*\r?$", re.IGNORECASE), "G20 or G21 in a block of its own"),
+    (_in_line(rb"^\s*(n\d+\s*)?[gxyz]\d*\.?\d*\s*[xyz\s]"), "words in small letters"),
+)
+"""What tells a control that runs on a PC, or on a small board, from those of machining centres."""
+_SMALL_LETTERS = re.compile(rb"\([^)\n]*[a-z]{3}|;[ \t]*[^\n]*[a-z]{3}")
+_FOREIGN = _in_line(rb"[A-Z_]{2,}\d*\s*[=(]|[A-Z]=|[A-Z]{4,}|(?<![A-Z_])G65(?!\d)")
+"""Words with a name, which none of LinuxCNC, grbl and Mach has."""
 _KLARTEXT = _in_line(rb"^\s*\d+\s+BEGIN\s+PGM\b")
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 
@@ -151,25 +174,22 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
     code = _COMMENT.sub(b" ", head)
     found: dict[str, str] = {}
     hints: dict[str, str] = {}
+    named = b"\n".join(c for c in comments.split(b"\n") if b"compatib" not in c.lower())
     for evidence in (*COMMENTS, *CODE):
-        match = evidence.pattern.search(comments if evidence in COMMENTS else code)
+        match = evidence.pattern.search(named if evidence in COMMENTS else code)
         if match:
             line = head.count(b"\n", 0, max(head.find(match[0]), 0)) + 1
             into = found if evidence.sure else hints
             into.setdefault(evidence.dialect, f"{evidence.why} (line {line})")
+    _find_system(found, code)
     _prefer(found, code)
     chosen = found or hints
     _refuse_mills(chosen, code, comments, lathe, name)
     if len(chosen) == 1:
         ((dialect, why),) = chosen.items()
         return DIALECTS[dialect], why
-    if not chosen and _O_PROGRAM.search(code):
-        raise ProgramError(
-            "the program has a number (O...), as fanuc, haas and mach have: which of them it is "
-            "cannot be told",
-            "state it: --dialect, or the machine file's dialect",
-            Place(name),
-        )
+    if not chosen and (common := _read_alike(code, comments, lathe)) is not None:
+        return common
     if not chosen:
         raise ProgramError(
             f"the dialect cannot be told from the program (dialect: {AUTO})",
@@ -182,6 +202,35 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
         "state it: --dialect, or the machine file's dialect",
         Place(name),
     )
+
+
+def _read_alike(code: bytes, comments: bytes, lathe: bool) -> tuple[Dialect, str] | None:
+    """What all dialects read alike that a program without evidence could be of.
+
+    A program that ISO mills run begins with a %, and with its number; LinuxCNC, grbl and Mach have
+    neither a number there, nor cycles of lathes.
+    """
+    upper = code.upper()
+    if (
+        lathe
+        or any(pattern.search(upper) for pattern, _ in LATHE)
+        or _TURNING.search(comments.upper())
+    ):
+        return None
+    if _TAPE.match(code):
+        why = (
+            "a % and a program number, as Fanuc and Haas have them; which of the two, nothing tells"
+        )
+        return DIALECTS["iso-mill"], f"{why}, so as what both read alike"
+    if _O_PROGRAM.search(code) or not _BLOCK.search(code) or _FOREIGN.search(upper):
+        return None
+    sign = next((what for pattern, what in _PC_CONTROL if pattern.search(code)), "")
+    if not sign and _SMALL_LETTERS.search(comments):
+        sign = "comments in small letters"
+    if not sign:
+        return None
+    why = f"{sign}, as controls on a PC have it: LinuxCNC, grbl or Mach, and which, nothing tells"
+    return DIALECTS["rs274"], f"{why}, so as what they read alike"
 
 
 def _refuse_mills(
@@ -208,6 +257,19 @@ def _refuse_mills(
             "the machine file's dialect",
             Place(name),
         )
+
+
+def _find_system(found: dict[str, str], code: bytes) -> None:
+    """Tell the G-code system of a lathe by how it limits the spindle's speed.
+
+    G50 S is that of system A, G92 S that of B; mills may have them, but no tool T0101 besides, nor
+    a surface speed without any Y.
+    """
+    turns = _TOOL_OF_LATHE.search(code) or (_SURFACE.search(code) and not _Y.search(code))
+    for dialect, pattern, what in _SPEED_LIMITS:
+        if turns and (match := pattern.search(code)):
+            line = code.count(b"\n", 0, match.start()) + 1
+            found.setdefault(dialect, f"{what} of a lathe (line {line})")
 
 
 def _prefer(found: dict[str, str], code: bytes) -> None:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from gcodejerk.axes import AXES
+from gcodejerk.start import Start
 
 LINEAR = frozenset("XYZUVW")
 
@@ -36,6 +37,9 @@ COMPENSATION = "cutter compensation"
 HARMLESS = "harmless"
 """Group of the M codes, and first word of the groups of the G codes, that the machine file says
 move nothing and change nothing."""
+
+_SWITCHES = frozenset(("spindle", "coolant", "auxiliary", HARMLESS))
+"""Groups of the M codes whose place in their block a machine file may state."""
 
 ARC_CENTRES: dict[int, tuple[str, str]] = {170: ("I", "J"), 180: ("I", "K"), 190: ("J", "K")}
 """The centre words that an arc may carry in each plane; the remaining one is an error."""
@@ -58,6 +62,10 @@ Effect = Literal[
     "frames",  # changes a frame in a way that is not followed
     "cycle",  # moves, and leaves the modes as they were but for motion and F
     "modal cycle",  # every position that follows is one of a cycle, until called without
+    "shift",  # the axis words shift the frame, and nothing else turns it; none: it is as selected
+    "further shift",  # the axis words shift it by so much more
+    "turned frame",  # turns, scales or mirrors the frame that "shift" ends; bare, it ends it too
+    "watch",  # what is said here may act at any time from here on
     "transform",  # turns, scales or mirrors what follows, for good
     "home",  # moves the axes that it names, or all, to a place that is not known
     "flow",  # a jump, a loop, a branch or a call: nothing is certain behind it
@@ -168,6 +176,15 @@ class Arithmetic:
     """Those of them that hold no such thing."""
     at_selection: bool = False
     """What such a variable holds takes effect where a work system is selected, not before."""
+    compared: Literal["near", "digits", "relative"] = "near"
+    """Numbers are equal within LinuxCNC's tolerance; in some eight digits, where what is nearly
+    equal is not certain; within a relative 1e-12."""
+    chained: bool = True
+    """A comparison of what a comparison gave is computed; it is left alone otherwise."""
+    vacant: bool = False
+    """A variable may be vacant, which equals no number: ``#0``, or what G65 was not given."""
+    parameters: str = ""
+    """Letters of the arguments of a macro, #1 first; a blank for one that has no letter."""
     feed: frozenset[str] = frozenset()
     """Variables that read the F in force: ``4109``, ``<_feed>``."""
 
@@ -284,6 +301,8 @@ class Dialect:
     """Whether programs of lathes are written so, in which X is a diameter."""
     tool_cancelled_by_return: bool = False
     """G28 cancels the tool length."""
+    bare_return: bool = False
+    """G28 without axis words moves all axes; otherwise nobody knows."""
     packed_repeats: bool = False
     """M98 P31000 runs O1000 three times."""
     other_m: Literal["unknown", "positions"] = "unknown"
@@ -321,6 +340,33 @@ class Dialect:
     def effect(self, code: int | None) -> Effect:
         """What a G code does besides changing its group."""
         return "none" if code is None else self.effects.get(code, "none")
+
+    def set_up(self, start: Start) -> Dialect:
+        """The dialect as the owner of a machine says that his control runs it.
+
+        Parameters
+        ----------
+        start : Start
+            Codes that are harmless, and M codes that run before the motion of their block, or
+            behind it. Of codes that do more than switch a spindle, coolant or auxiliaries, nothing
+            is believed.
+
+        Returns
+        -------
+        Dialect
+        """
+        dialect = self.with_harmless(start.harmless)
+        before, after = (
+            frozenset(m for m in codes if dialect.m_groups.get(m) in _SWITCHES)
+            for codes in (start.m_before, start.m_after)
+        )
+        if not before and not after:
+            return dialect
+        return replace(
+            dialect,
+            before_m=dialect.before_m - after | before,
+            after_m=dialect.after_m - before | after,
+        )
 
     def with_harmless(self, codes: frozenset[str]) -> Dialect:
         """The dialect of a machine whose owner says of some codes that they are harmless.

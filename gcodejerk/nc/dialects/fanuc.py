@@ -150,8 +150,18 @@ FANUC = Dialect(
         CYCLES, frozenset({760, 870, 880}), own_group=True, repeats="KL", missing="unknown"
     ),
     # Custom macro B: AND binds like *, OR and XOR like +. Local #1 to #33, common #100 to #999.
+    # <Vacant> equals no number (M700V manual p. 314, as Fanuc's), EQ is for whole numbers there.
     arithmetic=Arithmetic(
-        levels=(("*", "/", "MOD", "AND"), ("+", "-", "OR", "XOR")),
+        levels=(
+            ("*", "/", "MOD", "AND"),
+            ("+", "-", "OR", "XOR"),
+            ("EQ", "NE", "GT", "GE", "LT", "LE"),
+        ),
+        compared="digits",
+        chained=False,
+        vacant=True,
+        # "Argument specification I": A is #1, B #2, C #3, I #4, J #5, K #6, D #7 and so on.
+        parameters="ABCIJKDEF H M   QRSTUVWXYZ",
         functions=frozenset(_FUNCTIONS.split()),
         bits=True,
         local=33,

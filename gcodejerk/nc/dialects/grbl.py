@@ -72,6 +72,7 @@ GRBL = Dialect(
         # G61 is the only path mode, and is no exact stop: blocks blend as far as $11 allows.
         "path": 610,
     },
+    bare_return=True,
     effects={
         **dict.fromkeys((280, 300), "return"),
         **dict.fromkeys((281, 301), "store"),

@@ -77,5 +77,6 @@ HAAS = replace(
     packed_repeats=False,
     tool_word_moves=False,
     tool_cancelled_by_return=True,
+    bare_return=True,
     harmless=FANUC.harmless | {1030, 1870},
 )

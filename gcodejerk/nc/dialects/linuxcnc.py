@@ -83,6 +83,7 @@ LINUXCNC = Dialect(
         "compensation": 400,
         "system": 540,
     },
+    bare_return=True,
     effects={
         **dict.fromkeys((280, 300), "return"),
         **dict.fromkeys((281, 301), "store"),

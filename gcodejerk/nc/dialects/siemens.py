@@ -21,9 +21,22 @@ _SILENT = (
     *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
     *("FNORM", "FIFOCTRL", "WAITM", "WAITMC", "SETM", "CLEARM"),  # F as it is; waiting for channels
 )
+_FRAMES = ("RPL", "ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR")
+_WATCHES = ("ID", "IDS", "WHEN", "WHENEVER", "EVERY", "FROM", "DO")
+"""Synchronized actions: ``ID=1 WHEN $AA_IW[X]>50 DO POS[Y]=10``."""
 _TURNED = (
-    *("ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CRPL"),
-    *("TRANSMIT", "TRACYL", "TRAANG", "TRAORI", "TRACON", "TOFRAME", "TOROT", "PAROT", "RTLIOF"),
+    *(
+        "CRPL",
+        "TRANSMIT",
+        "TRACYL",
+        "TRAANG",
+        "TRAORI",
+        "TRACON",
+        "TOFRAME",
+        "TOROT",
+        "PAROT",
+        "RTLIOF",
+    ),
     *("AP", "RP", "POLF", "GEOAX"),
 )
 _CYCLES = (
@@ -36,10 +49,16 @@ _FLOW = (
     *("REPEATB", "UNTIL", "GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS", "CASE", "CALL", "PCALL"),
     *("EXTCALL", "ISOCALL", "PROC", "RET", "ENDPROC", "SETINT", "INIT", "START", "WAITE"),
 )
-_FUNCTIONS = "ABS COS LN EXP POT SIN SQRT TAN TRUNC"
+_FUNCTIONS = "ABS ACOS ASIN ATAN2 COS LN EXP POT ROUND SIN SQRT TAN TRUNC"
 NAMES: dict[str, Effect] = {
     **dict.fromkeys(_SILENT, "none"),
-    **dict.fromkeys(("TRANS", "ATRANS", "TRAFOOF"), "frames"),
+    # "TRANS X Y Z: programmable offset, deletes old instructions for offsetting, rotation, scaling,
+    # mirroring; ATRANS: additive; without values: clears" (808D, 6FC5398-4DP10-0BA1, p. 56).
+    "TRANS": "shift",
+    "ATRANS": "further shift",
+    **dict.fromkeys(_FRAMES, "turned frame"),
+    **dict.fromkeys(_WATCHES, "watch"),
+    "TRAFOOF": "frames",
     **dict.fromkeys(_TURNED, "transform"),
     **dict.fromkeys(_CYCLES, "cycle"),
     **dict.fromkeys(_FLOW, "flow"),
@@ -118,7 +137,7 @@ SIEMENS = Dialect(
         **dict.fromkeys((1470, 1480, 2470, 2480, 3470, 3480), "home"),
     },
     names=NAMES,
-    letters="FSTXYZABCUVWDHIJK",
+    letters="FSTXYZABCUVWDHIJKR",  # CR= is the radius of an arc; R5 alone is no word
     calls="L",
     units={700: True, 710: False, 7000: True, 7100: False},
     feed_modes={930: 93, 940: 94, 950: 95},
@@ -133,9 +152,19 @@ SIEMENS = Dialect(
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
     arithmetic=Arithmetic(
-        levels=(("*", "/"), ("+", "-")),
+        # NC programming 12/2019 p. 444: comparisons bind least of all.
+        levels=(
+            ("*", "/", "DIV", "MOD"),
+            ("+", "-"),
+            ("AND",),
+            ("XOR",),
+            ("OR",),
+            ("==", "<>", ">=", "<=", ">", "<"),
+        ),
         functions=frozenset(_FUNCTIONS.split()),
         brackets="()",
+        compared="relative",
+        chained=False,
     ),
     harmless=frozenset(
         {0, 90, 170, 180, 190, 400, 700, 710, 7000, 7100, 900, 910, 930, 940, 950, 600, 640}

@@ -30,6 +30,8 @@ class Codes:
     g: dict[str, int] = field(default_factory=dict)
     """Modal group -> G code."""
     names: list[Name] = field(default_factory=list)
+    calls: list[Name] = field(default_factory=list)
+    """Words that call a subprogram by themselves: L123."""
     m: list[int] = field(default_factory=list)
     values: dict[str, float] = field(default_factory=dict)
     """Letter -> number, NaN for one that is not known; G, M and N left out."""
@@ -89,7 +91,9 @@ def sort_words(
     codes = sorter.codes
     for word in block.words:
         value = sorter.computed(word) if word.value is None else word.value
-        if value is None or word.letter in dialect.calls:
+        if word.letter in dialect.calls:
+            codes.calls.append(Name(word.text.decode("latin-1").upper(), b""))
+        elif value is None:
             codes.reject(word.text)
         elif word.letter == "G":
             sorter.g_code(word, value)
@@ -102,7 +106,7 @@ def sort_words(
     if codes.moved() and any(group.startswith(HARMLESS) for group in codes.g):
         codes.reject(b"axis words beside a harmless code")
     codes.expression = codes.expression or bool(block.assigns)
-    codes.names = list(block.names)
+    codes.names = [*block.names, *codes.calls]
     if dialect.one_command and codes.g and (codes.m or len(codes.g) > 1):
         codes.fault = True
     if sorter.whole and dialect.whole_numbers == "machine":
@@ -124,13 +128,16 @@ class _Sorter:
 
     def computed(self, word: Word) -> float | None:
         """The number of a word that is an expression; None where it is that of a code."""
-        self.codes.expression = True
+        codes, rules = self.codes, self._dialect.arithmetic
         if word.letter in "GM" or word.letter in self._dialect.calls:
+            codes.expression = True
             return None
-        rules = self._dialect.arithmetic
         known = before_block(self._block, self._variables, rules)
         inch = self._inch and not _states_units(self._block, self._dialect)
-        return word_value(word, known, rules, inch)
+        value = word_value(word, known, rules, inch)
+        # A position of whole increments can be written as a number; a quotient can not.
+        codes.expression = codes.expression or rules.exact or value != value
+        return value
 
     def g_code(self, word: Word, value: float) -> None:
         """A G word; beside G80, another code of its group is the one that counts."""

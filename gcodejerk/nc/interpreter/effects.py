@@ -8,22 +8,29 @@ from __future__ import annotations
 
 import re
 
-from gcodejerk.nc.dialects.dialect import Dialect, Effect
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.dialect import LINEAR, Dialect, Effect
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.eligibility import Step
+from gcodejerk.nc.interpreter.expressions import evaluate
 from gcodejerk.nc.interpreter.flow_words import known_behind
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED
+from gcodejerk.nc.interpreter.variables import converted, named_assignment
 from gcodejerk.nc.text.block import Name
 from gcodejerk.nc.text.tokenizer import CHECKSUM
 from gcodejerk.start import Start
 
 _DECLARATION = re.compile(
-    rb"[ \t]*(?:REAL|INT|BOOL|CHAR|STRING[ \t]*\[[ \t]*[0-9]+[ \t]*\])[ \t]+(.*)", re.IGNORECASE
+    rb"[ \t]*(REAL|INT|BOOL|CHAR|STRING[ \t]*\[[ \t]*[0-9]+[ \t]*\])[ \t]+(.*)", re.IGNORECASE
 )
-_VALUES = re.compile(rb"\[[^\]]*\]|=[ \t]*(?:\"[^\"]*\"|[^,\"]*)")
-"""Sizes of arrays, and what variables begin with."""
+_DECLARED = re.compile(
+    rb"[ \t]*([A-Z_][A-Z_][A-Z0-9_]*)[ \t]*(\[[^\]]*\])?[ \t]*"
+    rb"(?:=((?:\"[^\"]*\"|\([^()]*\)|[^,\"()])*))?(?:,|$)",
+    re.IGNORECASE,
+)
+"""A variable, the size of an array, and what it begins with."""
 
 
 class Effects:
@@ -33,8 +40,8 @@ class Effects:
         self.dialect = dialect
         self.state = state
         self.lengths = dict(start.tool_lengths)
-        self.declared: set[str] = set()
-        """Variables with a name that the program has declared."""
+        self.declared: dict[str, str] = {}
+        """Variables with a name that the program has declared, with their types."""
         self.jumps_known = False
         """Whoever runs the blocks forgets everything at the targets of jumps."""
 
@@ -75,13 +82,16 @@ class Effects:
             frames.tool_length(state, code, values, self.lengths, self.dialect)
         elif effect == "system":
             other = "P" in values and code in self.dialect.p_selects
-            frames.select_system(state, 0 if other else code)
+            self._select_system(0 if other else code, step)
         elif effect == "numbered system":
             number = values.get("P", NAN)
-            frames.select_system(state, frames.numbered_system(number))
+            self._select_system(frames.numbered_system(number), step)
         elif effect == "frames":
             state.forget_frame()
             state.forget_positions()
+        elif effect == "watch":
+            state.forget()
+            state.put("bars", {**state.bars, "synchronized action": True})
         elif effect == "written":
             frames.data_written(state, self.lengths)
         elif effect == "data":
@@ -101,17 +111,56 @@ class Effects:
         elif effect == "flow":
             self._leave(step)
 
+    def _select_system(self, code: int, step: Step) -> None:
+        """Select a work system; whether the block's own rapid may rely on it, the step says."""
+        state = self.state
+        # That a default is in force, nobody has said; its offset, the machine file may have.
+        stated = state.system == code and bool(state.system_stated)
+        step.system_certain = bool(code) and (stated or code in state.offsets)
+        frames.select_system(state, code)
+        state.put("system_stated", True)
+
     def _declare(self, names: list[Name]) -> None:
-        """DEF REAL DEPTH, WIDTH=5: from here on these are variables."""
+        """DEF REAL DEPTH, WIDTH=5: from here on these are variables, of 0 unless it says more."""
+        rules = self.dialect.arithmetic
         for name in names:
             if self._named(name) != "declaration":
                 continue
-            match = _DECLARATION.fullmatch(name.arguments)
+            match = _DECLARATION.fullmatch(name.arguments.rstrip(b" \t"))
             if match is None:
                 self.state.forget()
                 return
-            texts = _VALUES.sub(b"", match[1]).split(b",")
-            self.declared |= {text.strip(b" \t").decode("latin-1").upper() for text in texts}
+            kind = match[1].decode("latin-1").upper()[:6]
+            at = 0
+            while at < len(match[2]):
+                found = _DECLARED.match(match[2], at)
+                if found is None:
+                    self.state.forget()
+                    return
+                at = found.end()
+                variable = found[1].decode("latin-1").upper()
+                self.declared[variable] = kind
+                value = 0.0 if found[3] is None else evaluate(found[3], self.state.variables, rules)
+                value = NAN if found[2] else value
+                self.state.set_variable(variable, converted(value, kind))
+
+    def _assign_names(self, names: list[Name]) -> None:
+        """DEPTH=R1+2, of a variable that was declared; values are read before any is set."""
+        rules, state = self.dialect.arithmetic, self.state
+        found = [(n.name, parts) for n in names if (parts := named_assignment(n)) is not None]
+        found = [(name, parts) for name, parts in found if name in self.declared]
+        values = [evaluate(text, state.variables, rules) for _, (_, text) in found]
+        for k, (name, (variable, _)) in enumerate(found):
+            if variable.endswith("["):
+                for element in [v for v in state.variables if v.startswith(variable)]:
+                    state.set_variable(element, NAN)
+                continue
+            # Set one behind the other or together? Where one depends on another, nobody knows.
+            value = converted(values[k], self.declared[name]) if len(found) == 1 else NAN
+            if len(found) > 1 and not any(c.isalpha() for c in found[k][1][1].decode("latin-1")):
+                twice = sum(other == variable for _, (other, _) in found) > 1
+                value = NAN if twice else converted(values[k], self.declared[name])
+            state.set_variable(variable, value)
 
     def _swivel(self, names: list[Name], step: Step) -> None:
         """CYCLE800(..) turns the plane, CYCLE800() turns it back; where the axes go, it says."""
@@ -121,6 +170,28 @@ class Effects:
                 self.state.forget_frame()
                 self._effect("cycle", 0, {}, step)
                 self._transform("swivel", on=on)
+
+    def _program_frame(self, effect: Effect, codes: Codes) -> None:
+        """TRANS shifts the frame, ATRANS by more, ROT turns it; each of them alone ends it all."""
+        state, values = self.state, codes.values
+        bare = len(codes.names) == 1 and not codes.moved() and not values
+        known = len(codes.names) == 1 and set(values) <= LINEAR and not codes.functions
+        known = known and not codes.g and not codes.m and not codes.unknown
+        ends = bare or effect == "shift"
+        if not ends and effect == "turned frame":
+            self._transform("programmed frame", on=True)
+            return
+        if ends:
+            self._transform("programmed frame", on=False)
+        if not ends and state.transforms.get("programmed frame", False) is not False:
+            known = False
+        shift = [0.0] * len(AXES) if ends else list(state.g92)
+        for axis, letter in enumerate(AXES):
+            if letter in values and not bare:
+                shift[axis] += values[letter] * state.scale(axis)
+        if state.diameter is not False and "X" in values:
+            known = False  # a diameter, or no diameter?
+        frames.shift_program(state, shift if known or bare else [NAN] * len(AXES))
 
     def _transform(self, name: str, on: bool) -> None:
         """Begin or end a rotation, scaling, mirroring or polar frame."""

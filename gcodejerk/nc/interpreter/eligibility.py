@@ -32,11 +32,13 @@ _FRAME_CHANGES: frozenset[Effect] = frozenset(
             "restore",
             "local",
         ),
-        *("table", "frames", "home"),
+        *("table", "frames", "home", "shift", "further shift", "turned frame"),
     }
 )
 """Effects that, in the block of a rapid, move the origin that its numbers refer to."""
 
+
+_SELECTIONS: frozenset[Effect] = frozenset({"system", "numbered system"})
 
 BARS = {
     "offsets written": Reason.SYSTEM_WRITTEN,  # until a work system is selected
@@ -46,6 +48,8 @@ BARS = {
     "feed group": Reason.FEED_GROUP,
     "feed override": Reason.FEED_SCALED,
     "another language": Reason.NOT_UNDERSTOOD,
+    "exact path": Reason.PATH_UNKNOWN,
+    "synchronized action": Reason.NOT_FOLLOWED,  # for good
 }
 """What makes rapids unfit while it is, or may be, in force (`State.bars`), and the reason."""
 
@@ -82,6 +86,8 @@ class Step:
     """A code that the dialect does not know, as written."""
     refused: str = ""
     """A code that some of the dialect's controls refuse."""
+    system_certain: bool = False
+    """The work system that the block selects is in force already, or the machine file has it."""
     turned: int = 0
     """Bit k set: AXES[k] turns, and its word alone does not say which way."""
     way_unknown: bool = False
@@ -158,6 +164,8 @@ def why_left_alone(
         return Reason.FRAME_CHANGE
     if step.cycle or contour or state.transforms.get("modal macro", False) is not False:
         return Reason.CANNED_CYCLE
+    if step.system_certain:
+        effects -= _SELECTIONS  # acts in front of the motion, and may stand in a block of its own
     if effects & _FRAME_CHANGES or not dialect.tool_frame.isdisjoint(codes.values):
         return Reason.FRAME_CHANGE
     if state.compensation != G40:
@@ -211,19 +219,29 @@ def _check_known_move(
         return Reason.PATH_UNKNOWN
     if step.way_unknown:
         return Reason.ROTARY_WAY
-    if _other_words(codes, dialect, fed=step.fed):
+    if _other_words(codes, dialect, step):
         return Reason.OTHER_WORDS
     if mixed and not dialect.feed_of_mixed:
         return Reason.MIXED_AXES
     return None
 
 
-def _other_words(codes: Codes, dialect: Dialect, *, fed: bool) -> bool:
+def _other_words(codes: Codes, dialect: Dialect, step: Step) -> bool:
     """Whether words stand in the block that act neither before nor after its motion for certain."""
     # Where the table does not say what a letter is for, nobody knows what it does to a rapid.
     others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
     return (
-        any(code not in dialect.harmless and not (fed and code == G1) for code in codes.g.values())
+        any(not _keeps_its_place(code, dialect, step) for code in codes.g.values())
         or not dialect.before_m | dialect.after_m >= set(codes.m)
-        or bool(others or codes.names or codes.functions)
+        or bool(others or codes.names)
+        or any(
+            how not in ("IC", "AC") or axis not in LINEAR for axis, how in codes.functions.items()
+        )
     )
+
+
+def _keeps_its_place(code: int, dialect: Dialect, step: Step) -> bool:
+    """Whether a G code does the same in front of the motion, or is that motion."""
+    if code in dialect.harmless or (step.fed and code == G1):
+        return True
+    return step.system_certain and dialect.effect(code) in _SELECTIONS

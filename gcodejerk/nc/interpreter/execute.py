@@ -142,6 +142,7 @@ class Executor(Phases):
             return
         if rules.at_selection:
             self.state.offsets = {}
+            self.state.lose("home")
         else:
             frames.data_written(self.state, self.lengths)
 

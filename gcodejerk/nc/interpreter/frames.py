@@ -29,6 +29,11 @@ def _rename(state: State, field: str, after: list[float]) -> None:
             state.move(axis, state.position[axis] + (old - new))
 
 
+def shift_program(state: State, shift: list[float]) -> None:
+    """Shift the frame by so much from the work system, TRANS and its kin. [mm]."""
+    _rename(state, "g92", shift)
+
+
 def tool_length(
     state: State, code: int, values: Values, lengths: Mapping[int, float], dialect: Dialect
 ) -> None:
@@ -118,6 +123,7 @@ def data_written(state: State, lengths: dict[int, float]) -> None:
     """
     lengths.clear()
     state.offsets = {}
+    state.lose("home")
     state.put("system", None)
     state.forget_frame()
     state.forget_positions()
@@ -140,8 +146,10 @@ def write_data(state: State, lengths: dict[int, float], values: Values) -> None:
 
 
 def change(state: State, effect: Effect, values: Values, lengths: dict[int, float]) -> None:
-    """Do what a non-modal code does to the frames: G92.1 and its kin, G52, G10."""
-    if effect == "clear":
+    """Do what a non-modal code does to the frames: G28.1, G92.1 and its kin, G52, G10."""
+    if effect == "store":
+        state.lose("home")
+    elif effect == "clear":
         _rename(state, "g92", [0.0] * len(AXES))
     elif effect == "restore":
         _rename(state, "g92", [NAN] * len(AXES))

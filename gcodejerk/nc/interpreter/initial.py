@@ -66,6 +66,7 @@ def _set_frames(state: State, start: Start) -> None:
     state.diameter = state.turns = start.diameter
     for system, offsets in start.offsets.items():
         state.offsets[system_key(system)] = [offsets.get(axis, NAN) for axis in AXES]
+    state.home = [start.home.get(axis, NAN) for axis in AXES]
     if start.positions or start.offsets:
         # Who states where the axes are, states it for the modes that the dialect starts in: no
         # tool length and no G92, which would otherwise outlive the program before this one.

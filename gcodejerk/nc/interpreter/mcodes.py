@@ -6,10 +6,13 @@ leave changed is forgotten.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G91
 from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.moves import change_tool, lose_tool_length
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import forget_shared
 
@@ -17,7 +20,13 @@ _CALLS = frozenset({47, 96, 97, 98, 198})
 """M codes that go on elsewhere, or may."""
 
 
-def run_m_code(state: State, m: int, dialect: Dialect, step: Step) -> bool:
+def run_m_code(
+    state: State,
+    m: int,
+    dialect: Dialect,
+    step: Step,
+    tool_change: Mapping[str, float] | None,
+) -> bool:
     """Execute an M code, the end of the program and stops excepted.
 
     Parameters
@@ -30,6 +39,9 @@ def run_m_code(state: State, m: int, dialect: Dialect, step: Step) -> bool:
         Of the program.
     step : Step
         What the block did so far.
+    tool_change : mapping of str to float, or None
+        Axis -> where it stands behind M6, in machine coordinates; None where that is not known.
+        [mm, deg]
 
     Returns
     -------
@@ -41,10 +53,10 @@ def run_m_code(state: State, m: int, dialect: Dialect, step: Step) -> bool:
         state.put("spindle", m)
     if group is None or m == 6 or group == "user":
         # A tool change may go anywhere, and so may a program of the user's.
-        state.forget_positions()
         forget_shared(state, dialect.arithmetic)
         if dialect.other_m == "positions" or f"M{m}" in dialect.refused:
             _behind_macro(state)
+        change_tool(state, tool_change if m == 6 and group is not None else None)
     elif m == 73 and group == "state":
         state.put("restores", True)
     elif m in (70, 72) and group == "state":
@@ -61,7 +73,7 @@ def _behind_macro(state: State) -> None:
     It retracts with G91 G28 and ends in G90, and it cancels the tool length. Were it to leave
     G91, G1 or another work system behind, no program would run on such a machine.
     """
-    state.lose("tool")
+    lose_tool_length(state)
     if state.cycle is not None:
         state.lose("cycle")
     if state.distance == G91 and "distance" not in state.fixed:

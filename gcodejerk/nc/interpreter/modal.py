@@ -97,7 +97,7 @@ FIELDS = (
     Field("spindle", "mode", 5),
     Field("cycle", "mode", together="cycle"),
     Field("cycle_level", "number", NAN),
-    *(Field(name, "axes") for name in ("position", "g5x", "g92", "tool")),
+    *(Field(name, "axes") for name in ("position", "g5x", "g92", "tool", "home")),
     *(Field(name, "named") for name in ("transforms", "bars")),
     *(Field(name, "table") for name in ("offsets", "variables")),
     *(
@@ -105,6 +105,7 @@ FIELDS = (
         for name in ("distance_stated", "feed_mode_stated", "unit_stated", "rotates", "turns")
     ),
     Field("restores", "once", False),
+    Field("system_stated", "mode", False),
     *(Field(name, "constant", start) for name, start in (("ended", False), ("touched", None))),
     Field("fixed", "constant", frozenset()),
     Field("wraps", "constant", (None,) * len(AXES)),
@@ -112,7 +113,8 @@ FIELDS = (
 )
 """What a state holds."""
 BY_NAME = {field.name: field for field in FIELDS}
-MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in ("feed_whole", "cycle"))
+_NO_GROUP = ("feed_whole", "cycle", "system_stated")
+MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in _NO_GROUP)
 """Fields that hold one modal group each."""
 _FRAME = ("g5x", "g92", "tool")
 _GROUPS = {
@@ -174,6 +176,8 @@ class State:
     g5x: list[float]
     g92: list[float]
     tool: list[float]
+    home: list[float]
+    """Where G28 leads, in machine coordinates."""
     transforms: dict[str, bool | None]
     """Rotation, scaling, mirroring..."""
     bars: dict[str, bool | None]
@@ -184,6 +188,8 @@ class State:
     distance_stated: bool
     feed_mode_stated: bool
     unit_stated: bool
+    system_stated: bool | None
+    """The work system is in force because the program, or the machine file, has said so."""
     rotates: bool
     """The program turns a coordinate system somewhere."""
     turns: bool

@@ -7,10 +7,11 @@ known and the way is not.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect
-from gcodejerk.nc.dialects.gcodes import G91
+from gcodejerk.nc.dialects.gcodes import G28, G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -57,20 +58,54 @@ def go_to_machine_position(state: State, values: dict[str, float]) -> None:
     """G53: the axis words are machine coordinates."""
     for axis, letter in enumerate(AXES):
         if letter in values:
-            at = values[letter] * state.scale(axis) - state.shift(axis)
-            counts = letter not in LINEAR and state.wraps[axis] in ("shortest", "sign")
-            state.move(axis, NAN if counts or state.distance == G91 else at)
+            at = _named_place(state, axis, values[letter] * state.scale(axis))
+            state.move(axis, NAN if state.distance == G91 else at)
 
 
 def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:
-    """G28 and G30: to a stored point that the program does not tell."""
+    """G28 and G30: to a stored point that the program does not tell, but the machine file may."""
     if dialect.tool_cancelled_by_return:
-        state.lose("tool")
-        state.forget_positions()
-    named = [AXES.index(axis) for axis in codes.moved()]
-    state.forget_positions(named or range(len(AXES)))
+        lose_tool_length(state)
+    named = codes.moved() or AXES
+    known = codes.g.get("non-modal") == G28 and (codes.moved() or dialect.bare_return)
+    home = state.home if known else [NAN] * len(AXES)
+    for axis, letter in enumerate(AXES):
+        if letter in named:
+            state.move(axis, _named_place(state, axis, home[axis]))
     if state.transformed:
         state.forget_positions()
+
+
+def _named_place(state: State, axis: int, machine: float) -> float:
+    """The name of a machine coordinate; of an axis that counts turns, it says the angle alone."""
+    turns = AXES[axis] not in LINEAR and state.wraps[axis] in ("shortest", "sign")
+    return NAN if turns else machine - state.shift(axis)
+
+
+def lose_tool_length(state: State) -> None:
+    """Forget the tool length, and where the axes stand that it may shift."""
+    shifted = [axis for axis, length in enumerate(state.tool) if length != 0.0]
+    state.put("tool", [NAN if axis in shifted else 0.0 for axis in range(len(AXES))])
+    state.forget_positions(shifted)
+
+
+def change_tool(state: State, places: Mapping[str, float] | None) -> None:
+    """M6: the axes go to where the machine file says that tools are changed, or who knows where.
+
+    Parameters
+    ----------
+    state : State
+        Changed.
+    places : mapping of str to float, or None
+        Axis -> where it stands behind M6, in machine coordinates; the others have not moved. None:
+        not known of any. [mm, deg]
+    """
+    if places is None or state.transformed:
+        state.forget_positions()
+        return
+    for letter, place in places.items():
+        axis = AXES.index(letter)
+        state.move(axis, _named_place(state, axis, place))
 
 
 def plane_axes(state: State) -> list[int]:

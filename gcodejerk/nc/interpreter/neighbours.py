@@ -17,7 +17,9 @@ keep.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import BinaryIO
 
 import numpy as np
@@ -32,6 +34,8 @@ WINDOW = 512
 FARTHEST = 1 << 14
 IN_FRONT = 512
 """Bytes in front of a rapid that are looked at. [bytes]"""
+REMEMBERED = 1 << 12
+"""Lines that are taken apart once: each is near some rapids."""
 LONG_TIME, LONG_RAPID = 0.02, 2.0
 """A motion that fills the queue: of so long at F, or over such a way. [s], [mm]"""
 _MEANING = frozenset({10, 20, 21, 28, 30, 52, 53, 54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3, 68, 69})
@@ -124,7 +128,8 @@ def _value_before(lines: list[bytes], axis: str) -> float:
     return float("nan")
 
 
-def _words(line: bytes) -> dict[str, tuple[float, ...]]:
+@lru_cache(maxsize=REMEMBERED)
+def _words(line: bytes) -> Mapping[str, tuple[float, ...]]:
     """The numbers of a line by letter; empty where it holds anything but words with numbers."""
     text = _plain(line)
     found = _WORD.findall(text)
@@ -165,6 +170,7 @@ def _waits(block: bytes) -> bool:
     return any(letter == b"M" and _number(value) in (0, 1, 2, 30, 60) for letter, value in words)
 
 
+@lru_cache(maxsize=REMEMBERED)
 def _kind(line: bytes) -> bool | None:
     """True: moves; False: waits, or is not understood; None: neither."""
     text = _plain(line)

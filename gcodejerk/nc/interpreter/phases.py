@@ -34,7 +34,9 @@ _TAKES_WORDS: frozenset[Effect] = frozenset(
     {"words", "cycle", "home", "flow", "modal cycle", "swivel"}
 )
 """Effects of a code beside which the axis words of the block are no straight move."""
-_NAME_TAKES_WORDS: frozenset[Effect] = (_TAKES_WORDS - {"flow"}) | {"frames", "transform"}
+_NAME_TAKES_WORDS: frozenset[Effect] = (_TAKES_WORDS - {"flow"}) | {
+    *("frames", "transform", "shift", "further shift", "turned frame", "watch")
+}
 """The same of a name; one of flow that goes on to the next block leaves the words to the motion."""
 _TAKES_AXES: frozenset[Effect] = frozenset({"table", "local", "set", "frames", "data"})
 """Effects of a non-modal code that the axis words belong to."""
@@ -49,6 +51,7 @@ class Phases(Effects):
         super().__init__(dialect, state, start)
         self._stays = start.resume == "same" or (start.resume is None and dialect.same_after_stop)
         """Behind M0 and M1 the axes stand where they stood."""
+        self._tool_change = start.tool_change
         self.rapid_feed = start.rapid_feed
         """Feed moves that count as rapids."""
         self._contour: float | None = None
@@ -100,7 +103,7 @@ class Phases(Effects):
         """M codes but stops: a program that is not followed leaves nothing of what stood before."""
         state, dialect = self.state, self.dialect
         for m in codes.m:
-            if run_m_code(state, m, dialect, step):
+            if run_m_code(state, m, dialect, step, self._tool_change):
                 self._leave(step)
             if m in dialect.m_bars:
                 on = _switched(codes.values.get("P", 1.0))
@@ -109,7 +112,7 @@ class Phases(Effects):
     def _tool_words(self, codes: Codes) -> None:
         """T, D and the like where they move the tool or its frame; G43 comes with the codes."""
         state, dialect, values = self.state, self.dialect, codes.values
-        if dialect.tool_word_moves and "T" in values:
+        if dialect.tool_word_moves and "T" in values and self._tool_change is None:
             state.forget_positions()
         if dialect.length_word in values and "tool length" not in codes.g:
             frames.tool_length(state, 0, values, {}, dialect)
@@ -168,6 +171,7 @@ class Phases(Effects):
         if not codes.names:
             return
         self._declare(codes.names)
+        self._assign_names(codes.names)
         self._swivel(codes.names, step)
         effects = [self._named(name) for name in codes.names]
         if "modal cycle" in effects:
@@ -180,6 +184,8 @@ class Phases(Effects):
                 continue
             if effect == "feed override":
                 self.state.put("bars", {**self.state.bars, effect: True})
+            if effect in ("shift", "further shift", "turned frame"):
+                self._program_frame(effect, codes)
             if effect == "feed group":
                 self._feed_group(codes.names)
             self._effect(effect, 0, codes.values, step)

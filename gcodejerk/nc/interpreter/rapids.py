@@ -81,6 +81,11 @@ class Rapids:
     def __len__(self) -> int:
         return len(self.line)
 
+    def freeze(self) -> None:
+        """Let nobody write to the columns any more: planning and proof may both read them."""
+        for column in fields(self):
+            getattr(self, column.name).flags.writeable = False
+
 
 _TYPES: dict[str, tuple[type, int]] = {
     **{name: (np.int64, 0) for name in ("line", "begin", "end")},

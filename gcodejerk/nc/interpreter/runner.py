@@ -45,6 +45,8 @@ class Runner:
         state = initial_state(dialect, start)
         self.executor = Executor(dialect, state, start)
         self.syntax_problems: list[Finding] = []
+        self.steps = 0
+        """Blocks run one by one so far, passes of loops among them."""
         self.problem_count = 0
         self._lost: dict[int, tuple[Line, int]] = {}
         """Line behind which what is in force is unknown -> it, and rapids left alone for that."""
@@ -85,6 +87,7 @@ class Runner:
             the one in force if the block may be skipped.
         """
         executor, block = self.executor, line.block
+        self.steps += 1
         executor.state.line = line
         before = executor.state.copy() if block.block_delete else None
         step = executor.run(block)

@@ -12,14 +12,16 @@ import re
 from collections.abc import Iterable, Mapping
 
 from gcodejerk.nc.dialects.dialect import LINEAR, Arithmetic
-from gcodejerk.nc.interpreter.expressions import NAN, evaluate, variable_name
-from gcodejerk.nc.interpreter.modal import State
-from gcodejerk.nc.text.block import Block, Word
+from gcodejerk.nc.interpreter.expressions import evaluate, variable_name
+from gcodejerk.nc.interpreter.modal import NAN, State
+from gcodejerk.nc.text.block import Block, Name, Word
 from gcodejerk.nc.text.cursor import LARGEST
 
 _INCREMENT_DECIMALS = (3, 4)
 """Of the least increment: 0.001 mm or degrees, 0.0001 inch."""
 _POSITIONS = frozenset("XYZABCUVWIJKR")
+_R_NAME = re.compile(r"R[0-9]+")
+_SET = re.compile(rb"[ \t]*(?:\[([^\]]*)\])?[ \t]*=(?!=)(.*)", re.DOTALL)
 _READ = re.compile(rb"#([0-9]+|<[^<>]*>|[#\[])")
 _PREDEFINED = """
 VMAJOR VMINOR LINE MOTION_MODE PLANE CCOMP METRIC IMPERIAL ABSOLUTE INCREMENTAL INVERSE_TIME
@@ -37,6 +39,8 @@ def is_local(name: str, rules: Arithmetic) -> bool:
     """Whether a variable belongs to one program or subprogram alone."""
     if name.isdigit():
         return 1 <= int(name) <= rules.local
+    if rules.brackets == "()":
+        return not _R_NAME.fullmatch(name)  # DEF: of the program that declares it
     return name.startswith("<") and not name.startswith("<_")
 
 
@@ -49,21 +53,75 @@ def _can_be_known(name: str, rules: Arithmetic) -> bool:
 
 def assigned_values(block: Block, state: State, rules: Arithmetic) -> list[float]:
     """Values of the assignments of a block, by the variables as they were before it."""
-    known = before_block(block, state.variables, rules)
-    return [evaluate(text, known, rules) for text in block.assigned]
+    if rules.together or len(block.assigns) == 1:
+        return [evaluate(text, state.variables, rules) for text in block.assigned]
+    values = []
+    known: Mapping[str, float] = state.variables
+    for target, text in zip(block.assigns, block.assigned, strict=True):
+        values.append(evaluate(text, known, rules))
+        # Is R2=R1 in the line of R1=5 computed before or after? Not certain: neither.
+        name = _name(target)
+        known = {n: value for n, value in known.items() if n != name} if target else {}
+    return values
 
 
 def before_block(
     block: Block, variables: Mapping[str, float], rules: Arithmetic
 ) -> Mapping[str, float]:
     """List the variables whose value within a block is certain."""
-    if rules.together or not block.assigns:
+    if rules.together or not (block.assigns or block.names):
         return variables
     # Is X#1 in the line of #1=5 read before or after? Not certain: neither.
     if "" in block.assigns:
         return {}
-    targets = set(map(_name, block.assigns))
+    targets = {*map(_name, block.assigns)}
+    targets |= {found[0] for name in block.names if (found := named_assignment(name)) is not None}
+    if not targets:
+        return variables
     return {name: value for name, value in variables.items() if name not in targets}
+
+
+def named_assignment(name: Name) -> tuple[str, bytes] | None:
+    """Take ``DEPTH=R1+2`` or ``PLACE[3]=5`` apart: the variable, and what it is set to.
+
+    The variable is all of an array where the index is computed.
+    """
+    match = _SET.fullmatch(name.arguments) if name.name else None
+    if match is None:
+        return None
+    if match[1] is None:
+        return name.name, match[2]
+    index = [part.strip(b" \t") for part in match[1].split(b",")]
+    if not all(part.isdigit() for part in index):
+        return name.name + "[", match[2]
+    return f"{name.name}[{','.join(str(int(part)) for part in index)}]", match[2]
+
+
+def converted(value: float, kind: str) -> float:
+    """Give what a variable of a type holds when a number is assigned to it.
+
+    Parameters
+    ----------
+    value : float
+        The number; NaN where it is not known.
+    kind : str
+        REAL, INT or BOOL; any other holds no number.
+
+    Returns
+    -------
+    float
+        INT rounds (NC programming, "Possible type conversions"); a half of a negative number, one
+        way or the other, is not certain.
+    """
+    if kind == "REAL":
+        return value
+    if kind == "BOOL":
+        return float(value != 0.0) if value == value else NAN
+    if kind != "INT" or not abs(value) < LARGEST:
+        return NAN
+    whole = math.floor(value + 0.5)
+    half = abs(value - whole) > 0.5 - 1e-6
+    return NAN if half and not (value > 0.0 and value + 0.5 == whole) else float(whole)
 
 
 def assign(block: Block, values: Iterable[float], state: State, rules: Arithmetic) -> None:
@@ -108,7 +166,7 @@ def word_value(word: Word, variables: Mapping[str, float], rules: Arithmetic, in
     text = word.text[1:] if b"=" not in word.text else word.text.partition(b"=")[2]
     if word.function:
         text = text.partition(b"(")[2].rstrip(b" \t").removesuffix(b")")
-    if not rules.exact and b"ROUND" in text.upper():
+    if not rules.exact and rules.brackets == "[]" and b"ROUND" in text.upper():
         return NAN  # in a word it rounds to the least increment
     value = evaluate(text, variables, rules)
     if not abs(value) <= LARGEST:

@@ -25,6 +25,20 @@ _FUNCTIONS = frozenset(
 _NUMBER = re.compile(rb"[-+]?[0-9. \t]*")
 
 
+_NAMED_OPERAND = re.compile(
+    rb"[ \t]*(?:NOT[ \t]+|NOT(?=[ \t]*\())?[-+]?[ \t]*"
+    rb"(?:(?P<open>\()|\"[^\"]*\"|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:EX[-+]?[0-9]+)?"
+    rb"|(?P<name>\$?[A-Z_][A-Z0-9_]*))",
+    re.IGNORECASE,
+)
+_NAMED_OPERATOR = re.compile(
+    rb"[ \t]*(?:<<|==|<>|>=|<=|[-+*/<>]|(?:DIV|MOD|AND|OR|XOR|B_AND|B_OR|B_XOR)(?![A-Z0-9_]))",
+    re.IGNORECASE,
+)
+_BEHIND_NAME = re.compile(rb"[ \t]*([\[(])")
+_PAIRS = {0x28: 0x29, 0x5B: 0x5D}
+
+
 class SyntaxProblem(Exception):  # noqa: N818 - not an error of ours: a place in the line
     """A problem and where it is, from 0."""
 
@@ -122,6 +136,48 @@ class Cursor:
                 self.at = at + 1
                 return
         raise SyntaxProblem("expression is not closed", begin)
+
+    def named_expression(self) -> None:
+        """Pass over an expression of names and round brackets: ``(R1+DEPTH[2]) DIV 3``."""
+        text = self.text
+        while True:
+            match = _NAMED_OPERAND.match(text, self.at)
+            if not match:
+                raise SyntaxProblem("a value is missing", self.at)
+            self.at = match.end()
+            if match["open"]:
+                self.at -= 1
+                self.pair()
+            elif match["name"]:
+                while behind := _BEHIND_NAME.match(text, self.at):
+                    self.at = behind.start(1)
+                    self.pair()
+            operator = _NAMED_OPERATOR.match(text, self.at)
+            if not operator:
+                return
+            self.at = operator.end()
+
+    def pair(self) -> None:
+        """Pass over brackets, round or square, and all in them; quoted text counts as such."""
+        text, begin = self.text, self.at
+        closing: list[int] = []
+        quoted = False
+        for at in range(begin, len(text)):
+            byte = text[at]
+            if byte == 0x22:
+                quoted = not quoted
+            elif quoted:
+                continue
+            elif byte in _PAIRS:
+                closing.append(_PAIRS[byte])
+            elif closing and byte == closing[-1]:
+                closing.pop()
+                if not closing:
+                    self.at = at + 1
+                    return
+            elif byte in b")];":
+                break
+        raise SyntaxProblem("parenthesis is not closed", begin)
 
     def assignment(self) -> None:
         """Pass over ``#target = value``."""

@@ -22,6 +22,7 @@ CHECKSUM = "*"
 _WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[0-9.]+)[ \t]*(?![-+0-9. \t#\[=])")
 _IDENTIFIER = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
 _INDEX = re.compile(rb"[0-9]*")
+_R_ELEMENT = re.compile(rb"R[ \t]*\[", re.IGNORECASE)
 _FUNCTION = re.compile(rb"(IC|AC|DC|ACP|ACN)[ \t]*\(", re.IGNORECASE)
 _TO_BLANK = re.compile(rb"[^ \t;]*")
 _TO_COMMENT = re.compile(rb"[^;]*")
@@ -36,6 +37,11 @@ _STRING = re.compile(rb'"[^"]*"')
 _LEADER = re.compile(
     rb"[ \t]*%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t]*(?:\([^()]*\)?[ \t]*)*;?[ \t]*", re.IGNORECASE
 )
+_PLAIN = re.compile(
+    rb"(?:N[0-9]{1,8} ?)?(?:G[0-9]{1,3} ?)?(?:[XYZ]-?[0-9]{1,6}(?:\.[0-9]{0,8})? ?){1,3}"
+)
+"""What dialects without names and hexadecimal numbers read alike: most of a program."""
+_PLAIN_WORD = re.compile(rb"([NGXYZ])(-?[0-9.]+)")
 _HEXADECIMAL = re.compile(rb"[A-Z][ \t]*[-+]?0[Xx]", re.IGNORECASE)
 
 
@@ -130,6 +136,8 @@ class _Line(Cursor):
                     self._close()
             else:
                 value = self.number()
+        if letter == "R" and self.rules.variables == "R":
+            raise SyntaxProblem("a parameter without =", begin)
         if letter == "N" and (value is None or not self.text[begin + 1 :].lstrip()[:1].isdigit()):
             raise SyntaxProblem("N without a plain number", begin)
         text = self.text[begin : self.at]
@@ -159,7 +167,15 @@ class _Line(Cursor):
         return match[1].decode().upper()
 
     def _value(self) -> float | None:
-        """Read what follows ``=``: a number, or an expression up to the next blank."""
+        """Read what follows ``=``: a number, or an expression."""
+        if self.rules.variables == "R":
+            begin = self.at
+            self.named_expression()
+            text = self.text[begin : self.at]
+            if not SHAPE.fullmatch(text):
+                return None
+            self.at = begin
+            return self.number()
         match = CLOSED_NUMBER.match(self.text, self.at)
         assert match is not None
         after = self.text[match.end() : match.end() + 1]
@@ -193,7 +209,9 @@ class _Line(Cursor):
         elif self.dialect.names.get(name) in ("flow", "declaration") and self.skip() != b":":
             self.at = _TO_COMMENT.match(self.text, self.at).end()  # type: ignore[union-attr]
         elif self.skip() == b"(":
-            self._arguments()
+            self.pair()
+        elif self.rules.variables == "R" and self.text[self.at : self.at + 1] == b"[":
+            self._element()
         elif self.text[self.at : self.at + 1] == b"=":
             self.at += 1
             self.skip()
@@ -212,19 +230,32 @@ class _Line(Cursor):
         self.names.append(Name(name, self.text[begin : self.at]))
         return True
 
-    def _arguments(self) -> None:
-        """Pass over ``( ... )``, quoted text in it included."""
-        depth, quoted, begin = 0, False, self.at
-        for at in range(begin, len(self.text)):
-            byte = self.text[at]
-            if byte == 0x22:
-                quoted = not quoted
-            elif not quoted:
-                depth += (byte == 0x28) - (byte == 0x29)
-                if depth == 0:
-                    self.at = at + 1
-                    return
-        raise SyntaxProblem("parenthesis is not closed", begin)
+    def _element(self) -> None:
+        """Pass over ``[2]``, or ``[2]=...``."""
+        self.pair()
+        if self.skip() == b"=":
+            self.at += 1
+            self.skip()
+            self._value()
+
+    def _indexed_parameter(self) -> bool:
+        """Pass over ``R[2]=...``, if it stands here; an index that is computed may be any."""
+        match = _R_ELEMENT.match(self.text, self.at)
+        if not match:
+            return False
+        self.at = match.end() - 1
+        begin = self.at + 1
+        self.pair()
+        index = self.text[begin : self.at - 1].strip(b" \t")
+        if self.skip() != b"=":
+            raise SyntaxProblem("assignment without =", self.at)
+        self.at += 1
+        self.skip()
+        self.assigns.append(f"R{int(index)}" if index.isdigit() else "")
+        at = self.at
+        self._value()
+        self.assigned.append(self.text[at : self.at])
+        return True
 
     def keyword(self) -> bool:
         """Take a keyword of program flow and all that follows it, if one stands here."""
@@ -293,6 +324,8 @@ class _Line(Cursor):
         leads = all(word.letter == "N" for word in self.words) and not self.names
         if byte in b"Oo" and leads and rules.o_word != "error":
             self.flow()
+        elif rules.variables == "R" and self._indexed_parameter():
+            pass
         elif not (rules.keywords and self.keyword()) and not (rules.names and self.name()):
             self.word()
 
@@ -363,6 +396,19 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
         With a `problem` where the controller would refuse the line.
     """
     text = text.rstrip(b"\r")  # CR CR LF, which a transfer in text mode makes of CR LF
+    rules = dialect.text
+    if not (rules.names or rules.hexadecimal) and _PLAIN.fullmatch(text):
+        return Block(
+            tuple(
+                Word(m[1].decode(), float(m[2]), m.start(), m.end(), m[0], b"." not in m[2])
+                for m in _PLAIN_WORD.finditer(text)
+            )
+        )
+    return _parse_carefully(text, dialect)
+
+
+def _parse_carefully(text: bytes, dialect: Dialect) -> Block:
+    """The same word by word, whatever the line holds."""
     line = _Line(text, dialect)
     problem, column, rest, mark = None, None, b"", 0
     limit = dialect.text.line_limit

@@ -10,7 +10,7 @@ it says so by a number and nothing is refused: `nc` follows more than it does.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -20,8 +20,12 @@ from gcodejerk.units import MM_PER_INCH
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
 from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
+from gcodejerk.verification.second_reading.routes import LostError, calls, flows
 from gcodejerk.verification.second_reading.tracking import Tracker
+from gcodejerk.verification.second_reading.walking import Stepper, Walker
 
+MOST_BYTES = 4_000_000
+"""Of a file whose flow is followed."""
 MARK = b"\xef\xbb\xbf"
 """Of UTF-8, in front of the first line."""
 
@@ -151,12 +155,23 @@ def observations(
         Index into `lines`.
     seen : Observation
     """
-    dialect = dialect.with_harmless(start.harmless)
+    dialect = dialect.set_up(start)
     begin = original.tell()
     doubt = jumps_back(original, dialect)
     original.seek(begin)
     decimals = dialect.whole_numbers == "machine" and start.decimal_point != "calculator"
     text = Text(dialect, decimals)
+    stepper = Stepper(text, dialect)
+    whole = original.read(MOST_BYTES + 1)
+    original.seek(begin)
+    walks = flows(whole, dialect)
+    walked = None
+    if len(whole) <= MOST_BYTES and (walks or calls(whole, dialect)):
+        walked = _walked(whole, stepper, lambda: _begin(text, dialect, start))
+    if walked is not None or walks:
+        seen = walked or {}
+        yield from ((k, seen.get(line - 1, Observation())) for k, line in enumerate(lines))
+        return
     tracker = _begin(text, dialect, start)
     tracker.doubt = doubt
     if dialect.dark_rapids and start.spindle == "mill" and lines:
@@ -181,11 +196,22 @@ def observations(
             end = size if end < 0 else end
             bare = data[at:end].rstrip(b"\r")
             bare = bare.removeprefix(MARK) if number == 1 else bare
-            seen = tracker.follow(text.read(bare, not tracker.begun))
+            found = stepper.step(tracker, bare)
             if number == line:
-                yield following, seen
+                yield following, found
                 line, following = next(wanted), following + 1
             number, at = number + 1, end + 1
+
+
+def _walked(
+    whole: bytes, stepper: Stepper, begin: Callable[[], Tracker]
+) -> dict[int, Observation] | None:
+    """What is seen in the lines of a file with flow, from 0; None where it is not followed."""
+    lines = [line.rstrip(b"\r") for line in whole.removeprefix(MARK).split(b"\n")]
+    try:
+        return Walker(stepper, begin, lines).walk()
+    except LostError:
+        return None
 
 
 def _behaves_like_a_laser(original: BinaryIO, dialect: Dialect, start: Start) -> bool:
@@ -210,6 +236,8 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
             start.diameter,
             start.decimal_point,
             start.wraps,
+            start.home,
+            start.tool_change,
             start.resume,
             start.spindle,
             None if fed is None else (fed.feed, fed.clearance),

@@ -6,13 +6,14 @@ Rule: as in `tracking`, what is not followed makes unknown all that it might hav
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import Effect
-from gcodejerk.nc.dialects.gcodes import G54_1, G64, G91
+from gcodejerk.nc.dialects.dialect import LINEAR, Effect
+from gcodejerk.nc.dialects.gcodes import G28, G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
-from gcodejerk.verification.second_reading.known import Known
+from gcodejerk.verification.second_reading.known import Known, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
 
+SELECTIONS: frozenset[Effect] = frozenset(("system", "numbered system"))
 QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
 _CALLS = (47, 96, 97, 98, 198)
 _ENDS = (2, 17, 30, 99)
@@ -22,11 +23,45 @@ _OUTPUTS = (*range(62, 69), *range(100, 200))
 class Codes(Known):
     """Executes codes."""
 
+    def stray(self) -> None:
+        """Lose everything where a program runs that is not followed."""
+        self.forget()
+        self.strayed = True
+
     def unknown_call(self) -> None:
         """Whatever a program does that is not followed."""
-        self.forget()
+        self.stray()
         if self.dialect.diameter_codes:
             self.diameter = None
+
+    def program_shift(self, line: Line) -> Observation:
+        """TRANS X5, ATRANS X5, ROT Z30; alone, each of them ends all that went before."""
+        words = [(letter, number) for letter, number, _ in line.words if letter != "N"]
+        shift = len(line.effects) == 1 and line.effects[0] != "turned frame"
+        turned = self.frames.get("a programmed frame", False) is not False
+        if not words and len(line.effects) == 1:
+            self.frames["a programmed frame"] = False
+            self.g92 = self.rename(self.g92, [0.0] * len(AXES))
+            if turned:
+                self.lose()
+            return Observation()
+        letters = [letter for letter, _ in words]
+        plain = shift and set(letters) <= LINEAR and len(set(letters)) == len(letters)
+        plain = plain and not line.relative and not ("X" in letters and self.diameter is not False)
+        replaces = line.effects[0] == "shift"
+        if not plain or (turned and not replaces):
+            self.frames["a programmed frame"] = True if not shift else None
+            self.g92 = [NAN] * len(AXES)
+            self.lose()
+            return Observation()
+        if turned:
+            self.lose()
+        self.frames["a programmed frame"] = False
+        after = [0.0] * len(AXES) if replaces else list(self.g92)
+        for letter, number in words:
+            after[AXES.index(letter)] += number * self.scale(letter)
+        self.g92 = self.rename(self.g92, after)
+        return Observation()
 
     def turning(self, effect: Effect) -> None:
         """Take X as a diameter, or not."""
@@ -80,13 +115,18 @@ class Codes(Known):
             elif group is None and self.dialect.other_m == "unknown":
                 self.forget()
             elif group in (None, "tool", "user"):
-                self.lose()
+                places = self.facts.tool_change if m == 6 and group is not None else None
+                if places is None or self.turned():
+                    self.lose()
+                self.forget_shared()
                 if self.dialect.other_m == "positions" or f"M{m}" in self.dialect.refused:
-                    self.tool = [NAN] * len(AXES)
+                    self.cancel_length()
                     if self.cycle is not None:
                         self.g["motion"], self.cycle = None, None
                     if self.g.get("distance") == G91 and "distance" not in self.fixed:
                         self.g["distance"] = None
+                for axis, place in (places or {}).items():
+                    self.at[AXES.index(axis)] = self.stand(AXES.index(axis), place)
             elif group == "state":
                 self.forget()
         return ends
@@ -135,11 +175,8 @@ class Codes(Known):
             self.turning(effect)
         elif effect == "length":
             self.lengthen(code, values.get("H", NAN), _axes(values))
-        elif effect in ("system", "numbered system"):
-            number = values.get("P", NAN) if effect == "numbered system" else 0.0
-            if "P" in values and code in self.dialect.p_selects:
-                number = NAN
-            self.select(code if effect == "system" else G54_1, number)
+        elif effect in SELECTIONS:
+            self.select(self.selection(effect, code, values))
         elif effect == "frames":
             self.lose_offsets()
             self.lose()
@@ -156,6 +193,35 @@ class Codes(Known):
             self._data(values)
         elif effect == "flow":
             self.unknown_call()
+
+    def sure_of_systems(self, effects: dict[int, Effect], values: dict[str, float]) -> bool:
+        """Whether all work systems that codes select are certain in front of the block's motion."""
+        return all(
+            self.sure_of(self.selection(effect, code, values))
+            for code, effect in effects.items()
+            if effect in SELECTIONS
+        )
+
+    def selection(
+        self, effect: Effect, code: int, values: dict[str, float]
+    ) -> tuple[int, int] | None:
+        """Which work system a code selects; None where that is not known."""
+        number = values.get("P", NAN) if effect == "numbered system" else 0.0
+        if number != number or ("P" in values and code in self.dialect.p_selects):
+            return None
+        return code if effect == "system" else G54_1, int(number)
+
+    def go_home(self, block: Sorted) -> None:
+        """G28 leads to where the machine file says, G30 and its kin to an unknown place."""
+        if self.dialect.tool_cancelled_by_return:
+            self.cancel_length()
+        knows = G28 in block.g.values() and (block.axes or self.dialect.bare_return)
+        for k, axis in enumerate(AXES):
+            if block.axes and not block.axes >> k & 1:
+                continue
+            self.at[k] = self.stand(k, self.home.get(axis, NAN)) if knows else NAN
+        if self.turned():
+            self.lose()
 
     def _data(self, values: dict[str, float]) -> None:
         """G10: offsets (L2, L20), tool data (L1, L3, L10 to L13), or parameters."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
@@ -23,11 +23,12 @@ KINDS = {
     "g": "modes",
     **dict.fromkeys(("frames", "bars"), "frames"),
     **dict.fromkeys(("at", "system", "g92", "tool"), "axes"),
-    **dict.fromkeys(("systems", "lengths"), "table"),
+    **dict.fromkeys(("systems", "lengths", "home", "variables"), "table"),
     **dict.fromkeys(("feed", "level", "r"), "number"),
     **dict.fromkeys(("p", "q"), "tolerance"),
-    **dict.fromkeys(("doubt", "turns", "habits"), "ever"),
-    **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter", "selected"), "mode"),
+    **dict.fromkeys(("doubt", "turns", "habits", "strayed"), "ever"),
+    **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter"), "mode"),
+    **dict.fromkeys(("selected", "told"), "mode"),
     **dict.fromkeys(("cycle", "feed_whole", "spindle"), "mode"),
     **dict.fromkeys(("dialect", "facts", "fixed", "dark", "burns"), "given"),
     # where in the file the reading is; a line that may be skipped changes none of these for good
@@ -46,6 +47,8 @@ class Facts:
     diameter: bool = False
     decimal_point: str | None = None
     wraps: Mapping[str, str] = field(default_factory=dict)
+    home: Mapping[str, float] = field(default_factory=dict)
+    tool_change: Mapping[str, float] | None = None
     resume: str | None = None
     spindle: str | None = None
     rapid_feed: tuple[float, float] | None = None
@@ -106,6 +109,9 @@ class Known:
         self.tool = list(self.g92)
         self.systems = {_system(name): values for name, values in facts.offsets.items()}
         self.lengths = dict(facts.tool_lengths)
+        self.home = dict(facts.home)
+        self.told: tuple[int, int] | None = None
+        """The work system that a block, or the startup codes, have selected last."""
         self.selected: tuple[int, int] | None = None
         if "system" in modes:
             self.selected = (modes["system"], 0)
@@ -127,6 +133,10 @@ class Known:
         self.doubt = False
         """Nothing can be confirmed any more: subprograms, jumps."""
         self.contour: float | None = None
+        self.variables: dict[str, float] = {}
+        """Those that the program has set, on every way that leads here."""
+        self.strayed = False
+        """A program has run that is not followed."""
 
     def mode_of(self, code: int | None) -> int | None:
         """93, 94 or 95 by its code."""
@@ -145,9 +155,9 @@ class Known:
         self.at = [self.facts.positions.get(axis, NAN) for axis in AXES]
         self.begun = self.started = False
 
-    def copy(self) -> Known:
+    def copy(self) -> Self:
         """Make an independent copy."""
-        other = object.__new__(Known)
+        other = object.__new__(type(self))
         for name, value in vars(self).items():
             setattr(other, name, value.copy() if isinstance(value, dict | list) else value)
         return other
@@ -186,8 +196,19 @@ class Known:
         if self.turns and not self.dialect.diameter_fixed:
             self.diameter = None
         self.lose_offsets()
-        self.systems, self.lengths = {}, {}
+        self.systems, self.lengths, self.home, self.variables = {}, {}, {}, {}
+        self.told = None
         self.frames, self.bars = dict.fromkeys(self.frames), dict.fromkeys(self.bars)
+
+    def forget_shared(self) -> None:
+        """Lose the variables that a program of the builder's can have set."""
+        rules = self.dialect.arithmetic
+        self.variables = {
+            name: value
+            for name, value in self.variables.items()
+            if (name.isdigit() and int(name) <= rules.local)
+            or (rules.brackets == "()" and not (name[:1] == "R" and name[1:].isdigit()))
+        }
 
     def lose_offsets(self) -> None:
         """Lose what lies between machine and program coordinates."""
@@ -213,12 +234,16 @@ class Known:
         """Put a tool length in force: that of the machine file under an H number, or none."""
         length = self.lengths.get(int(number), NAN) if number == number else NAN
         length = 0.0 if code == G49 else length if code == G43 else NAN
-        after = [length if axis == "Z" else 0.0 for axis in AXES]
-        self.tool = self.rename(self.tool, after if length == length else [NAN] * len(AXES))
+        only = self.g.get("plane") == G17 and named & ~_bits(self.dialect.length_axes) == 0
+        axes = self.dialect.length_axes if only else AXES
+        after = list(self.tool)
+        for k, axis in enumerate(AXES):
+            if axis in axes:
+                after[k] = NAN if length != length else length if axis == "Z" else 0.0
+        self.tool = self.rename(self.tool, after)
         self.end_bar("tool data")
         if self.dialect.length_moves:
-            only = self.g.get("plane") == G17 and named & ~_bits(self.dialect.length_axes) == 0
-            self.lose(self.dialect.length_axes if only else AXES)
+            self.lose(axes)
 
     def end_bar(self, name: str) -> None:
         """End what forbade to rewrite."""
@@ -229,7 +254,8 @@ class Known:
         """Data of the control have been set that may hold offsets."""
         self.lose()
         self.lose_offsets()
-        self.systems, self.lengths, self.selected = {}, {}, None
+        self.systems, self.lengths, self.selected, self.told = {}, {}, None, None
+        self.home = {}
         self.bars.update({"offsets": True, "tool data": True})
 
     def turn(self, k: int, angle: float) -> float:
@@ -250,14 +276,31 @@ class Known:
         ends.sort(key=lambda end: abs(end - here))
         return NAN if abs(abs(ends[0] - here) - abs(ends[1] - here)) < 1e-6 else ends[0]
 
-    def select(self, code: int, number: float) -> None:
+    def sure_of(self, selected: tuple[int, int] | None) -> bool:
+        """Whether a work system was selected before, or the machine file has it."""
+        again = selected == self.told == self.selected
+        return selected is not None and (again or selected in self.systems)
+
+    def select(self, selected: tuple[int, int] | None) -> None:
         """Select a work system."""
         self.end_bar("offsets")
-        selected = (code, int(number)) if number == number else None
         if selected is None or selected != self.selected:
             known = [NAN] * len(AXES) if selected is None else self.offsets_of(selected)
             self.system = self.rename(self.system, known)
-        self.selected = selected
+        self.selected = self.told = selected
+
+    def stand(self, k: int, place: float) -> float:
+        """The program's name of a machine coordinate of an axis."""
+        counts = AXES[k] not in LINEAR and self.facts.wraps.get(AXES[k]) in ("shortest", "sign")
+        return (
+            NAN if counts or self.turned() else place - self.system[k] - self.g92[k] - self.tool[k]
+        )
+
+    def cancel_length(self) -> None:
+        """The tool length may have been cancelled."""
+        for k, length in enumerate(self.tool):
+            if length != 0.0:
+                self.tool[k] = self.at[k] = NAN
 
     def shift(
         self, kinds: set[Effect], values: Mapping[str, float], increments: Mapping[str, float]

@@ -78,6 +78,8 @@ class Line:
     """The plane is turned from here on."""
     group: bool = False
     """F is from here on the speed of some axes only."""
+    relative: dict[str, str] = field(default_factory=dict)
+    """Address -> ``IC`` or ``AC``, whatever G90 or G91 says."""
 
 
 @dataclass(slots=True)

@@ -18,13 +18,14 @@ _SINGLE = ("stop", "spindle", "coolant", "tool")
 class Sorted:
     """The words of a line, by what they are."""
 
-    __slots__ = ("axes", "feed_whole", "g", "increments", "m", "values")
+    __slots__ = ("axes", "feed_whole", "g", "increments", "m", "relative", "values")
 
     def __init__(self) -> None:
         self.g: dict[str, int] = {}
         self.m: list[int] = []
         self.values: dict[str, float] = {}
         self.increments: dict[str, float] = {}
+        self.relative: dict[str, str] = {}
         self.axes = 0
         self.feed_whole = False
 
@@ -32,6 +33,7 @@ class Sorted:
         """Sort; whether every word has a meaning that is known, and none stands twice."""
         if not self._codes(line, dialect):
             return False
+        self.relative = line.relative
         dwells = any(dialect.effect(code) == "words" for code in self.g.values())
         inch = dialect.units[self.g["units"]] if "units" in self.g else inch
         for letter, number, whole in line.words:

@@ -16,7 +16,7 @@ from gcodejerk.nc.dialects.dialect import LINEAR, Effect
 from gcodejerk.nc.dialects.gcodes import G1, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
-from gcodejerk.verification.second_reading.coding import QUIET
+from gcodejerk.verification.second_reading.coding import QUIET, SELECTIONS
 from gcodejerk.verification.second_reading.drilling import Drilling
 from gcodejerk.verification.second_reading.known import NEAR, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line, Run
@@ -30,8 +30,13 @@ _FRAMES: frozenset[Effect] = frozenset(
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
-_READ: frozenset[Effect] = QUIET | frozenset[Effect](("frames", "swivel", "machine"))
+_READ: frozenset[Effect] = (
+    QUIET
+    | frozenset[Effect](("frames", "swivel", "machine"))
+    | frozenset[Effect](("shift", "further shift", "turned frame"))
+)
 """Effects of names that are followed."""
+_SHIFTS: frozenset[Effect] = frozenset(("shift", "further shift", "turned frame"))
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
 
@@ -86,7 +91,7 @@ class Tracker(Drilling):
             self._flow(line.flow)
             return Observation()
         if line.offsets and self.dialect.arithmetic.at_selection:
-            self.systems = {}
+            self.systems, self.home = {}, {}
         elif line.offsets:
             self.written()
         if line.understood and not line.words and not line.effects:
@@ -143,6 +148,8 @@ class Tracker(Drilling):
             return Observation()
         if not line.understood or any(effect not in _READ for effect in line.effects):
             return self._lost(line)
+        if _SHIFTS.issuperset(line.effects) and line.effects:
+            return self.program_shift(line)
         if not {"frames", "swivel"}.isdisjoint(line.effects):
             return self._new_frame(line)
         if self.contour is not None:
@@ -195,9 +202,12 @@ class Tracker(Drilling):
         # M3 I: a letter without a number is no word
         fires = any(letter == "M" and number in (3, 4) for letter, number, _ in line.words)
         self.habits = self.habits or (fires and not line.understood)
+        if "watch" in line.effects:
+            self.bars["synchronized action"] = True
         if any(effect in ("transform", "swivel", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
+        self.strayed = True
         return Observation()
 
     def _in_contour(self, line: Line) -> None:
@@ -211,7 +221,8 @@ class Tracker(Drilling):
         effects = {code: self.dialect.effect(code) for code in block.g.values()}
         kinds = set(effects.values())
         burnt = self.spindle != 5
-        seen = Observation(against=self._ban(kinds), axes=block.axes)
+        sure = self.sure_of_systems(effects, block.values)
+        seen = Observation(self._ban(kinds - SELECTIONS if sure else kinds), axes=block.axes)
         self._set_feed(block, kinds)
         ends = self.machine_codes(block)
         self._set_tool(block, seen)
@@ -243,7 +254,7 @@ class Tracker(Drilling):
     def _set_tool(self, block: Sorted, seen: Observation) -> None:
         """Execute the words, other than codes, that move the tool or its frame."""
         dialect, values = self.dialect, block.values
-        if dialect.tool_word_moves and "T" in values:
+        if dialect.tool_word_moves and "T" in values and self.facts.tool_change is None:
             self.lose()
         if dialect.length_word in values and "tool length" not in block.g:
             self.lengthen(0, NAN, block.axes)
@@ -364,11 +375,10 @@ class Tracker(Drilling):
     def _taken(self, block: Sorted, kinds: set[Effect]) -> bool:
         """Execute what takes the axis words from the motion: G28, G92, G10, G43.1."""
         if "return" in kinds:
-            if self.dialect.tool_cancelled_by_return:
-                self.tool = [NAN] * len(AXES)
-                self.lose()
-            self.lose(_letters(block.axes) or AXES)
+            self.go_home(block)
             return True
+        if "store" in kinds:
+            self.home = {}
         if kinds & {"set", "clear", "restore", "local", "table"}:
             self.shift(kinds, block.values, block.increments)
             return True
@@ -391,11 +401,12 @@ class Tracker(Drilling):
                 self.at[k] += block.increments[axis] * self.scale(axis)
             elif axis in block.values:
                 there = block.values[axis] * self.scale(axis)
-                if distance == G91:
+                how = block.relative.get(axis)
+                if how == "IC" or (how is None and distance == G91):
                     there += self.at[k]
                 elif axis not in LINEAR:
                     there = self.turn(k, there)
-                self.at[k] = NAN if distance is None else there
+                self.at[k] = NAN if distance is None and how is None else there
 
     def _why_not(self, block: Sorted, seen: Observation) -> None:
         """Whether the move was a rapid in a known frame."""

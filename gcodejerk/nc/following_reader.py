@@ -1,0 +1,139 @@
+"""A reader that looks at the whole file before it runs it, where its flow can be followed.
+
+Rule: what cannot be followed whole is read as `Reader` reads it, line after line, and everything
+that jumps may lead to is forgotten.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import BinaryIO
+
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.flow.following import Follower
+from gcodejerk.nc.flow.macro_b import NotFollowedError, macro_script
+from gcodejerk.nc.flow.named import named_script
+from gcodejerk.nc.flow.o_words import Passes
+from gcodejerk.nc.flow.script import Script
+from gcodejerk.nc.flow.subprograms import Calls
+from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.runner import Runner
+from gcodejerk.nc.reader import Reader
+from gcodejerk.nc.text.block import Line
+from gcodejerk.start import Start
+
+MOST_BYTES = 4_000_000
+"""Of a file that is followed; a larger one is read line after line."""
+_NAMED = re.compile(
+    rb"(?<![A-Z0-9_])(?:GOTO[FBC]?|FOR|WHILE|LOOP|REPEATB?|IF|PROC)(?![A-Z0-9_])|%_N_",
+    re.IGNORECASE,
+)
+_MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[", re.IGNORECASE)
+
+
+def worth_following(file: BinaryIO, dialect: Dialect) -> bool:
+    """Whether a file has flow that can be followed; it stands where it stood."""
+    if dialect.text.variables == "R" and dialect.text.names:
+        pattern = _NAMED
+    elif dialect.text.keywords and dialect.text.o_word == "program":
+        pattern = _MACRO
+    else:
+        return False
+    begin = file.tell()
+    data = file.read(MOST_BYTES + 1)
+    file.seek(begin)
+    return len(data) <= MOST_BYTES and pattern.search(data) is not None
+
+
+class FollowingReader(Reader):
+    """Collects the lines of a file, and runs them when it is complete."""
+
+    def __init__(
+        self, name: str, dialect: Dialect, start: Start, calls: Callable[[Runner], Calls]
+    ) -> None:
+        super().__init__(name, dialect, start)
+        self._start, self._make_calls = start, calls
+        self._kept: list[tuple[Line, bool]] = []
+        """Lines, and whether each is the first block."""
+        self._behind: list[tuple[Line, bool]] = []
+        """The same behind a closing ``%``."""
+        self._closed = False
+
+    @property
+    def collecting(self) -> bool:
+        """Whether lines wait to be run."""
+        return True
+
+    def can_run(self) -> bool:
+        """Lines are run when the file is complete."""
+        return False
+
+    def _run(self, line: Line, first: bool = False) -> None:
+        (self._behind if self._closed else self._kept).append((line, first))
+
+    def _percent(self, line: Line) -> None:
+        named = self.dialect.text.percent == "named"
+        if not named and (self.percent is not None or self.blocks):
+            self._closed = True
+        if self.percent is None and not self.blocks:
+            self.percent, self.insert_at, self.started = line.number, line.end, True
+        self._run(line)
+
+    def finish(self) -> None:
+        """Run everything."""
+        kept, observe = self.runner, self.runner.observe
+        said = (list(kept.syntax_problems), kept.problem_count)
+        passed: list[tuple[Line, State]] = []
+        if observe is not None:
+            # What is seen before the file is given up is not what happens on every pass.
+            kept.observe = lambda line, state: passed.append((line, state.copy()))
+        try:
+            spoiled = self._follow()
+            if observe is not None:
+                for line, state in passed:
+                    lost = any(first <= line.number <= last for first, last in spoiled)
+                    observe(line, State() if lost else state)
+        except NotFollowedError:
+            runner = self.runner = Runner(self.name, self.dialect, self._start)
+            runner.syntax_problems, runner.problem_count = said
+            runner.observe = observe
+            self.passes = Passes(runner)
+            self.refer(self._make_calls(runner))
+            self._replay_all()
+        self._finish_log()
+
+    def _follow(self) -> list[tuple[int, int]]:
+        """Run the file as a script; lines of which not every pass is known."""
+        lines = [line for line, _ in self._kept]
+        if self.dialect.text.names:
+            script: Script = named_script(lines)
+        else:
+            script = macro_script([line for line in lines if not line.block.percent], self.dialect)
+        runner = self.runner
+        follower = Follower(runner, script)
+        follower.follow()
+        if follower.ended is not None:
+            runner.state = follower.ended
+        runner.enter_unreached(line for line in lines if not line.block.percent)
+        if self._behind or follower.ended is not None:
+            runner.executor.end()
+        for line, _ in self._behind:
+            if not line.block.percent and line.block.o_word is None:
+                runner.run(line)
+        return follower.spoiled
+
+    def _replay_all(self) -> None:
+        """Take all lines one by one."""
+        self.percent = None
+        blocks, started, insert_at = self.blocks, self.started, self.insert_at
+        self.blocks, self.started = 0, False
+        for line, first in [*self._kept, *self._behind]:
+            if line.block.percent:
+                super()._percent(line)
+            else:
+                self.blocks, self.started = blocks, True
+                super()._run(line, first)
+        self.blocks, self.started, self.insert_at = blocks, started, insert_at
+        assert self.calls is not None
+        self.calls.finish()
