@@ -84,7 +84,8 @@ def _lengths(block: bytes, dialect: Dialect) -> tuple[int, int]:
         if word.letter in AXES or word.letter in dialect.increments:
             own = word.end - word.begin
             axes += own
-            grows = word.letter in dialect.increments or scaled
+            computed = word.value is None or word.function != ""
+            grows = word.letter in dialect.increments or scaled or computed
             # Of an increment, the last word holds what is left, with the decimals of a step too.
             point += max(own + 8, REWRITTEN if grows else 0) + 1
     return len(block.rstrip()) - axes, point

@@ -120,6 +120,11 @@ class Frame:
             # The points are absolute: so is the end of an increment.
             return axis.encode() + plain(programmed_end(self.rapids, self.move, axis, False))
         incremental = bool(self.rapids.incremental[self.move])
+        if word.value is None or word.function:
+            # A variable, or X=IC(5): the points know nothing of either.
+            number = programmed_end(self.rapids, self.move, word.letter, incremental)
+            left = number - before_end.get(AXES.index(word.letter), Decimal(0))
+            return word.letter.encode() + plain(left if incremental else number)
         # X=3 of Siemens is X3.
         text = b"".join(word.text[1:].split()).removeprefix(b"=")
         number = Decimal(text.decode())

@@ -99,14 +99,16 @@ class LinuxcncController(LinuxcncSettings, Controller):
         feed = _feeds(batch, rapids)
         guard = batch.plans.machine.controller_options.override_guard
         out = []
+        every = [_Points(batch, rapids, row, feed[row]) for row in range(len(batch))]
+        texts = _texts(every, ends)
         for row, move in enumerate(batch.moves.tolist()):
             block = parse_block(blocks[row], options.dialect)
             frame = Frame(rapids, move, block, blocks[row], options.dialect)
-            points = _Points(batch, rapids, row, feed[row])
+            points = every[row]
             lines = [
                 *frame.modes(),
                 *points.lead(filled=bool(rapids.queued[move]) and not guard),
-                points.text(ends[row]),
+                texts[row],
                 frame.last_point(points.reached(), b"G0"),
                 *([b" ".join(words)] if (words := restored(frame)) else []),
             ]
@@ -206,8 +208,13 @@ def _feeds(batch: Batch, rapids: Rapids) -> NDArray[np.int64]:
     ends = np.maximum(speed, np.concatenate([speed[:, :1], speed[:, :-1]], axis=1))
     scale = per_minute(1.0) * 10.0**decimals / unit
     feed: NDArray[np.int64] = np.rint(ends * scale[:, np.newaxis]).astype(np.int64)
+    # Above 1 m/s the last decimal is less than a double's last bit, once F is a speed.
+    bit = np.spacing(ends) * scale[:, np.newaxis]
+    apart = np.where(bit > 1.0, np.ceil(3.0 * bit), 1.0).astype(np.int64)
     for k in range(1, feed.shape[1]):
-        feed[:, k] += (knots[:, k - 1] > 0) & (feed[:, k] == feed[:, k - 1])
+        near = np.abs(feed[:, k] - feed[:, k - 1]) < apart[:, k]
+        equal = (knots[:, k - 1] > 0) & near
+        feed[:, k] = np.where(equal, feed[:, k - 1] + apart[:, k], feed[:, k])
     return feed
 
 
@@ -250,18 +257,33 @@ class _Points:
             return [b"G0 " + words[0]]
         return [b"G0 " + words[0], b"G1 " + words[1] + b" F%.9f" % feed, b"G0 " + words[2]]
 
-    def text(self, line_end: bytes) -> bytes:
-        """The G1 blocks."""
-        columns: list[Column] = []
-        for axis in self.axes:
-            values = self.whole[axis]
-            values = np.diff(values) if self.incremental else values[1:]
-            prefix = (b" " if columns else b"G1 ") + AXES[axis].encode()
-            columns.append(Column(prefix, values, self.decimals))
-        places = INCH_FEED_DECIMALS if self.inch else FEED_DECIMALS
-        columns.append(Column(b" F", self.feed, places))
-        return format_lines(columns, line_end)[0].removesuffix(line_end)
+    def columns(self) -> list[NDArray[np.int64]]:
+        """The numbers of the G1 blocks: each axis, and F."""
+        numbers = [self.whole[axis] for axis in self.axes]
+        ways = [np.diff(each) if self.incremental else each[1:] for each in numbers]
+        return [*ways, self.feed]
 
     def reached(self) -> dict[int, Decimal]:
         """How far the increments of all points lead, in the program's unit."""
         return {a: Decimal(int(v[-1])).scaleb(-self.decimals) for a, v in self.whole.items()}
+
+
+def _texts(points: Sequence[_Points], ends: Sequence[bytes]) -> list[bytes]:
+    """The G1 blocks of many moves; those that are spelled alike are made together."""
+    alike: dict[tuple[tuple[int, ...], bool, bytes], list[int]] = {}
+    for row, (one, end) in enumerate(zip(points, ends, strict=True)):
+        alike.setdefault((tuple(one.axes), one.inch, end), []).append(row)
+    out = [b""] * len(points)
+    for (axes, inch, end), rows in alike.items():
+        places = [INCH_DECIMALS if inch else DECIMALS] * len(axes)
+        places.append(INCH_FEED_DECIMALS if inch else FEED_DECIMALS)
+        prefixes = [b"G1 " + AXES[axes[0]].encode(), *(b" " + AXES[a].encode() for a in axes[1:])]
+        each = [points[row].columns() for row in rows]
+        words = zip([*prefixes, b" F"], zip(*each, strict=True), places, strict=True)
+        columns = [Column(prefix, np.concatenate(parts), n) for prefix, parts, n in words]
+        text, last = format_lines(columns, end)
+        count = np.cumsum([len(columns[-1]) for columns in each])
+        at = [0, *last[count - 1].tolist()]
+        for row, begin, behind in zip(rows, at, at[1:], strict=False):
+            out[row] = text[begin:behind].removesuffix(end)
+    return out

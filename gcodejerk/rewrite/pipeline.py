@@ -24,7 +24,7 @@ from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.nc import Program, find_dialect, read_program
+from gcodejerk.nc import Program, read_program
 from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.lines import Play
@@ -46,10 +46,11 @@ from gcodejerk.rewrite.feed_moves import instead_notes
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
 from gcodejerk.rewrite.rapid_feed import check_dialect, check_rapid_feed
-from gcodejerk.rewrite.result import Result, reported_profiles
+from gcodejerk.rewrite.result import ReportedProfiles, Result
 from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.set_control import set_control
 from gcodejerk.rewrite.stamp import ProcessedError, stamp_text
+from gcodejerk.rewrite.what_if import entry_notes
 from gcodejerk.verification import Verification, require, verify_files
 
 Progress = Callable[[str, int, int], None]
@@ -231,7 +232,7 @@ def _process(
         plans, peaks = told_in(plans, program.rapids, form)
     writer = Rewriter(
         source, target, program, emitter,
-        Options(settings.comments, find_dialect(program.dialect)),
+        Options(settings.comments, program.language),
         stamp_text(machine, _chosen(machine, settings, emitter.name, emitter.form)),
         beside,
         guarded=machine.controller_options.override_guard,
@@ -246,6 +247,7 @@ def _process(
             source, target, machine, settings, program, plans, emitter, lines, beside
         )
         report("verifying", 1, 1)
+    what_if = entry_notes(source, program, machine.program_start())
     edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
     differences = hunks(edits, program.rapids, program.insert_at, lines)
     program = in_original(program, expansion)
@@ -266,6 +268,7 @@ def _process(
         notes=(
             *operator_notes(emitter, machine, plans),
             *program_notes(program, expansion, emitter),
+            *what_if,
             *instead_notes(source, plans, emitter.name),
             *dogleg_notes(plans, deviation),
             *tick_notes(plans),
@@ -323,6 +326,7 @@ def _read(
         progress=lambda done: report("reading", done, size),
         neighbours=replace(machine, controller=emitter.name).neighbours_matter,
     )
+    program.rapids.freeze()
     if program.stamp is not None and not settings.force:
         raise ProcessedError(
             "this program has been processed by gcodejerk before",
@@ -343,7 +347,7 @@ def _plan(
     """All rapids of the program that are certain, and that the control could read as streams."""
     rapids = program.rapids
     if emitter.in_place:
-        dialect = find_dialect(program.dialect)
+        dialect = program.language
         reason = reasons_to_leave(program, source, machine, dialect)
         unguardable = emitter.unguardable(program, source, machine, dialect)
         reason[unguardable & (reason == CERTAIN)] = REASONS.index(Reason.SUBPROGRAM)
@@ -430,8 +434,9 @@ def _verified(
             names=(program.name, f"the output for {program.name}"),
             dialect=program.dialect,
             table=not emitter.in_place,
-            reported=reported_profiles(program, plans) if emitter.play is Play.ALIGNED else None,
+            reported=ReportedProfiles(program, plans) if emitter.play is Play.ALIGNED else None,
             beside=beside if emitter.beside else None,
+            program=program,
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +12,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program
+from gcodejerk.planning.batch import SIDES
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
@@ -88,17 +90,33 @@ def rapid_results(
     return tuple(out)
 
 
-def reported_profiles(program: Program, plans: Plans) -> dict[int, Array]:
-    """The profiles as reports say them: durations and jerks along the path, by line."""
-    out = {}
-    for move in np.flatnonzero(plans.planned).tolist():
-        rows = plans.profiles_of(move)
-        if len(rows) == 1:
-            segments = slice(*plans.profiles.first[rows.start : rows.start + 2].tolist())
-            jerk = plans.profiles.jerk[segments] * plans.length[move]
-            line = int(program.rapids.line[move])
-            out[line] = np.stack([plans.profiles.duration[segments], jerk], axis=1)
-    return out
+class ReportedProfiles(Mapping[int, Array]):
+    """The profiles as reports say them: durations and jerks along the path, by line.
+
+    Each is made when it is asked for: of a hundred thousand moves no copy is kept.
+    """
+
+    def __init__(self, program: Program, plans: Plans) -> None:
+        planned = np.flatnonzero(plans.planned)
+        begin, end = (np.searchsorted(plans.move, planned, side=side) for side in SIDES)
+        single = end - begin == 1
+        self.plans, self.moves, self.rows = plans, planned[single], begin[single]
+        self.lines = program.rapids.line[self.moves]
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self.lines.tolist())
+
+    def __getitem__(self, line: int) -> Array:
+        at = int(np.searchsorted(self.lines, line, side="right")) - 1
+        if at < 0 or self.lines[at] != line:
+            raise KeyError(line)
+        profiles, row = self.plans.profiles, int(self.rows[at])
+        segments = slice(int(profiles.first[row]), int(profiles.first[row + 1]))
+        jerk = profiles.jerk[segments] * self.plans.length[self.moves[at]]
+        return np.stack([profiles.duration[segments], jerk], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+from array import array
 from collections.abc import Sequence
 from typing import BinaryIO
 
@@ -92,7 +93,7 @@ class Rewriter:
         self.sum_at: int | None = None
         self.at = 0
         self.between = b""
-        self.edits: list[tuple[int, int, int]] = []
+        self.edits = array("q")
         source.seek(0)
 
     def write_header(self, machine: Machine) -> None:
@@ -148,7 +149,7 @@ class Rewriter:
         self.target.write(text)
         self.written.update(text)
         if self.emitter.in_place:
-            self.edits.append((begin, begin + len(text), move))
+            self.edits.extend((begin, begin + len(text), move))
 
     def _sign(self, text: bytes) -> None:
         """Write the head of a file of its own; in place there is none."""

@@ -17,7 +17,7 @@ from typing import BinaryIO
 from gcodejerk.emit.sheets import Sheets
 from gcodejerk.errors import EmitError, Place
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Dialect, Program, find_dialect
+from gcodejerk.nc import Dialect, Program
 from gcodejerk.nc.program import split_lines
 from gcodejerk.nc.text.block import Block
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK, read_chunks
@@ -99,7 +99,7 @@ class _Scan:
 
     def __init__(self, program: Program, emitter: Sheets, machine: Machine) -> None:
         self.program, self.emitter = program, emitter
-        self.dialect: Dialect = find_dialect(program.dialect)
+        self.dialect: Dialect = program.language
         self.firmware = self.dialect.one_command
         self.own = re.compile(emitter.program_sets.encode(), re.IGNORECASE)
         self.harmless = {one.number.upper() for one in machine.controller_parameters}
