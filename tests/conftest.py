@@ -6,13 +6,16 @@ import tempfile
 
 from hypothesis import settings
 
+USUAL = 60
+"""Examples of a property test that does not say how many."""
 LONG = 250
 """How many times more examples `--long` draws."""
 
 
 def pytest_configure(config):
     # How long an example takes says what else the machine does, not what the package does.
-    settings.register_profile("untimed", deadline=None)
+    # Every run draws others: what one does not come to, the next one does.
+    settings.register_profile("untimed", deadline=None, max_examples=USUAL)
     settings.load_profile("untimed")
     # No test reads or fills the user's own cache of solutions.
     config.cache_folder = tempfile.mkdtemp(prefix="gcodejerk-cache-")
