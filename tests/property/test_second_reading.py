@@ -61,6 +61,18 @@ def test_the_second_reading_agrees_with_the_first(dialect, data, known):
     assert not violations
 
 
+@pytest.mark.parametrize("wrap", ["none", "shortest", "sign"])
+def test_a_rotary_axis_that_counts_turns_does_so_in_a_run_of_feed_moves(wrap):
+    run = b"Z105.9 X162.3\nY0. X199.9 Z-188.75\nA10. C-104.4 Z-49.5\n"
+    data = b"G1 F100\n" + run * 5 + b"G1 Z180\nG0 Y190. X-120.\nY77. C-65.98\n"
+    start = replace(start_of("linuxcnc"), wraps=dict.fromkeys("ABC", wrap))
+    rapids = read(data, "linuxcnc", start)
+    assert np.count_nonzero(rapids.reason == CERTAIN) == 2
+    violations, confirmed = judge(data, "linuxcnc", start, rapids)
+    assert not violations
+    assert confirmed == (2 if wrap == "none" else 1)
+
+
 @pytest.mark.parametrize(("spindle", "certain"), [(None, 1), ("mill", 1), ("laser", 0)])
 def test_outputs_may_fire_a_beam_only_where_there_is_one(spindle, certain):
     """M106 is a fan, unless the machine file says that the machine burns."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.nc import CERTAIN, REASONS, Start, read_program
+from gcodejerk.nc import CERTAIN, REASONS, Start, read_program, trace
 from gcodejerk.nc.flow import following
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import verify
@@ -297,3 +297,17 @@ def test_computed_rapids_are_written_as_numbers_and_proven(dialect):
     assert not any(c in line for line in points for c in (b"R", b"#", b"=", b"("))
     proof = verify(data, result.output, machine, dialect=dialect, controller=dialect)
     assert not proof.violations
+
+
+def test_a_line_that_did_nothing_on_one_pass_is_traced_on_that_pass_too():
+    # What is known behind it is what holds on every pass, also where its condition was false.
+    data = (
+        b"O1\nG21 G90 G94 G17 G40 G49 G80 G54\n#1=1.\n#2=2.\nN10 G90\nIF [#1 NE #2] THEN #1=#1\n"
+        b"G0 X0. Y1.\n#2=1.\nIF [0. EQ 0.] GOTO 10\nM30\n"
+    )
+    after = {
+        line: place
+        for line, place, _ in trace(io.BytesIO(data), dialect="fanuc", start=START["fanuc"])
+    }
+    assert np.isnan(after[6][1])
+    assert after[7][1] == 1.0

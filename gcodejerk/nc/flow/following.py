@@ -242,6 +242,8 @@ class Follower:
             runner.state = state
             runner.run(op.line, visit=True)
             state = runner.state if value == value else join(before, runner.state)
+        elif self.runner.observe is not None:
+            self.runner.observe(self.script.lines[at], state)
         ways.go(at + 1, state)
 
     def _count(self, at: int, op: Op, state: State, ways: Ways) -> None:

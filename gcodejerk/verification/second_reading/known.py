@@ -276,6 +276,13 @@ class Known:
         ends.sort(key=lambda end: abs(end - here))
         return NAN if abs(abs(ends[0] - here) - abs(ends[1] - here)) < 1e-6 else ends[0]
 
+    def end_run(self, k: int, there: float) -> None:
+        """An axis ends a run of which only its last word is known, not how many turns it made."""
+        self.at[k] = there
+        if AXES[k] not in LINEAR:
+            counts = self.facts.wraps.get(AXES[k]) in ("shortest", "sign")
+            self.at[k] = NAN if counts else self.turn(k, there)
+
     def sure_of(self, selected: tuple[int, int] | None) -> bool:
         """Whether a work system was selected before, or the machine file has it."""
         again = selected == self.told == self.selected

@@ -73,7 +73,7 @@ class Tracker(Drilling):
             if letter == "F":
                 self.feed, self.feed_whole = number, self._matters(run.feed_whole)
             else:
-                self.at[AXES.index(letter)] = number * self.scale(letter)
+                self.end_run(AXES.index(letter), number * self.scale(letter))
         if run.code is not None and self.dialect.modal_motion:
             self.g["motion"] = run.code
         if self.g.get("compensation") != G40:
