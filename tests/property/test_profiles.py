@@ -1,4 +1,4 @@
-"""Profiles of every kind, over drawn machines and moves: 600 moves, or 150,000 with `--long`.
+"""Profiles of every kind, over drawn machines and moves: 400 moves, or 100,000 with `--long`.
 
 What a profile does is worked out here from its jerks alone, by sums that share no code with the
 package.
@@ -17,13 +17,13 @@ from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.testing import machines
 
 MOVES = 50
-"""Of an example; 12 examples in four parts are 600 moves."""
+"""Of an example; 8 examples in four parts are 400 moves."""
 LONGEST = 160
 """Intervals of a drawn move, about: an optimum of more takes long."""
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 SAME_TIME = ("condition1", "condition2", "condition3", "symmetric", "cascade", "optimal")
 cases = settings(
-    max_examples=3, deadline=None, phases=PHASES, suppress_health_check=list(HealthCheck)
+    max_examples=2, deadline=None, phases=PHASES, suppress_health_check=list(HealthCheck)
 )
 
 

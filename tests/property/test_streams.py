@@ -15,7 +15,7 @@ from gcodejerk.testing import assert_stream_valid, machines, moves
 # A machine is a large thing to shrink: minutes for a smaller example that says no more.
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 slow = settings(
-    max_examples=14, deadline=None, phases=PHASES, suppress_health_check=list(HealthCheck)
+    max_examples=9, deadline=None, phases=PHASES, suppress_health_check=list(HealthCheck)
 )
 
 
@@ -107,7 +107,7 @@ def worst_in_band(machine, positions, dt):
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @given(case=cases(jerk_limited=True))
-@settings(slow, max_examples=8)
+@settings(slow, max_examples=5)
 def test_no_stream_leaves_more_than_the_conventional_one(part, case):
     plan = plan_or_skip(case)
     plans, dt = plan.plans, plan.machine.interval
@@ -132,7 +132,7 @@ def rewritten():
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
 @given(case=cases(jerk_limited=True, positioning="linear"))
-@settings(slow, max_examples=8)
+@settings(slow, max_examples=5)
 def test_segments_add_up_to_the_time_and_to_the_length(part, rewritten, case):
     plan = plan_or_skip(case)
     position = velocity = acceleration = 0.0

@@ -70,7 +70,7 @@ def test_every_output_is_accepted(controller, machine, data, known):
 
 
 @pytest.mark.parametrize("part", range(4))  # for as many cores
-@settings(parent=CALM, max_examples=3)
+@settings(parent=CALM, max_examples=2)
 @given(
     st.sampled_from(PLANNERS),
     st.data(),
@@ -103,7 +103,7 @@ def test_every_output_is_accepted_whatever_profile_todays_rapids_follow(
 
 
 @pytest.mark.parametrize("part", range(2))  # for as many cores
-@settings(parent=CALM, max_examples=4)
+@settings(parent=CALM, max_examples=2)
 @given(machine=machines(axes="XYZ"), data=programs())
 def test_every_table_is_accepted(part, machine, data):
     machine = ready(machine)

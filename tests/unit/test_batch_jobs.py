@@ -250,7 +250,7 @@ def test_programs_that_freecad_posts_go_through_in_one_run(
     tmp_path, machine, jobs, command, request
 ):
     tree = tmp_path / "in"
-    most = np.inf if machine == "vmc" or request.config.getoption("--long") else 20_000
+    most = np.inf if request.config.getoption("--long") else 20_000
     for path in (p for p in POSTED.glob("*__linuxcnc*.ngc") if p.stat().st_size < most):
         place = tree / path.stem.split("__")[0] / path.name
         place.parent.mkdir(parents=True, exist_ok=True)
