@@ -53,6 +53,20 @@ _NEAR = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
+class CycleSettings:
+    """What a control's settings decide about its drilling cycles; None: nobody has said."""
+
+    chip_retract: float | None = None
+    """How far G73 goes back to break the chip: Fanuc 5114, Haas setting 22. [mm]"""
+    peck_clearance: float | None = None
+    """How far above its last depth G83 comes down again: Fanuc 5115, Haas setting 22. [mm]"""
+    clear_above_r: float | None = None
+    """How far above R G83 clears the chips: Haas setting 52. [mm]"""
+    boring_out: str | None = None
+    """``feed``: G85 and G89 come out to R with the feed in force, at 100 %."""
+
+
+@dataclass(frozen=True, slots=True)
 class Start:
     """What may be assumed when the program starts; by default nothing but the dialect's modes."""
 
@@ -92,6 +106,7 @@ class Start:
     mode and no frame; one that the dialect's table knows means what it says there."""
     rapid_feed: RapidFeed | None = None
     """Feed moves that count as rapids; None, as a rule: none do."""
+    cycles: CycleSettings = field(default_factory=CycleSettings)
 
 
 NOTHING_KNOWN = Start()

@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from typing import Literal
 
 from gcodejerk.nc.dialects.gcodes import G17, G18, G19
+from gcodejerk.start import Start
 
 MOST_MOVES = 20_000
 """Of one block; more is a slip of the pen (a Q far too small, an L far too large)."""
@@ -54,6 +56,11 @@ class Cycle:
     out: Out = Out.RAPID
 
 
+Distance = Mapping[bool, Decimal | None]
+"""In mm (False) and inches (True); None where nobody has said what a parameter of the machine is,
+or where it is no whole number of increments."""
+
+
 @dataclass(frozen=True, slots=True)
 class DrillingRules:
     """What the drilling cycles of one controller mean."""
@@ -69,9 +76,32 @@ class DrillingRules:
     """Address of the dwell, which `G4` takes in the same unit."""
     borrows_dwell: frozenset[int]
     """Cycles that, without a dwell of their own, take that of whichever cycle stated one last."""
-    clearance: Mapping[bool, Decimal | None]
-    """Distance that G83 and G73 keep above, or go back: in mm (False) and inches (True); None where
-    a parameter of the machine decides."""
+    clearance: Distance
+    """That G83 keeps above where it stopped, and G73 goes back where `break_back` is None."""
+    break_back: Distance | None = None
+    lift: Distance = field(default_factory=lambda: {False: Decimal(0), True: Decimal(0)})
+    """How far above R pecks are cleared."""
+    feed_out: bool = True
+    """Cycles that come out with feed do so with the one in force."""
+    own_group: bool = False
+    """The cycles are a modal group beside G0 and G1, which hold on behind them. The ways between
+    holes are then level, from where the tool stands; G90 and G91 say once for a series what R and
+    depth mean; and an M code of a cycle's block acts with its first positioning."""
+    exact_stop: bytes = b""
+    """What lets a feed move end in a standstill, in front of it; empty where a path mode does."""
+    exact_pecks: bool = False
+    """Pecks are counted in least increments, not in binary fractions."""
+    needs_position: bool = False
+    """A block without an axis of the plane may make a hole or none."""
+    pecks_dwell: bool = False
+    """A dwell that another cycle of the series states also holds for those that peck."""
+    dwell_form: Literal["any", "whole", "point"] = "any"
+    """How a dwell has to be written for `G4` to read it in the same unit."""
+    whole: Literal["any", "unknown", "calculator", "standard"] = "any"
+    """What a length without a decimal point is: the number as it stands; nobody knows; the number,
+    or least increments, as in `gcodejerk.start.Start`."""
+    refused: Mapping[int, str] = field(default_factory=dict)
+    """Cycles of which it is another reason that they are missing above."""
 
 
 LINUXCNC = DrillingRules(
@@ -97,8 +127,95 @@ LINUXCNC = DrillingRules(
     clearance={False: Decimal("0.254"), True: Decimal("0.010")},
 )
 
-DRILLING: dict[str, DrillingRules] = {"linuxcnc": LINUXCNC}
+_Whole = Literal["any", "unknown", "calculator", "standard"]
+_WHOLE: dict[str | None, _Whole] = {"calculator": "calculator", "standard": "standard"}
+UNSAID: Distance = {False: None, True: None}
+_FEEDS_OUT = Cycle(out=Out.FEED_TO_R)
+FANUC = DrillingRules(
+    # 30i user's manual B-63944EN-2/02: p. 53 (G83: rapid to d above where the last drilling ended,
+    # 5115; R counts from the initial level, Z from R), p. 62 (G85: cutting feed back to R; an M
+    # code acts with the first positioning). 5114 is the d of G73 and P milliseconds, as in G4
+    # (pages on Fanuc's cycles by users and by Weihong, whose cycles are the same). That the rapid
+    # of G73, and what G82 and G89 do besides dwelling, is as everywhere, is general knowledge.
+    # G86 is missing: no page was found that says how the spindle goes on.
+    cycles={
+        730: Cycle(pecks=Pecks.BREAK),
+        810: Cycle(),
+        820: Cycle(dwells=True),
+        830: Cycle(pecks=Pecks.CLEAR),
+        850: _FEEDS_OUT,
+        890: Cycle(dwells=True, out=Out.FEED_TO_R),
+    },
+    # In other planes a parameter (5101#0) may keep Z as the drilling axis.
+    planes=frozenset({G17}),
+    repeats="K",
+    peck="Q",
+    dwell="P",
+    borrows_dwell=frozenset({740, 760, 820, 840, 870, 880, 890}),
+    clearance=UNSAID,
+    break_back=UNSAID,
+    feed_out=False,
+    own_group=True,
+    exact_stop=b"G9 ",
+    exact_pecks=True,
+    dwell_form="whole",
+    whole="unknown",
+    refused={860: "no source tells how G86 starts the spindle again"},
+)
+HAAS = replace(
+    # VF operator's manual 96-8000: p. 182 (order of motions, G98 and G99, G17 only; a motion of X
+    # or Y makes a hole), pp. 185, 191, 192 (G73 and G83: settings 22 and 52; P in seconds, which
+    # holds until G80; I, J and K are other ways of pecking). P with a decimal point is seconds in
+    # G4, too; without one, G4 would read milliseconds.
+    FANUC,
+    repeats="L",
+    borrows_dwell=FANUC.borrows_dwell | {730, 830},
+    lift=UNSAID,
+    needs_position=True,
+    pecks_dwell=True,
+    dwell_form="point",
+)
+DRILLING: dict[str, DrillingRules] = {"linuxcnc": LINUXCNC, "fanuc": FANUC, "haas": HAAS}
 """By dialect; a dialect that is missing has cycles that nobody writes out."""
+
+
+def rules_for(name: str, start: Start) -> DrillingRules:
+    """The cycles of a dialect, with what the machine file says of the control's settings.
+
+    Parameters
+    ----------
+    name : str
+        Of the dialect.
+    start : Start
+        Where the table leaves nothing to the machine, it changes nothing.
+
+    Returns
+    -------
+    DrillingRules
+    """
+    rules, settings = DRILLING[name], start.cycles
+    if not rules.own_group:
+        return rules
+    return replace(
+        rules,
+        clearance=_distance(settings.peck_clearance),
+        break_back=_distance(settings.chip_retract),
+        lift=_distance(settings.clear_above_r) if rules.lift is UNSAID else rules.lift,
+        feed_out=settings.boring_out == "feed",
+        whole=_WHOLE.get(start.decimal_point, "unknown"),
+    )
+
+
+def _distance(mm: float | None) -> Distance:
+    """A setting of the control in both units, in increments of 0.001 mm or 0.0001 inch."""
+    if mm is None:
+        return UNSAID
+    out: dict[bool, Decimal | None] = {}
+    for inch, scale, places in ((False, 1.0, 3), (True, 25.4, 4)):
+        nearest = round(mm / scale, places)
+        near = abs(nearest - mm / scale) < 1e-9
+        out[inch] = Decimal(repr(nearest)) if near else None
+    return out
 
 
 class Kind(enum.Enum):
@@ -139,10 +256,16 @@ class Call:
     repeats: int = 1
     peck: Decimal = Decimal(0)
     clearance: Decimal = Decimal(0)
+    lift: Decimal = Decimal(0)
+    """How far above R pecks are cleared."""
+    level_ways: bool = False
+    """The way to every hole is level; otherwise it leads to where the tool will come back to."""
     dwell: Decimal = Decimal(0)
     """In the unit of G4."""
     binary: tuple[float, float] | None = None
     """R and bottom as the controller adds them up; the nearest to the decimals by default."""
+    exact_pecks: bool = False
+    """The controller counts pecks in least increments."""
 
 
 def end_of(call: Call) -> Decimal:
@@ -178,7 +301,7 @@ def drill(call: Call) -> Iterator[Move]:
         yield Move(Kind.RAPID, at)
     for repeat in range(call.repeats):
         # From above R the first way is level; any other goes to where the tool will come back to.
-        at = at if repeat == 0 and at > call.r else end_of(call)
+        at = at if call.level_ways or (repeat == 0 and at > call.r) else end_of(call)
         yield Move(Kind.HOLE, at)
         for move in path:
             if move.kind not in (Kind.RAPID, Kind.FEED) or move.to != at:
@@ -202,7 +325,7 @@ def _one_hole(call: Call) -> list[Move]:
         for depth in _pecks(call):
             path.append(Move(Kind.FEED, depth))
             if cycle.pecks is Pecks.CLEAR:
-                path.append(Move(Kind.RAPID, r))
+                path.append(Move(Kind.RAPID, r + call.lift))
             path.append(Move(Kind.RAPID, depth + call.clearance))
     path.append(Move(Kind.FEED, bottom))
     if cycle.dwells:
@@ -217,7 +340,12 @@ def _one_hole(call: Call) -> list[Move]:
 
 
 def _pecks(call: Call) -> Iterator[Decimal]:
-    """Depths at which a peck ends above the bottom, counted in binary like the controller."""
+    """Depths at which a peck ends above the bottom, counted as the controller counts."""
+    if call.exact_pecks:
+        place = call.r
+        while (place := place - call.peck) > call.bottom:
+            yield place
+        return
     depth, bottom = call.binary or (float(call.r), float(call.bottom))
     peck = float(call.peck)
     done = 1

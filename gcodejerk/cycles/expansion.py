@@ -20,8 +20,10 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gcodejerk.cycles.drilling import DRILLING
+from gcodejerk.cycles.blocks import write_block
+from gcodejerk.cycles.drilling import DRILLING, rules_for
 from gcodejerk.cycles.line_map import LineMap
+from gcodejerk.cycles.numbers import decimal
 from gcodejerk.cycles.series import (
     LeftAlone,
     Moment,
@@ -29,13 +31,12 @@ from gcodejerk.cycles.series import (
     Series,
     begin_series,
     call_of,
-    decimal,
+    cycle_in_force,
     doubt,
     drills,
     g_codes,
     passes,
     why_left_alone,
-    write_block,
 )
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.nc.dialects import find_dialect
@@ -198,7 +199,7 @@ class _Expander(Reader):
         verdicts: list[_Verdict] | None,
     ) -> None:
         super().__init__(name, dialect, start)
-        self.rules = DRILLING[dialect.name]
+        self.rules = rules_for(dialect.name, start)
         self.comments = comments
         self.target = target
         self.known = verdicts
@@ -252,7 +253,7 @@ class _Expander(Reader):
             return
         block = parse_line(bare, self.dialect)
         before, faults, inside = list(self.state.position), self.problem_count, self.inside
-        ended, motion = self.state.ended, self.state.motion
+        ended, cycle = self.state.ended, cycle_in_force(self.state, self.dialect)
         super().read_line(text, begin, number, terminator)
         if ended:
             return
@@ -269,12 +270,13 @@ class _Expander(Reader):
             states = any(word.letter == self.rules.dwell for word in block.words)
             if not states and not (self.series is not None and self.series.dwells):
                 self._borrow(number)
-        moment = Moment(before, self.state, self.path, self.spindle)
+        now = cycle_in_force(self.state, self.dialect)
+        moment = Moment(before, self.state, self.path, self.spindle, now)
         if self.series is None:
-            if self.state.motion not in self.dialect.cycles:
+            if now is None:
                 return
             self.series = begin_series(number, moment)
-            if motion in self.dialect.cycles:
+            if cycle is not None:
                 why = str(Reason.START_UNKNOWN)  # a cycle from before the program
         place = _Place(begin, begin + len(bare), number, len(text) - len(bare), terminator)
         self._follow(self.series, block, bare, moment, why, place)
@@ -289,27 +291,27 @@ class _Expander(Reader):
         place: _Place,
     ) -> None:
         """One line of a series."""
-        state, cycles = self.state, self.dialect.cycles
         if why is not None:
             self._give_up(series, why, place.number)
-            if state.motion not in cycles:
+            if moment.cycle is None:
                 self._close(series)
             return
-        if state.ended:
+        if self.state.ended:
             # M2 resets the motion, so whether its block makes a hole is not seen afterwards.
             if any(word.letter in "XYZABCUVW" for word in block.words):
                 self._give_up(series, str(Reason.OTHER_WORDS), place.number)
             self._close(series)
-        elif drills(block, state, cycles):
+        elif drills(block, moment, self.dialect):
             self.holes += 1
             series.dwells |= any(word.letter == self.rules.dwell for word in block.words)
             self._drill(series, block, text, moment, place)
-        elif state.motion not in cycles:
-            own = any(self.dialect.groups.get(code) == "motion" for code in g_codes(block))
+        elif moment.cycle is None:
+            groups = ("motion", "cycle")
+            own = any(self.dialect.groups.get(code) in groups for code in g_codes(block))
             if not own:
                 self._give_up(series, str(Reason.NOT_UNDERSTOOD), place.number)
             self._close(series)
-        elif not passes(block):
+        elif not passes(block, self.rules):
             series.broken = f"something else stands between the holes (line {place.number})"
 
     def _drill(
@@ -342,7 +344,7 @@ class _Expander(Reader):
         self._copy(place.begin)
         last = b"\r" * place.returns + b"\n" * place.terminator
         line_end = last if place.terminator else self.newline
-        lines = write_block(text, block, call, moment, self.comments)
+        lines = write_block(text, block, call, moment, self.rules, self.comments)
         new = line_end.join(lines) + last if lines else b""
         kind = (0, 1, 3, 2)[2 * place.returns + place.terminator]
         self.places.extend((number + self._added, len(lines), self._out, self._out + len(new)))

@@ -1,18 +1,7 @@
 """A series of drilling cycles, from its first block to G80 or another motion: certain or not.
 
 While a cycle is in force every bare `X..` drills, so a series can be written out as a whole or not
-at all. This module owns that judgement, and the text of one block that is written out::
-
-    (gcodejerk: N120 G98 G81 X10. Y5. Z-6. R2. M8)   names the original
-    N120 G98 M8                                      what else the block says
-    G61                                              LinuxCNC runs cycles in exact path mode
-    G0 X10. Y5.                                      the moves
-    ...
-    G64 P0.05                                        the path mode that the program has
-    M0                                               what takes effect after motion
-
-Where the program's path mode is not known, so that nothing could return to it, `G4 P0` follows
-every move instead: the tool comes to rest where exact path mode would not have rounded the corner.
+at all. This module owns that judgement; `blocks` owns the text that one block becomes.
 
 Rule 1: whatever might make a block something else than it seems makes the series uncertain: flow,
 expressions, block delete, changes of frame, words that are not known to keep their order.
@@ -21,6 +10,7 @@ Rule 2: depths and increments are decimals, words in the plane are the program's
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Context, Decimal
 
@@ -30,15 +20,16 @@ from gcodejerk.cycles.drilling import (
     Call,
     Cycle,
     DrillingRules,
-    Kind,
     Out,
     Pecks,
-    drill,
     end_of,
     most_moves,
 )
-from gcodejerk.nc.dialects.dialect import PLANES
+from gcodejerk.cycles.numbers import length, plain
+from gcodejerk.nc.dialects.dialect import PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import (
+    G0,
+    G1,
     G17,
     G18,
     G19,
@@ -55,24 +46,23 @@ from gcodejerk.nc.dialects.gcodes import (
     G99,
 )
 from gcodejerk.nc.interpreter.modal import State
-from gcodejerk.nc.text.block import Block, Word
+from gcodejerk.nc.text.block import Block
 from gcodejerk.reasons import Reason
 
-COMMENT_LENGTH = 69
-"""Controllers and senders with short lines choke on longer comments."""
 KNOWN_DECIMALS = 9
 """To which a position is a number of the program: far below any resolution."""
 TOLERANCE = Context(prec=12)
 """Digits of a tolerance that has to be converted."""
 
-_STOPS = frozenset({0, 1, 2, 30, 60})
+STOPS = frozenset({0, 1, 2, 30, 60})
 _HARMLESS_M = frozenset({3, 4, 5, 7, 8, 9, 48, 49})
 _HARMLESS_G = frozenset({G17, G18, G19, G20, G21, G40, G90, G91, G90_1, G91_1, G94, G95, G98, G99})
 """G codes that act before the motion of their block, and of which the state tells all."""
+_SPINDLE_AND_COOLANT = frozenset({3, 4, 5, 7, 8, 9})
 _TAKERS = frozenset({100, 280, 300, 520, 920})
 """G codes that the axis words of their block belong to, whatever motion is in force."""
-_HARMLESS_LETTERS = frozenset("NFST")
-_EXACT = frozenset({61, 62})
+HARMLESS_LETTERS = frozenset("NFST")
+EXACT = frozenset({61, 62})
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +103,8 @@ class Series:
     """What stands in the series that a further hole must not follow."""
     code: int = 0
     sticky: dict[str, Decimal] | None = None
+    distance: int | None = None
+    """G90 or G91, as its first block has it."""
     dwells: bool = False
     """A block of it states a dwell."""
 
@@ -128,6 +120,8 @@ class Moment:
     path: PathWords | None
     spindle: int | None
     """M3 or M4; None where it stands or is not known to turn."""
+    cycle: int | None
+    """The cycle in force, times ten; None: none, or nobody knows."""
 
 
 def begin_series(line: int, moment: Moment) -> Series:
@@ -139,14 +133,24 @@ def begin_series(line: int, moment: Moment) -> Series:
         number = moment.before[along] / state.scale(along)
         if number == number:
             level = Decimal(repr(round(number, KNOWN_DECIMALS)))
-    return Series(line, state.plane, state.unit, level, level)
+    return Series(line, state.plane, state.unit, level, level, distance=state.distance)
 
 
-def drills(block: Block, state: State, cycles: frozenset[int]) -> bool:
+def cycle_in_force(state: State, dialect: Dialect) -> int | None:
+    """Code of the cycle in force; None where there is none, or nobody knows."""
+    if dialect.drilling.own_group:
+        return None if state.cycle is None else state.cycle[0]
+    return state.motion if state.motion in dialect.cycles else None
+
+
+def drills(block: Block, moment: Moment, dialect: Dialect) -> bool:
     """Whether a block makes a hole: a cycle is in force, and nothing else takes its axis words."""
-    if state.motion not in cycles or not any(word.letter in AXES for word in block.words):
+    if moment.cycle is None or not any(word.letter in AXES for word in block.words):
         return False
-    return not _TAKERS & {*g_codes(block)}
+    codes = g_codes(block)
+    if dialect.drilling.own_group:
+        return not any(dialect.groups.get(code) == "non-modal" for code in codes)
+    return not _TAKERS & {*codes}
 
 
 def g_codes(block: Block) -> list[int]:
@@ -165,8 +169,10 @@ def doubt(block: Block) -> str | None:
     return None
 
 
-def passes(block: Block) -> bool:
+def passes(block: Block, rules: DrillingRules) -> bool:
     """Whether a block without motion may stand between two holes."""
+    # R makes a hole of its own there, and P may be the dwell of the next one.
+    letters = HARMLESS_LETTERS - {"T"} if rules.own_group else HARMLESS_LETTERS | {"P"}
     for word in block.words:
         number = -1.0 if word.value is None else word.value
         if word.letter == "G":
@@ -174,7 +180,7 @@ def passes(block: Block) -> bool:
         elif word.letter == "M":
             good = number in _HARMLESS_M | {0, 1, 60}
         else:
-            good = word.letter in _HARMLESS_LETTERS | {"P"}
+            good = word.letter in letters
         if not good:
             return False
     return True
@@ -185,50 +191,75 @@ def why_left_alone(
 ) -> str | None:
     """Why the modal state does not allow to write a block out; None where it does."""
     state = moment.state
-    code = state.motion or 0
+    code = moment.cycle or 0
     if series.broken is not None:
         return series.broken
     if code not in rules.cycles:
-        return f"G{code / 10:g} is a cycle that only the controller can do"
+        alone = f"G{code / 10:g} is a cycle that only the controller can do"
+        return rules.refused.get(code, alone)
+    planes = "G17, G18, G19" if len(rules.planes) > 1 else "G17"
     reasons = [
         (state.compensation != G40, str(Reason.CUTTER_COMPENSATION)),
-        (state.rotated is not False, str(Reason.ROTATION)),
+        (state.transformed, str(Reason.ROTATION)),
         (state.distance is None, str(Reason.DISTANCE_MODE_UNKNOWN)),
         (state.unit is None, str(Reason.UNITS_UNKNOWN)),
-        (state.plane not in rules.planes, "the plane is not one of G17, G18, G19"),
+        (state.plane not in rules.planes, f"the plane is not one of {planes}"),
         (state.plane != series.plane, "the plane changes within the series"),
         (state.unit != series.unit, "the unit changes within the series"),
         (series.level is None, str(Reason.START_UNKNOWN)),
         (state.feed_mode not in (94, 95) or not state.feed > 0.0, str(Reason.FEED_UNKNOWN)),
         (_on_diameter(state), "the drilling axis is programmed as a diameter"),
+        *(_beside_motion(series, moment, block, rules) if rules.own_group else ()),
     ]
     for applies, reason in reasons:
         if applies:
             return reason
+    return None if _words_are_known(code, block, state, rules) else str(Reason.OTHER_WORDS)
+
+
+def _beside_motion(
+    series: Series, moment: Moment, block: Block, rules: DrillingRules
+) -> Iterator[tuple[bool, str]]:
+    """What else has to be certain where cycles are a modal group beside G0 and G1."""
+    state, cycle = moment.state, rules.cycles[moment.cycle or 0]
+    yield state.motion not in (G0, G1), "whether G0 or G1 is in force behind it is not known"
+    yield state.path not in (61, 64), str(Reason.PATH_UNKNOWN)
+    yield state.distance != series.distance, "G90 and G91 change within the series"
+    along = AXES.index(PLANES[G17][2])
+    here = moment.before[along] / state.scale(along)
+    # Somebody may have moved the axes meanwhile (M0).
+    stands = series.at is not None and abs(here - float(series.at)) < 10.0**-KNOWN_DECIMALS
+    yield not stands, str(Reason.START_UNKNOWN)
+    named = any(word.letter in PLANES[G17][:2] for word in block.words)
+    yield rules.needs_position and not named, "a setting decides whether it drills without X and Y"
+    yield cycle.dwells and state.feed_mode != 94, "a dwell may count revolutions in G95"
+    lent = rules.pecks_dwell and series.dwells and not cycle.dwells
+    yield lent and cycle.pecks is not Pecks.NONE, "the dwell of an earlier cycle holds in it"
+
+
+def _words_are_known(code: int, block: Block, state: State, rules: DrillingRules) -> bool:
+    """Whether every word of a block is its cycle's, or acts in front of it or behind it."""
     own = {PLANES[state.plane or G17][k] for k in range(3)} | {"R", rules.repeats}
     own |= {rules.peck} if rules.cycles[code].pecks is not Pecks.NONE else set()
     own |= {rules.dwell} if rules.cycles[code].dwells else set()
+    own |= HARMLESS_LETTERS - ({"T"} if rules.own_group else set())
+    switches = _SPINDLE_AND_COOLANT if rules.own_group else _HARMLESS_M | STOPS
     for word in block.words:
         number = -1.0 if word.value is None else word.value
         if word.letter == "G":
             good = round(number * 10) in _HARMLESS_G | {code}
         elif word.letter == "M":
-            good = number in _HARMLESS_M | _STOPS
+            good = number in switches
         else:
-            good = word.letter in _HARMLESS_LETTERS | own
+            good = word.letter in own
         if not good:
-            return str(Reason.OTHER_WORDS)
-    return None
+            return False
+    return True
 
 
 def _on_diameter(state: State) -> bool:
     """Whether cycles drill along an X that is a diameter: R would not be one."""
     return state.diameter is not False and state.plane == G19
-
-
-def _stops(moment: Moment) -> bool:
-    """Whether the path mode is not known well enough to be stated again."""
-    return moment.state.path not in _EXACT and (moment.state.path != 64 or moment.path is None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,9 +272,17 @@ class LeftAlone:
 def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) -> Call | LeftAlone:
     """One block of a series as a call of its cycle, or why it is none; the series goes on."""
     state = moment.state
-    code = state.motion or 0
+    code, inch = moment.cycle or 0, state.unit != 1.0
     cycle = rules.cycles[code]
-    given = {w.letter: decimal(w) for w in block.words if w.letter not in "GMN"}
+    given = {}
+    for word in block.words:
+        if word.letter not in "GMN":
+            number = length(word, rules, inch=inch)
+            if number is None:
+                return LeftAlone(str(Reason.DECIMAL_POINT))
+            given[word.letter] = number
+    if not _dwell_is_that_of_g4(block, rules):
+        return LeftAlone(f"{rules.dwell} may not count as in G4")
     before = series.sticky or {} if series.code == code else {}
     sticky = _sticky(before, given, PLANES[state.plane or G17][2], rules)
     repeats = given.get(rules.repeats, Decimal(1))
@@ -258,12 +297,9 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
         bottom += r
         lifted = float(series.level) + binary[0]
         binary = lifted, lifted + binary[1]
-    clearance = rules.clearance[state.unit != 1.0]
-    if clearance is None and cycle.pecks is not Pecks.NONE:
-        return LeftAlone("the clearance of its pecks is a parameter of the machine")
     if bottom > r:
         return LeftAlone(str(Reason.NOT_UNDERSTOOD))
-    missing = _not_stated(moment, cycle, lifts=series.level > r)
+    missing = _not_stated(moment, cycle, rules, lifts=series.level > r)
     if missing is not None:
         return LeftAlone(missing)
     call = Call(
@@ -275,23 +311,56 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
         back_to_r=state.retract == G99,
         repeats=int(repeats),
         peck=sticky.get("peck", Decimal(0)),
-        clearance=clearance or Decimal(0),
+        clearance=_goes_back(cycle, rules, inch=inch) or Decimal(0),
         dwell=sticky.get("dwell", Decimal(0)),
+        lift=rules.lift[inch] or Decimal(0),
+        level_ways=rules.own_group,
         binary=binary,
+        exact_pecks=rules.exact_pecks,
     )
+    if rules.own_group and min(call.start, call.level) < r:
+        return LeftAlone("R is above where the tool stands")
+    if rules.own_group and cycle.pecks is not Pecks.NONE and call.clearance >= call.peck:
+        return LeftAlone("its pecks are not longer than the way back")
     if most_moves(call) > MOST_MOVES:
         return LeftAlone(f"one block makes more than {MOST_MOVES} moves")
     series.code, series.sticky, series.at = code, sticky, end_of(call)
     return call
 
 
-def _not_stated(moment: Moment, cycle: Cycle, *, lifts: bool) -> str | None:
-    """What the program has not said that the way out needs; `lifts`: G98 leads higher than R."""
+def _dwell_is_that_of_g4(block: Block, rules: DrillingRules) -> bool:
+    """Whether a dwell of the block is written so that G4 reads it in the same unit."""
+    forms = {"any": (True, False), "whole": (True,), "point": (False,)}[rules.dwell_form]
+    return all(word.whole in forms for word in block.words if word.letter == rules.dwell)
+
+
+def _goes_back(cycle: Cycle, rules: DrillingRules, *, inch: bool) -> Decimal | None:
+    """How far a cycle that pecks goes back, or how near to its last depth it comes down."""
+    breaks = cycle.pecks is Pecks.BREAK and rules.break_back is not None
+    return (rules.break_back if breaks and rules.break_back else rules.clearance)[inch]
+
+
+def _not_stated(moment: Moment, cycle: Cycle, rules: DrillingRules, *, lifts: bool) -> str | None:
+    """What nobody has said that a cycle needs; `lifts`: G98 leads higher than R."""
+    inch = moment.state.unit != 1.0
+    pecks = cycle.pecks is not Pecks.NONE
+    key = "chip_retract" if cycle.pecks is Pecks.BREAK else "peck_clearance"
+    clears = cycle.pecks is Pecks.CLEAR
+    feeds_out = cycle.out in (Out.FEED, Out.FEED_TO_R)
     if moment.state.retract is None and lifts:
         return "G98 or G99 is not stated"
     if cycle.out is Out.STOPPED and moment.spindle is None:
         return "the direction of the spindle is not known"
-    return None
+    if pecks and _goes_back(cycle, rules, inch=inch) is None:
+        return _setting(key)
+    if clears and rules.lift[inch] is None:
+        return _setting("clear_above_r")
+    return _setting("boring_out") if feeds_out and not rules.feed_out else None
+
+
+def _setting(key: str) -> str:
+    """What to say of a setting that is missing."""
+    return f"the machine file states no program.cycles.{key}, or none in whole increments"
 
 
 def _sticky(
@@ -310,119 +379,3 @@ def _is_complete(sticky: dict[str, Decimal], cycle: Cycle) -> bool:
     if needed - sticky.keys() or sticky.get("dwell", Decimal(0)) < 0:
         return False
     return not pecks or sticky["peck"] > 0
-
-
-def decimal(word: Word) -> Decimal:
-    """The number of a word, exactly."""
-    return Decimal(b"".join(word.text[1:].split()).decode())
-
-
-def plain(number: Decimal) -> bytes:
-    """A number without exponent, with a decimal point, and never minus zero."""
-    text = format(number if number else abs(number), "f")
-    return (text.rstrip("0") if "." in text else text + ".").encode()
-
-
-def write_block(
-    text: bytes, block: Block, call: Call, moment: Moment, comments: bool
-) -> list[bytes]:
-    """The lines that stand for a block, without line ends.
-
-    Parameters
-    ----------
-    text : bytes
-        The block, without its line end.
-    block : Block
-        Its words.
-    call : Call
-        What it makes.
-    moment : Moment
-        In which state.
-    comments : bool
-        Name the block in a comment.
-
-    Returns
-    -------
-    list of bytes
-        Empty where the block says nothing else and the tool is at the bottom already.
-    """
-    state = moment.state
-    kept, stops, rest, begin = [], [], [], 0
-    for word in block.words:
-        stop = word.letter == "M" and word.value in _STOPS
-        cycle = word.letter == "G" and round((word.value or 0.0) * 10) == state.motion
-        if not (stop or cycle or word.letter not in _HARMLESS_LETTERS | {"G", "M"}):
-            kept.append(word)
-            continue
-        rest.append(text[begin : word.begin].strip(b" \t"))
-        begin = word.end
-        if stop:
-            stops.append(b"".join(word.text.split()))
-    rest.append(text[begin:].strip(b" \t"))
-    lines = [_comment(block)] if comments else []
-    if kept or block.comments:
-        lines.append(b" ".join(part for part in rest if part))
-    moves = _moves(block, call, moment)
-    if _stops(moment):
-        lines += _with_stops(moves)
-    elif state.path in _EXACT or moment.path is None:
-        lines += moves
-    else:
-        lines += [b"G61", *moves, moment.path.text(state.unit)]
-    return lines + ([b" ".join(stops)] if stops else [])
-
-
-def _moves(block: Block, call: Call, moment: Moment) -> list[bytes]:
-    """The moves of a call as blocks."""
-    incremental = moment.state.distance == G91
-    along = PLANES[moment.state.plane or G17][2].encode()
-    hole_words, going = _to_hole(block, moment)
-    lines, at = [], call.start
-    for move in drill(call):
-        if move.kind is Kind.DWELL:
-            lines.append(b"G4 P" + plain(call.dwell))
-        elif move.kind in (Kind.STOP, Kind.START):
-            lines.append(b"M5" if move.kind is Kind.STOP else b"M%d" % (moment.spindle or 5))
-        else:
-            words = list(hole_words) if move.kind is Kind.HOLE and going else []
-            if move.to != at:
-                words.append(along + plain(move.to - at if incremental else move.to))
-            if words:
-                lines.append(b" ".join([b"G1" if move.kind is Kind.FEED else b"G0", *words]))
-            if move.kind is Kind.HOLE:
-                going = going and incremental  # absolute repeats stay where they are
-        at = move.to
-    return lines
-
-
-def _to_hole(block: Block, moment: Moment) -> tuple[list[bytes], bool]:
-    """The words of a block that lead to its hole, and whether they lead anywhere."""
-    plane = PLANES[moment.state.plane or G17]
-    hole = [w for w in block.words if w.letter in plane[:2]]
-    words = [b"".join(w.text.split()).upper() for w in hole]
-    if moment.state.distance == G91:
-        return words, any(w.value for w in hole)
-    # An unknown position is a NaN, which differs from everything.
-    axes = [AXES.index(w.letter) for w in hole]
-    return words, any(moment.before[axis] != moment.state.position[axis] for axis in axes)
-
-
-def _with_stops(moves: list[bytes]) -> list[bytes]:
-    """The moves, with a rest behind each that has none."""
-    out = []
-    for k, line in enumerate(moves):
-        out.append(line)
-        dwells = moves[k + 1 : k + 2] and moves[k + 1].startswith(b"G4")
-        if line.startswith((b"G0", b"G1")) and not dwells:
-            out.append(b"G4 P0")
-    return out
-
-
-def _comment(block: Block) -> bytes:
-    """`(gcodejerk: ...)` with the words of the block, in at most COMMENT_LENGTH characters."""
-    words = b" ".join(b"".join(w.text.split()) for w in block.words)
-    shown = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
-    room = COMMENT_LENGTH - len(b"(gcodejerk: )")
-    if len(shown) > room:
-        shown = shown[: room - 3] + b"..."
-    return b"(gcodejerk: " + shown + b")"

@@ -164,6 +164,7 @@ class Machine(Description):
             spindle=self.spindle,
             rapid_feed=self.rapid_feed,
             diameter=any(axis.diameter for axis in self.axes),
+            cycles=self.program.cycles,
         )
 
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gcodejerk.errors import MachineError
-from gcodejerk.start import RapidFeed
+from gcodejerk.start import CycleSettings, RapidFeed
 
 OSCILLATORS = 4
 """That a line of a spectrum stands for."""
@@ -249,6 +249,8 @@ class ProgramStart:
     m_before: tuple[str, ...] = ()
     m_after: tuple[str, ...] = ()
     """Codes (``M8``) that the control runs before the motion of their block, and behind it."""
+    cycles: CycleSettings = field(default_factory=CycleSettings)
+    """What settings of the control decide about drilling cycles."""
 
 
 @dataclass(frozen=True, slots=True)

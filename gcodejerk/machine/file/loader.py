@@ -31,6 +31,7 @@ from gcodejerk.machine.parts import (
 )
 from gcodejerk.machine.problems import Problems, place_order
 from gcodejerk.machine.spectrum import load_spectrum
+from gcodejerk.start import CycleSettings
 
 JERK_OVER_RAPID = 10.0
 """`limit.jerk` where only `rapid.jerk` is given, as a multiple of that (contract, section 2)."""
@@ -357,4 +358,5 @@ def _program(values: dict[str, Any]) -> ProgramStart:
         tool_change=values.get("tool_change"),
         m_before=_codes(values, "m_before"),
         m_after=_codes(values, "m_after"),
+        cycles=CycleSettings(**values.get("cycles", {})),
     )

@@ -234,6 +234,25 @@ _DESIGN = Section(
     )
 )  # fmt: skip
 
+_SETTING = Number("mm", at_least=0.0, at_most=1000.0)
+_CYCLES = Section(
+    (
+        Key("chip_retract", _SETTING,
+            "How far G73 goes back behind each peck (Fanuc parameter 5114, Haas setting 22). Left "
+            "out: unknown, and G73 is not written out.", example="0.5"),
+        Key("peck_clearance", _SETTING,
+            "How far above its last depth G83 ends the rapid back down (Fanuc parameter 5115, Haas "
+            "setting 22). Left out: unknown, and G83 is not written out.", example="0.5"),
+        Key("clear_above_r", _SETTING,
+            "How far above R G83 goes up between its pecks (Haas setting 52). Left out: unknown, "
+            "and G83 of a Haas is not written out.", example="0"),
+        Key("boring_out", Choice(("feed",)),
+            "How G85 and G89 come out of the hole: feed, with the feed in force at 100 % (Fanuc: "
+            "parameters 5104#1 and 5149 change that). Left out: unknown, and they are not written "
+            "out.", example="feed"),
+    )
+)  # fmt: skip
+
 _PROGRAM = Section(
     (
         Key("start", _POSITIONS, "Where the axes are, in program coordinates.",
@@ -276,6 +295,9 @@ _PROGRAM = Section(
         Key("m_after", _M_CODES,
             "M codes that it runs when the motion of their block has ended.",
             example="[M5, M9]"),
+        Key("cycles", _CYCLES,
+            "What settings of a Fanuc or Haas decide about its drilling cycles, for "
+            "--expand-cycles."),
         Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*", "G-code words"),
             "The codes in force when a program starts (LinuxCNC: RS274NGC_STARTUP_CODE).",
             default="", example='"G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"'),

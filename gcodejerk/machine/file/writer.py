@@ -26,6 +26,7 @@ from gcodejerk.machine.parts import (
     ProgramStart,
     Spectrum,
 )
+from gcodejerk.start import CycleSettings
 
 
 def machine_yaml(machine: Description) -> str:
@@ -88,9 +89,21 @@ def machine_yaml(machine: Description) -> str:
                 if program.tool_change is not None
                 else []
             ),
+            *_cycles(program.cycles),
             "",
         ]
     )
+
+
+def _cycles(cycles: CycleSettings) -> list[str]:
+    """Settings of drilling cycles, where there are any."""
+    values = {name: getattr(cycles, name) for name in CycleSettings.__dataclass_fields__}
+    texts = {
+        name: value if isinstance(value, str) else number_text(value)
+        for name, value in values.items()
+        if value is not None
+    }
+    return [f"  cycles: {_braces(texts)}"] if texts else []
 
 
 def _lists(program: ProgramStart) -> list[str]:

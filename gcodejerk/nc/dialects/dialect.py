@@ -142,6 +142,8 @@ class Drilling:
     """They do not replace G0 or G1, which are in force again after G80."""
     repeats: str = "L"
     """Letters of the number of repeats."""
+    maybe_repeats: str = ""
+    """Letters that are such a number on some of the controls, and something else on others."""
     missing: Literal["error", "unknown"] = "error"
     """What follows where no R or depth was ever given: the block is refused, or nobody knows."""
 

@@ -74,6 +74,8 @@ HAAS = replace(
     },
     # G103 P1 lets the control look only one block ahead, so that no stream is blended.
     bars={1030: ("look-ahead", "P")},
+    # L repeats; K is the least depth of a peck (G73 and G83, 96-8000 pp. 185, 191).
+    drilling=replace(FANUC.drilling, repeats="L"),
     packed_repeats=False,
     tool_word_moves=False,
     tool_cancelled_by_return=True,

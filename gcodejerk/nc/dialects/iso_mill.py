@@ -38,6 +38,7 @@ ISO_MILL = replace(
     },
     transforms=HAAS.transforms,
     bars=HAAS.bars,
+    drilling=replace(FANUC.drilling, repeats="", maybe_repeats="KL"),
     packed_repeats=False,
     tool_word_moves=True,
     tool_cancelled_by_return=True,

@@ -52,6 +52,8 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     along = AXES.index(plane[2])
     cycle = _cycle_in_force(state, code, values, rules)
     repeats = next((values[letter] for letter in rules.repeats if letter in values), 1.0)
+    if any(letter in values for letter in rules.maybe_repeats):
+        repeats = NAN
     beside = any(axis in values for axis in AXES if axis not in plane)
     if cycle is None or repeats <= 0 or beside:
         return False

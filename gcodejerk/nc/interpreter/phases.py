@@ -8,7 +8,7 @@ stands where it does.
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import Dialect, Effect
+from gcodejerk.nc.dialects.dialect import PLANES, Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G1, G40, G64
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
@@ -265,6 +265,8 @@ class Phases(Effects):
         if not step.words and not arc_words(codes.values, state):
             if cycle is not None and "cycle" in codes.g:
                 begin_cycle(state, cycle, codes.values)
+            if cycle is not None and dialect.drilling.own_group and "R" in codes.values:
+                self._drill_at_r(codes)
             return
         if state.motion is None and cycle is None:
             state.forget_positions()
@@ -291,6 +293,13 @@ class Phases(Effects):
         else:
             frames.change(self.state, effect, codes.values, self.lengths)
         return effect in _TAKES_AXES or (step.words != 0 and takes_axes(codes))
+
+    def _drill_at_r(self, codes: Codes) -> None:
+        """A block with R and without an axis: it may make a hole, or only note R (Fanuc does)."""
+        state = self.state
+        assert state.cycle is not None
+        state.put("cycle", (state.cycle[0], NAN, codes.values["R"]))
+        state.forget_positions([AXES.index(PLANES[state.plane][2])] if state.plane else range(len(AXES)))
 
     def _drill(self, cycle: int, codes: Codes, step: Step) -> None:
         """Run a canned cycle at the block's position."""

@@ -35,8 +35,12 @@ class Drilling(Codes):
         first, second, along = PLANES[plane]
         self._begin_cycle(code, block, along)
         if not block.axes:
+            if drilling.own_group and "R" in values:
+                self.lose(along)  # it may have made a hole
+                self.r = NAN
             return
-        repeats = [values[letter] for letter in drilling.repeats if letter in values]
+        letters = drilling.repeats + drilling.maybe_repeats
+        repeats = [values[letter] for letter in letters if letter in values]
         if self.g.get("distance") != G90 or any(n != 1.0 for n in repeats) or block.increments:
             self.lose()
             self.level = self.r = NAN
