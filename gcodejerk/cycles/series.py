@@ -198,7 +198,7 @@ def why_left_alone(
         alone = f"G{code / 10:g} is a cycle that only the controller can do"
         return rules.refused.get(code, alone)
     planes = "G17, G18, G19" if len(rules.planes) > 1 else "G17"
-    reasons = [
+    reasons: list[tuple[bool, str]] = [
         (state.compensation != G40, str(Reason.CUTTER_COMPENSATION)),
         (state.transformed, str(Reason.ROTATION)),
         (state.distance is None, str(Reason.DISTANCE_MODE_UNKNOWN)),

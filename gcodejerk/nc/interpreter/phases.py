@@ -299,7 +299,9 @@ class Phases(Effects):
         state = self.state
         assert state.cycle is not None
         state.put("cycle", (state.cycle[0], NAN, codes.values["R"]))
-        state.forget_positions([AXES.index(PLANES[state.plane][2])] if state.plane else range(len(AXES)))
+        state.forget_positions(
+            [AXES.index(PLANES[state.plane][2])] if state.plane else range(len(AXES))
+        )
 
     def _drill(self, cycle: int, codes: Codes, step: Step) -> None:
         """Run a canned cycle at the block's position."""

@@ -10,7 +10,6 @@ Rule: a series is written out whole or not at all; everything else is kept byte 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from fractions import Fraction
 from typing import BinaryIO
 
@@ -23,11 +22,10 @@ from gcodejerk.nc.program import read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.verification.bytes.source import Window
+from gcodejerk.verification.cycles.controls import control_of, cycle_of
 from gcodejerk.verification.cycles.holes import (
     CLOSE,
-    HEIGHTS,
     QUIET_G,
-    QUIET_M,
     STOPS,
     Doubt,
     Event,
@@ -39,9 +37,11 @@ from gcodejerk.verification.cycles.holes import (
     number_of,
     read_event,
     same,
+    stays,
     told,
+    with_rests,
 )
-from gcodejerk.verification.cycles.lines import OriginalLine, WrittenLines
+from gcodejerk.verification.cycles.lines import OriginalLine, WrittenLines, squeezed
 from gcodejerk.verification.findings import Findings, Kind, Verification
 from gcodejerk.verification.second_reading.agreement import Context, confirm_contexts
 
@@ -114,6 +114,7 @@ class _Proof:
 
     def __init__(self, theirs: Window, dialect: Dialect, start: Start, most: int) -> None:
         self.theirs, self.dialect = theirs, dialect
+        self.control = control_of(dialect, start)
         self.reader = Reader("<original>", dialect, start)
         self.found = Findings(most)
         self.holes = self.written = self.kept = 0
@@ -153,14 +154,14 @@ class _Proof:
 
     def _line(self, text: bytes, begin: int, number: int, terminator: int) -> bool:
         """Take one line of the original; whether the walk can go on."""
-        motion = self.reader.state.motion
+        cycle = cycle_of(self.reader.state, self.dialect)
         line = self._read(text, begin, number, terminator)
         if not line.ended:
             self._remember(line.block, sure=line.sure)
-            self._begin_series(line, motion)
+            self._begin_series(line, cycle)
         if not self._is_kept(line.whole):
             if line.hole:
-                modes = _modes(self.reader.state)
+                modes = _modes(self.reader.state, motion=self.control.beside)
                 self.contexts.append(Context(number, line.here, modes))
             return self._written(line)
         self.theirs.skip(len(line.whole))
@@ -182,24 +183,25 @@ class _Proof:
         sure = problems == reader.problem_count and not (inside or reader.inside)
         sure = sure and not (block.block_delete or block.assigns or block.o_word is not None)
         sure = sure and all(word.value is not None for word in block.words)
-        drills = reader.state.motion in self.dialect.cycles
+        drills = cycle_of(reader.state, self.dialect) is not None
         hole = sure and drills and any(word.letter in AXES for word in block.words)
         return OriginalLine(bare, text + b"\n" * terminator, number, block, here, ended, sure, hole)
 
-    def _begin_series(self, line: OriginalLine, motion: int | None) -> None:
-        """Note where a series begins; `motion` was in force in front of the line."""
+    def _begin_series(self, line: OriginalLine, cycle: int | None) -> None:
+        """Note where a series begins; `cycle` was in force in front of the line."""
         state = self.reader.state
-        if self.series is None and state.motion in self.dialect.cycles:
-            self.series = begin_series(line.here, state)
-            if motion in self.dialect.cycles:
+        if self.series is None and cycle_of(state, self.dialect) is not None:
+            self.series = begin_series(line.here, state, self.control)
+            if cycle is not None:
                 self.series.doubt = "it began before the program"
 
     def _kept_in(self, series: Series, line: OriginalLine) -> bool:
         """A line of a series that is kept; whether the walk can go on."""
         state, number = self.reader.state, line.number
-        in_cycle = state.motion in self.dialect.cycles
-        if line.hole and not any(code in (10, 28, 30, 52, 92) for code in line.codes):
+        in_cycle = cycle_of(state, self.dialect) is not None
+        if line.hole and not self._takes_axes(line):
             self.holes += 1
+            series.dwelt |= line.dwells
             if series.written:
                 return self._complain(Kind.CYCLE, number, "a hole of the series is not written out")
             series.written = False
@@ -212,10 +214,7 @@ class _Proof:
             series.doubt = series.doubt or f"line {number} stands between its holes"
         if not in_cycle or state.ended:
             # The end of a series must be one beyond doubt, or a later block may be a hole.
-            closes = state.ended or any(
-                self.dialect.groups.get(round((code or 0.0) * 10)) == "motion"
-                for code in line.codes
-            )
+            closes = state.ended or not {"motion", "cycle"}.isdisjoint(self._groups(line))
             self.series = None
             if series.written and not closes:
                 return self._complain(Kind.SERIES, number, "its end is not certain")
@@ -227,10 +226,19 @@ class _Proof:
             return False
         return line.endswith(b"\n") or len(self.theirs.peek(len(line) + 1)) == len(line)
 
-    @staticmethod
-    def _borrows(line: OriginalLine) -> bool:
-        """Whether a block may tap with the P of an earlier cycle, or call what does."""
-        if any(code in (74, 84) for code in line.codes):
+    def _groups(self, line: OriginalLine) -> set[str | None]:
+        """Modal groups of the codes of a line."""
+        return {self.dialect.groups.get(round((code or 0.0) * 10)) for code in line.codes}
+
+    def _takes_axes(self, line: OriginalLine) -> bool:
+        """Whether the axis words of a line belong to another code than the cycle in force."""
+        if self.control.beside:
+            return "non-modal" in self._groups(line)
+        return any(code in (10, 28, 30, 52, 92) for code in line.codes)
+
+    def _borrows(self, line: OriginalLine) -> bool:
+        """Whether a block may drill with the P of an earlier cycle, or call what does."""
+        if any(code in self.control.lent for code in line.codes):
             return not line.dwells
         return line.block.o_word == "call" or any(
             word.letter == "M" and word.value == 98 for word in line.block.words
@@ -240,8 +248,8 @@ class _Proof:
         """Whether a block may stand between two holes."""
         return all(
             (w.letter == "G" and w.value in QUIET_G | {4})
-            or (w.letter == "M" and w.value in QUIET_M | {0, 1, 60})
-            or w.letter in "NFSTP"
+            or (w.letter == "M" and w.value in self.control.switches - {2, 30} | {0, 1, 60})
+            or w.letter in self.control.letters + ("" if self.control.beside else "P")
             for w in block.words
         )
 
@@ -256,7 +264,8 @@ class _Proof:
                 return self._complain(Kind.MISSING, number, f"file ends where '{mine}' follows")
             return self._complain(Kind.CHANGED, number, problem)
         self.holes += 1
-        doubt = series.doubt or doubt_of(series, self.reader.state)
+        code = cycle_of(self.reader.state, self.dialect)
+        doubt = series.doubt or doubt_of(series, self.reader.state, code, line.here)
         if series.written is False:
             doubt = "an earlier hole of the series is not written out"
         if doubt is not None:
@@ -264,7 +273,8 @@ class _Proof:
         series.written = True
         self.written += 1
         self.lent = self.lent or line.dwells
-        wanted = calls_for(series, line.block, self.reader.state, self.turning)
+        series.dwelt |= line.dwells
+        wanted = calls_for(series, line.block, self.reader.state, code or 0, self.turning)
         if isinstance(wanted, Doubt):
             return self._uncertain(number, wanted.reason)
         return self._moves(series, wanted, line)
@@ -277,7 +287,9 @@ class _Proof:
             if not (comment.endswith(b")") and comment.count(b"(") == comment.count(b")") == 1):
                 return self._complain(Kind.COMMENT, number, "not one closed comment")
         plane = PLANES[state.plane or G17]
-        head, stops = self._head(line.text, line.block, {*plane, "R", "L", "P", "Q"})
+        head, stops = self._head(
+            line.text, line.block, {*plane, "R", self.control.repeats, "P", "Q"}
+        )
         if head and squeezed(lines.peek()) != head:
             return self._complain(Kind.HEAD, number, f"expected '{head.decode('latin-1')}'")
         if head:
@@ -296,11 +308,15 @@ class _Proof:
     ) -> bool:
         """Compare the moves, and how they come to exact path mode and back."""
         state = self.reader.state
+        if self.control.beside:
+            return self._compare(series, wanted, lines, number) and self._motion_restored(
+                wanted[0], lines, number
+            )
         if state.path in (61, 62):
             return self._compare(series, wanted, lines, number)
         if state.path != 64 or self.path is None:
             # Where the path mode is not known, a rest behind every move does what G61 would.
-            rests = [[*_with_rests(events)] for events in wanted]
+            rests = [[*with_rests(events)] for events in wanted]
             return self._compare(series, rests, lines, number)
         if lines.next() != b"G61":
             return self._complain(Kind.MODE, number, "cycles run in exact path mode: no G61")
@@ -308,6 +324,19 @@ class _Proof:
             return False
         if not self._path_restored(lines.next(), state):
             return self._complain(Kind.PATH, number, "the path mode of the program does not return")
+        return True
+
+    def _motion_restored(self, events: list[Event], lines: WrittenLines, number: int) -> bool:
+        """Whether G0 or G1 is in force again where the moves have left the other one."""
+        moves = [kind for kind, _ in events if kind in ("rapid", "feed")]
+        motion = self.reader.state.motion
+        if not moves or (moves[-1] == "feed") == (motion == 10):
+            return True
+        wanted = b"G1" if motion == 10 else b"G0"
+        if lines.peek() != wanted:
+            told = f"{wanted.decode()} of the program does not return"
+            return self._complain(Kind.MODE, number, told)
+        lines.next()
         return True
 
     def _compare(
@@ -318,15 +347,20 @@ class _Proof:
         incremental = self.reader.state.distance == G91
         plane = PLANES[self.reader.state.plane or G17]
         candidates = wanted
+
+        def read() -> tuple[Event, dict[str, Height]] | None:
+            unit = self.reader.state.unit
+            return read_event(lines.peek(), at, incremental, plane, self.control, unit)
+
         for k in range(max(map(len, wanted))):
             open_ = [events for events in candidates if len(events) > k]
             if not open_:
                 break
             ending = [events for events in candidates if len(events) == k]
-            got = read_event(lines.peek(), at, incremental, plane)
-            if got is not None and _stays(got[1], at):
+            got = read()
+            if got is not None and stays(got[1], at):
                 lines.next()
-                got = read_event(lines.peek(), at, incremental, plane)
+                got = read()
             fits = [events for events in open_ if got is not None and same(events[k], got[0])]
             if not fits and ending:
                 candidates = ending
@@ -347,7 +381,7 @@ class _Proof:
         rest, stops = bytearray(text), []
         for word in block.words:
             number = word.value or 0.0
-            cycle = word.letter == "G" and round(number * 10) in HEIGHTS
+            cycle = word.letter == "G" and round(number * 10) in self.control.heights
             stop = word.letter == "M" and number in STOPS
             if word.letter in taken or cycle or stop:
                 rest[word.begin : word.end] = b" " * (word.end - word.begin)
@@ -392,9 +426,10 @@ class _Proof:
         return False
 
 
-def _modes(state: State) -> dict[str, float | None]:
-    """What a cycle's moves depend on, as the second reading names it."""
-    return {
+def _modes(state: State, *, motion: bool) -> dict[str, float | None]:
+    """What a cycle's moves depend on, as the second reading names it; `motion`: G0 or G1, too."""
+    beside = {"motion": None if state.motion is None else state.motion // 10} if motion else {}
+    return beside | {
         "unit": state.unit,
         "incremental": None if state.distance is None else state.distance == G91,
         "feed mode": state.feed_mode,
@@ -403,21 +438,3 @@ def _modes(state: State) -> dict[str, float | None]:
         "retract": state.retract,
         "path": state.path,
     }
-
-
-def _with_rests(events: list[Event]) -> Iterator[Event]:
-    """The events with a rest behind every move that no dwell follows."""
-    for k, event in enumerate(events):
-        yield event
-        if event[0] in ("rapid", "feed") and [e[0] for e in events[k + 1 : k + 2]] != ["dwell"]:
-            yield "dwell", Fraction(0)
-
-
-def _stays(after: dict[str, Height], before: dict[str, Height]) -> bool:
-    """Whether a move goes by less than a number of the program can say, but not by nothing."""
-    return after != before and same(("", (*after.values(),)), ("", (*before.values(),)))
-
-
-def squeezed(text: bytes) -> bytes:
-    """Without blanks."""
-    return b"".join(text.split())

@@ -1,8 +1,8 @@
 """What drilling cycles mean, told a second time: the places that the tool visits for each hole.
 
-By this measure `expansion` beside it judges cycles that were written out. It follows the
-description of the cycles in LinuxCNC's manual and shares nothing with the room `gcodejerk.cycles`,
-which writes them; the words of a block and what is in force there come from the reader, as
+By this measure `expansion` beside it judges cycles that were written out. It follows what
+`controls` says of each control and shares nothing with the room `gcodejerk.cycles`, which writes
+them; the words of a block and what is in force there come from the reader, as
 everywhere in this package.
 
 Rule: every number is exact, and every place absolute where the program tells it; a place that it
@@ -20,36 +20,23 @@ from fractions import Fraction
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Block, Word
 from gcodejerk.nc.dialects.dialect import PLANES
-from gcodejerk.nc.dialects.gcodes import G17, G18, G19, G40, G90, G91, G99
+from gcodejerk.nc.dialects.gcodes import G17, G19, G40, G90, G91, G99
 from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.verification.cycles.controls import Control
 
 CLOSE = Fraction(1, 10**8)
 """Numbers of a program that differ by less are the same; in its unit, far below a resolution."""
 
-HEIGHTS = {
-    # What the tool does over a hole, once it is at R (LinuxCNC manual, "Canned cycles"):
-    # z feed to the bottom, r feed to R, t feed to the top, T rapid to the top (R in G99, else where
-    # the series began if that is higher), P dwell, S stop the spindle, M start it again,
-    # b pecks that break the chip, c pecks that clear it.
-    730: "bzT",
-    810: "zT",
-    820: "zPT",
-    830: "czT",
-    850: "zrT",
-    860: "zPSTM",
-    890: "zPt",
-}
-CLEARANCE = Fraction(10, 1000)
-"""Inches that a peck goes back, or stops above where it was."""
 MOST_PECKS = 20_000
 """Of one block, repeats included."""
 
-_MOVE = re.compile(rb"(G0|G1)((?: [XYZ][-+]?\d*(?:\.\d*)?)+)")
+_MOVE = re.compile(rb"(G9 )?(G0|G1)((?: [XYZ][-+]?\d*(?:\.\d*)?)+)")
 _DWELL = re.compile(rb"G4 P(\d*(?:\.\d*)?)")
 QUIET_G = frozenset({17, 18, 19, 20, 21, 40, 90, 91, 90.1, 91.1, 94, 95, 98, 99})
 QUIET_M = frozenset({3, 4, 5, 7, 8, 9, 48, 49})
 STOPS = frozenset({0, 1, 2, 30, 60})
-"""G and M codes that a block of a cycle may hold: what they do, they do before or after it."""
+"""G and M codes that a block of a cycle may hold, as far as the control does before or after it
+what they do."""
 
 Height = tuple[str, Fraction]
 """Origin (empty: the program's zero; `?`: a place that is not known), and distance to it."""
@@ -65,14 +52,18 @@ class Series:
     at: dict[str, Height]
     plane: int | None
     unit: float | None
+    distance: int | None
+    control: Control
     written: bool | None = None
     code: int = 0
     said: dict[str, Fraction] = field(default_factory=dict)
     """Words that stay in force: the depth (under `z`), R, P and Q."""
     doubt: str | None = None
+    dwelt: bool = False
+    """A block of it has stated a dwell."""
 
 
-def begin_series(here: list[float], state: State) -> Series:
+def begin_series(here: list[float], state: State, control: Control) -> Series:
     """The tool as a series finds it; `here` are the positions in front of its first block."""
     at: dict[str, Height] = {}
     for letter in "XYZ":
@@ -80,18 +71,21 @@ def begin_series(here: list[float], state: State) -> Series:
         number = here[axis] / state.scale(axis)
         at[letter] = ("?", Fraction(0)) if math.isnan(number) else ("", Fraction(number))
     along = PLANES[state.plane][2] if state.plane in PLANES else "Z"
-    return Series(at.get(along, ("?", Fraction(0))), at, state.plane, state.unit)
+    level = at.get(along, ("?", Fraction(0)))
+    return Series(level, at, state.plane, state.unit, state.distance, control)
 
 
-def doubt_of(series: Series, state: State) -> str | None:
-    """What is not certain of the state in which a hole is made."""
-    if state.motion not in HEIGHTS:
+def doubt_of(series: Series, state: State, code: int | None, here: list[float]) -> str | None:
+    """What is not certain of the state in which a hole is made; `here` is where the tool is."""
+    control = series.control
+    heights = control.heights.get(code or 0)
+    if heights is None or set(heights) & control.leaves:
         return "only the controller can do this cycle"
     if state.plane != series.plane or state.unit != series.unit or series.unit is None:
         return "plane or unit change, or are not known"
-    if state.plane not in (G17, G18, G19) or (state.plane == G19 and state.diameter is not False):
+    if state.plane not in control.planes or (state.plane == G19 and state.diameter is not False):
         return "nobody knows cycles in this plane"
-    if state.compensation != G40 or state.rotated is not False:
+    if state.compensation != G40 or state.transformed:
         return "cutter compensation or rotation"
     if state.distance not in (G90, G91) or state.feed_mode not in (94, 95):
         return "distance mode or feed mode"
@@ -99,15 +93,31 @@ def doubt_of(series: Series, state: State) -> str | None:
         return "no feed"
     if series.level[0]:
         return "where it starts is not known"
+    return _doubt_beside(series, state, heights, here) if control.beside else None
+
+
+def _doubt_beside(series: Series, state: State, heights: str, here: list[float]) -> str | None:
+    """What more is not certain where a cycle leaves G0 or G1 in force."""
+    z = Fraction(0) if math.isnan(here[2]) else Fraction(here[2]) / Fraction(str(state.unit))
+    if math.isnan(here[2]) or abs(z - series.at["Z"][1]) > CLOSE:
+        return "where the tool stands in front of the hole is not known"
+    if state.motion not in (0, 10) or state.path not in (61, 64):
+        return "G0 or G1, or the path mode, is not known"
+    if state.distance != series.distance:
+        return "G90 and G91 change"
+    if "P" in heights and state.feed_mode != 94:
+        return "a dwell in G95"
+    if series.control.carries and series.dwelt and "P" not in heights and heights[0] in "bc":
+        return "a dwell of an earlier cycle"
     return None
 
 
-def _belongs(word: Word, code: int, letters: set[str]) -> bool:
+def _belongs(word: Word, code: int, letters: set[str], switches: frozenset[int]) -> bool:
     """Whether a word may stand in a block of a cycle."""
     number = -1.0 if word.value is None else word.value
     if word.letter == "G":
         return number in QUIET_G or round(number * 10) == code
-    return word.letter in letters or (word.letter == "M" and number in QUIET_M | STOPS)
+    return word.letter in letters or (word.letter == "M" and number in switches)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,28 +128,41 @@ class Doubt:
 
 
 def calls_for(
-    series: Series, block: Block, state: State, turning: int
+    series: Series, block: Block, state: State, code: int, turning: int
 ) -> list[list[Event]] | Doubt:
     """What a block calls for: its moves, for each count of pecks that may be meant."""
-    plane = PLANES[state.plane or G17]
-    code = state.motion or 0
-    said = {w.letter: number_of(w.text[1:]) for w in block.words if w.letter in "XYZRPQL"}
-    own = _own_words(code)
+    plane, control = PLANES[state.plane or G17], series.control
+    said: dict[str, Fraction] = {}
+    own = _own_words(control.heights[code])
     for word in block.words:
-        if not _belongs(word, code, {*plane, "R", "L", "N", "F", "S", "T"} | own):
+        letters = {*plane, "R", control.repeats, *control.letters} | own
+        if not _belongs(word, code, letters, control.switches):
             return Doubt(f"nobody knows when {word.text.decode('latin-1')} acts")
+        if word.letter in "XYZRPQ" or word.letter == control.repeats:
+            number = control.number(word.letter, word.text[1:], state.unit)
+            if number is None:
+                return Doubt("a number without a decimal point")
+            said[word.letter] = number
+        if word.letter == "P" and control.point not in (None, b"." in word.text):
+            return Doubt("its dwell may be another one in G4")
+    if control.xy and not set(plane[:2]) & said.keys():
+        return Doubt("it names neither X nor Y")
     _remember(series, code, said, plane[2])
     needs = {"z", "R"} | own
-    repeats = said.get("L", Fraction(1))
+    repeats = said.get(control.repeats, Fraction(1))
     if needs - series.said.keys() or repeats < 1 or repeats.denominator != 1:
         return Doubt("a word that it needs is missing")
     r, z = _heights(series, state)
     if z > r or ("Q" in needs and series.said["Q"] <= 0):
         return Doubt("the controller refuses it")
+    if control.beside and (series.level[1] < r or series.at[plane[2]][1] < r):
+        return Doubt("R is above the tool")
+    if not _pecks_are_told(series, code, state):
+        return Doubt("the machine file does not say how it pecks")
     level = series.level[1]
     if state.retract is None and level > r:
         return Doubt("G98 or G99 is not known")
-    if "S" in HEIGHTS[code] and not turning:
+    if "S" in control.heights[code] and not turning:
         return Doubt("the spindle may stand")
     top = r if state.retract == G99 else max(r, level)
     out = []
@@ -152,9 +175,20 @@ def calls_for(
     return out
 
 
-def _own_words(code: int) -> set[str]:
+def _own_words(heights: str) -> set[str]:
     """Letters that this cycle needs and others do not: P of a dwell, Q of pecks."""
-    return {"P"} & set(HEIGHTS[code]) | ({"Q"} if HEIGHTS[code][0] in "bc" else set())
+    return {"P"} & set(heights) | ({"Q"} if heights[0] in "bc" else set())
+
+
+def _pecks_are_told(series: Series, code: int, state: State) -> bool:
+    """Whether it is known how far pecks go back, and less than they go down."""
+    control, kind = series.control, series.control.heights[code][0]
+    if kind not in "bc":
+        return True
+    back = control.distance(control.back[kind], state.unit)
+    if back is None or (kind == "c" and control.distance(control.lift, state.unit) is None):
+        return False
+    return not control.beside or back < series.said["Q"]
 
 
 def _remember(series: Series, code: int, said: dict[str, Fraction], along: str) -> None:
@@ -177,9 +211,11 @@ def _heights(series: Series, state: State) -> tuple[Fraction, Fraction]:
 
 def _pecks(series: Series, code: int, r: Fraction, z: Fraction) -> list[int]:
     """How many pecks end above the bottom; two counts where binary numbers decide."""
-    if HEIGHTS[code][0] == "z":
+    if series.control.heights[code][0] == "z":
         return [0]
     steps = (r - z) / series.said["Q"]
+    if series.control.beside:  # such a control counts its least increments
+        return [max(math.ceil(steps) - 1, 0)]
     nearest = round(steps)
     if nearest > 0 and abs(steps - nearest) * series.said["Q"] < CLOSE:
         return [nearest - 1, nearest]
@@ -196,14 +232,16 @@ def _visits(
 ) -> Iterator[tuple[str, Fraction]]:
     """What happens over a hole once the tool is at R: its kind, and the height or number."""
     r, z, top = heights
-    back = CLEARANCE if state.unit != 1.0 else CLEARANCE * Fraction(254, 10)
-    for step in HEIGHTS[code]:
+    control = series.control
+    lift = control.distance(control.lift, state.unit) or Fraction(0)
+    for step in control.heights[code]:
         if step in "bc":
+            back = control.distance(control.back[step], state.unit) or Fraction(0)
             for k in range(1, pecks + 1):
                 depth = r - k * series.said["Q"]
                 yield "feed", depth
                 if step == "c":
-                    yield "rapid", r
+                    yield "rapid", r + lift
                 yield "rapid", depth + back
         elif step in "zrt":
             yield "feed", {"z": z, "r": r, "t": top}[step]
@@ -238,7 +276,7 @@ def _places(
             a = ("", said[first]) if first in said else a
             b = ("", said[second]) if second in said else b
         # The manual's "preliminary motion": level where that is above R.
-        c = c if k == 0 and c > r else top
+        c = c if series.control.beside or (k == 0 and c > r) else top
         yield "rapid", (a, b, ("", c))
         yield "rapid", (a, b, ("", r))
         for kind, value in visits:
@@ -253,22 +291,32 @@ def number_of(text: bytes) -> Fraction:
 
 
 def read_event(
-    line: bytes, at: dict[str, Height], incremental: bool, plane: tuple[str, str, str]
+    line: bytes,
+    at: dict[str, Height],
+    incremental: bool,
+    plane: tuple[str, str, str],
+    control: Control,
+    unit: float | None,
 ) -> tuple[Event, dict[str, Height]] | None:
     """One line as what it does, and where it leaves the tool; None where it is none of ours."""
     if match := _MOVE.fullmatch(line):
-        after = dict(at)
-        for word in match[2].split():
+        after, kind = dict(at), "rapid" if match[2] == b"G0" else "feed"
+        for word in match[3].split():
             letter, number = word[:1].decode(), word[1:]
             if not number.strip(b"+-."):
                 return None
-            value = number_of(number)
+            value = control.number(letter, number, unit)
+            if value is None:
+                return None
             after[letter] = (at[letter][0], at[letter][1] + value) if incremental else ("", value)
-        if after.keys() != at.keys() or len(match[2].split()) > 3:
+        if after.keys() != at.keys() or len(match[3].split()) > 3:
             return None
-        kind = "rapid" if match[1] == b"G0" else "feed"
+        if bool(match[1]) != (control.beside and kind == "feed"):
+            return None  # a feed move of such a control has to end in a standstill
         return (kind, tuple(after[letter] for letter in plane)), after
     if (match := _DWELL.fullmatch(line)) and match[1].strip(b"."):
+        if control.point not in (None, b"." in match[1]):
+            return None
         return ("dwell", number_of(match[1])), at
     if line in (b"M3", b"M4", b"M5"):
         return ("spindle", number_of(line[1:])), at
@@ -311,3 +359,16 @@ def told(event: Event, plane: tuple[str, str, str]) -> str:
         )
         return f"a {kind} to {' '.join(words)}"
     return f"{kind} {float(value):g}"
+
+
+def with_rests(events: list[Event]) -> Iterator[Event]:
+    """The events with a rest behind every move that no dwell follows."""
+    for k, event in enumerate(events):
+        yield event
+        if event[0] in ("rapid", "feed") and [e[0] for e in events[k + 1 : k + 2]] != ["dwell"]:
+            yield "dwell", Fraction(0)
+
+
+def stays(after: dict[str, Height], before: dict[str, Height]) -> bool:
+    """Whether a move goes by less than a number of the program can say, but not by nothing."""
+    return after != before and same(("", (*after.values(),)), ("", (*before.values(),)))

@@ -58,3 +58,8 @@ class WrittenLines:
     def well_ended(self, end: bytes, last: bytes) -> bool:
         """Whether every line taken ends in one way, and the last one as the block did."""
         return self.ends[-1:] == [last] and all(got == end for got in self.ends[:-1])
+
+
+def squeezed(text: bytes) -> bytes:
+    """Without blanks."""
+    return b"".join(text.split())
