@@ -151,7 +151,7 @@ FANUC = DrillingRules(
     repeats="K",
     peck="Q",
     dwell="P",
-    borrows_dwell=frozenset({740, 760, 820, 840, 870, 880, 890}),
+    borrows_dwell=frozenset(),  # G80 clears what a cycle was given
     clearance=UNSAID,
     break_back=UNSAID,
     feed_out=False,
@@ -169,7 +169,6 @@ HAAS = replace(
     # G4, too; without one, G4 would read milliseconds.
     FANUC,
     repeats="L",
-    borrows_dwell=FANUC.borrows_dwell | {730, 830},
     lift=UNSAID,
     needs_position=True,
     pecks_dwell=True,

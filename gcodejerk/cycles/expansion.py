@@ -370,7 +370,7 @@ class _Expander(Reader):
 
     def _borrow(self, line: int) -> None:
         """A cycle may take its dwell from those before it: the controller has to read them."""
-        for index in self.dwell_series:
+        for index in self.dwell_series if self.rules.borrows_dwell else ():
             reason = "a later cycle takes its dwell from this one"
             self.verdicts[index] = _Verdict(self.verdicts[index].line, reason, line)
         self.dwell_series = []

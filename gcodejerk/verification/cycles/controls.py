@@ -45,7 +45,7 @@ class Control:
     leaves: frozenset[str] = frozenset()
     """Heights that this machine has not told enough of."""
     lent: frozenset[float] = frozenset({74.0, 84.0})
-    """Cycles that take the dwell of an earlier one."""
+    """Cycles that take the dwell of an earlier one, G80 or not."""
     letters: str = "NFST"
     """What may stand beside a cycle's own words, and between two holes."""
     switches: frozenset[int] = frozenset({3, 4, 5, 7, 8, 9, 48, 49, 0, 1, 2, 30, 60})
@@ -103,7 +103,6 @@ def control_of(dialect: Dialect, start: Start) -> Control:
     if dialect.name not in ("fanuc", "haas"):
         return Control({})
     haas, said = dialect.name == "haas", start.cycles
-    takers = {74.0, 76.0, 82.0, 84.0, 87.0, 88.0, 89.0}
     return Control(
         _ISO,
         repeats="L" if haas else "K",
@@ -115,7 +114,7 @@ def control_of(dialect: Dialect, start: Start) -> Control:
         xy=haas,
         carries=haas,
         leaves=frozenset() if said.boring_out == "feed" else frozenset("r"),
-        lent=frozenset(takers | {73.0, 83.0} if haas else takers),
+        lent=frozenset(),
         letters="NFS",
         switches=frozenset({3, 4, 5, 7, 8, 9}),
         whole=start.decimal_point,

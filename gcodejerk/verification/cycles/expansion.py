@@ -238,6 +238,8 @@ class _Proof:
 
     def _borrows(self, line: OriginalLine) -> bool:
         """Whether a block may drill with the P of an earlier cycle, or call what does."""
+        if not self.control.lent:
+            return False
         if any(code in self.control.lent for code in line.codes):
             return not line.dwells
         return line.block.o_word == "call" or any(

@@ -41,7 +41,9 @@ class Drilling(Codes):
             return
         letters = drilling.repeats + drilling.maybe_repeats
         repeats = [values[letter] for letter in letters if letter in values]
-        if self.g.get("distance") != G90 or any(n != 1.0 for n in repeats) or block.increments:
+        # In G90 every repeat is a hole in the same place.
+        odd = any(not (n >= 1.0 and n.is_integer()) for n in repeats)
+        if self.g.get("distance") != G90 or odd or block.increments:
             self.lose()
             self.level = self.r = NAN
             return
