@@ -130,6 +130,16 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
+class NamedCycle:
+    """A drilling cycle with a name, which comes back to its RTP."""
+
+    parameters: tuple[str, ...]
+    """Those whose meaning is known, in their order."""
+    keeps_feed: bool = False
+    """It drills with the F in force, and leaves it alone."""
+
+
+@dataclass(frozen=True, slots=True)
 class Drilling:
     """How canned cycles of the drilling kind behave."""
 
@@ -144,6 +154,8 @@ class Drilling:
     """Letters of the number of repeats."""
     maybe_repeats: str = ""
     """Letters that are such a number on some of the controls, and something else on others."""
+    named: Mapping[str, NamedCycle] = field(default_factory=dict)
+    """By their names: ``CYCLE81(RTP, RFP, SDIS, DP, DPR)``."""
     missing: Literal["error", "unknown"] = "error"
     """What follows where no R or depth was ever given: the block is refused, or nobody knows."""
 

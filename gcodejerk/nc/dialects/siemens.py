@@ -8,7 +8,16 @@ subprogram is such a name.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Effect, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import (
+    Arithmetic,
+    Dialect,
+    Drilling,
+    Effect,
+    NamedCycle,
+    Text,
+    Writing,
+    grouped,
+)
 
 SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 
@@ -49,6 +58,20 @@ _FLOW = (
     *("REPEATB", "UNTIL", "GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS", "CASE", "CALL", "PCALL"),
     *("EXTCALL", "ISOCALL", "PROC", "RET", "ENDPROC", "SETINT", "INIT", "START", "WAITE"),
 )
+# Order of the parameters: snippets of the extension MaTka.cnc-sinumerik. Motions of CYCLE81, to RTP
+# at the end with G0: helmancnc.com; "the G functions effective prior to the cycle call remain
+# active beyond the cycle": 808D manual (at cncmasterpiece.blogspot.com). That 82, 83, 85 and 89 end
+# in RTP, too, and that only 83 (FRF) and 85 (FFR, RFF) have an F of their own, is general knowledge
+# that was not looked up, and so is that MCALL runs a cycle behind every block that moves. Later
+# parameters choose planes, axes and meanings: they have to be 0 or left out.
+_PLANES = ("RTP", "RFP", "SDIS", "DP", "DPR")
+_NAMED = {
+    "CYCLE81": NamedCycle(_PLANES, keeps_feed=True),
+    "CYCLE82": NamedCycle((*_PLANES, "DTB"), keeps_feed=True),
+    "CYCLE83": NamedCycle((*_PLANES, "FDEP", "FDPR", "DAM", "DTB", "DTS", "FRF", "VARI")),
+    "CYCLE85": NamedCycle((*_PLANES, "DTB", "FFR", "RFF")),
+    "CYCLE89": NamedCycle((*_PLANES, "DTB"), keeps_feed=True),
+}
 _FUNCTIONS = "ABS ACOS ASIN ATAN2 COS LN EXP POT ROUND SIN SQRT TAN TRUNC"
 NAMES: dict[str, Effect] = {
     **dict.fromkeys(_SILENT, "none"),
@@ -151,6 +174,7 @@ SIEMENS = Dialect(
     tool_frame=frozenset("TD"),
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
+    drilling=Drilling(named=_NAMED),
     arithmetic=Arithmetic(
         # NC programming 12/2019 p. 444: comparisons bind least of all.
         levels=(

@@ -16,6 +16,7 @@ from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.expressions import evaluate
 from gcodejerk.nc.interpreter.flow_words import known_behind
 from gcodejerk.nc.interpreter.modal import NAN, State
+from gcodejerk.nc.interpreter.named_cycles import certain_call, come_back
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import converted, named_assignment
 from gcodejerk.nc.text.block import Name
@@ -201,9 +202,36 @@ class Effects:
         if on or name in state.transforms:
             state.put("transforms", {**state.transforms, name: on})
 
+    def _drill_by_name(self, codes: Codes, step: Step) -> bool:
+        """CYCLE81(..) alone in its block; whether it is certain."""
+        call = None
+        if not (codes.g or codes.m or codes.values or codes.unknown):
+            call = certain_call(codes.names[0], self.state, self.dialect.drilling)
+        if call is None:
+            return False
+        step.feed_event = USES_FEED
+        come_back(self.state, call)
+        return True
+
+    def _call_modally(self, codes: Codes, step: Step) -> None:
+        """MCALL CYCLE81(..) begins a cycle that runs behind every move, MCALL alone ends it."""
+        state, names = self.state, codes.names
+        alone = not (codes.g or codes.m or codes.values or codes.unknown)
+        in_force, call = state.modal_cycle, None
+        if len(names) == 2 and self._named(names[0]) == "modal cycle" and alone:
+            call = certain_call(names[1], state, self.dialect.drilling)
+        step.leaves = len(names) > 1 and call is None
+        here = list(state.position)
+        self._modal_cycle(begins=len(names) > 1)
+        if call is not None or (len(names) == 1 and alone and in_force is not None):
+            for axis, place in enumerate(here):
+                state.move(axis, place)
+        state.put("modal_cycle", call)
+
     def _modal_cycle(self, begins: bool) -> None:
         """Begin or end a cycle or macro that runs at every position."""
         state = self.state
+        state.put("modal_cycle", None)
         state.put("transforms", {**state.transforms, "modal macro": begins})
         state.forget_positions()
 

@@ -97,6 +97,7 @@ FIELDS = (
     Field("spindle", "mode", 5),
     Field("cycle", "mode", together="cycle"),
     Field("cycle_level", "number", NAN),
+    Field("modal_cycle", "mode"),
     *(Field(name, "axes") for name in ("position", "g5x", "g92", "tool", "home")),
     *(Field(name, "named") for name in ("transforms", "bars")),
     *(Field(name, "table") for name in ("offsets", "variables")),
@@ -113,7 +114,7 @@ FIELDS = (
 )
 """What a state holds."""
 BY_NAME = {field.name: field for field in FIELDS}
-_NO_GROUP = ("feed_whole", "cycle", "system_stated")
+_NO_GROUP = ("feed_whole", "cycle", "modal_cycle", "system_stated")
 MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in _NO_GROUP)
 """Fields that hold one modal group each."""
 _FRAME = ("g5x", "g92", "tool")
@@ -172,6 +173,9 @@ class State:
     """Code in force, its Z and R words."""
     cycle_level: float
     """Where the series of cycles began."""
+    modal_cycle: tuple[float, bool] | None
+    """Where the cycle behind MCALL comes back to, and whether it leaves F alone; None: there is
+    none, or nobody knows."""
     position: list[float]
     g5x: list[float]
     g92: list[float]

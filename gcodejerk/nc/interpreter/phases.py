@@ -24,6 +24,7 @@ from gcodejerk.nc.interpreter.moves import (
     go_to_stored_point,
     plane_axes,
 )
+from gcodejerk.nc.interpreter.named_cycles import drill_behind
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.interpreter.rules import arc_words, takes_axes
 from gcodejerk.reasons import Reason
@@ -176,8 +177,9 @@ class Phases(Effects):
         effects = [self._named(name) for name in codes.names]
         if "modal cycle" in effects:
             # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
-            step.leaves = len(effects) > 1
-            self._modal_cycle(begins=step.leaves)
+            self._call_modally(codes, step)
+            return
+        if effects == ["cycle"] and self._drill_by_name(codes, step):
             return
         for effect in effects:
             if effect == "flow":
@@ -332,7 +334,9 @@ class Phases(Effects):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))
-        if any(on is not False for on in state.transforms.values()):
+        if any(on is not False for on in state.transforms.values()) and not (
+            motion not in dialect.redrawn and drill_behind(state, step.start)
+        ):
             state.forget_positions()
 
     def _counts_as_rapid(self, step: Step) -> bool:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import PLANES
 from gcodejerk.nc.dialects.gcodes import G17, G40, G80, G90, G98, G99
 from gcodejerk.verification.second_reading.coding import Codes
-from gcodejerk.verification.second_reading.reading import NAN
+from gcodejerk.verification.second_reading.known import Observation
+from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
+
+_INSIDE = re.compile(rb"[ \t]*\(([^()]*)\)[ \t]*")
+_PLAIN = re.compile(rb"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)")
 
 
 class Drilling(Codes):
@@ -71,3 +77,71 @@ class Drilling(Codes):
         retract = self.g.get("retract")
         top = max(self.level, self.r) if self.level == self.level and self.r == self.r else NAN
         return self.r if retract == G99 else top if retract == G98 else NAN
+
+    def in_contour(self, line: Line) -> None:
+        """A line of a contour, which a cycle runs as it sees fit."""
+        self.lose()
+        self.g["motion"], self.feed = None, NAN
+        if any(letter == "N" and number == self.contour for letter, number, _ in line.words):
+            self.contour = None
+
+    def drill_by_name(self, line: Line) -> bool:
+        """CYCLE81(..) and its kin, at once or by MCALL, or the end of MCALL; whether it is sure."""
+        if not line.understood or any(letter != "N" for letter, _, _ in line.words):
+            return False
+        if line.relative or not line.effects:
+            return False
+        if line.effects == ["modal cycle"]:
+            known, self.modal = self.modal is not None, None
+            if known:
+                self.frames["modal macro"] = False
+            return known
+        hole = self._hole(*line.cycle) if line.cycle is not None else None
+        if line.effects == ["cycle"] and hole is not None:
+            self._retract(hole)
+            return True
+        if line.effects == ["modal cycle", "cycle"] and hole is not None:
+            self.modal = hole
+            self.frames["modal macro"] = True
+            return True
+        return False
+
+    def _hole(self, name: str, arguments: bytes) -> tuple[float, bool] | None:
+        """RTP of a call whose numbers make a hole from above, and whether F outlives it."""
+        known = self.dialect.drilling.named.get(name)
+        inside = _INSIDE.fullmatch(arguments)
+        if known is None or inside is None or self.turned():
+            return None
+        if (self.g.get("plane"), self.g.get("compensation"), self.unit) != (G17, G40, 1.0):
+            return None
+        said: dict[str, float] = {}
+        for number, text in enumerate(inside[1].split(b",")):
+            if text.strip():
+                if not _PLAIN.fullmatch(text.strip()):
+                    return None
+                later = number >= len(known.parameters)
+                said["" if later else known.parameters[number]] = float(text)
+                if later and float(text):
+                    return None
+        rtp, rfp = said.get("RTP", NAN), said.get("RFP", NAN)
+        sdis, dpr = said.get("SDIS", 0.0), said.get("DPR", 0.0)
+        deep = dpr > 0.0 or (dpr == 0.0 and said.get("DP", NAN) < rfp)
+        return (rtp, known.keeps_feed) if deep and sdis >= 0.0 and rtp - rfp >= sdis else None
+
+    def _retract(self, hole: tuple[float, bool]) -> None:
+        self.at[AXES.index("Z")] = hole[0]
+        self.feed = self.feed if hole[1] else NAN
+
+    def drilled_behind(self, seen: Observation) -> bool:
+        """The hole behind a block that moves; whether it is sure where it leaves the tool."""
+        alone = {frame for frame, on in self.frames.items() if on is not False} == {"modal macro"}
+        plain = self.g.get("motion") in (0, 10) and self.g.get("compensation") == G40
+        if self.modal is None or not alone or not plain:
+            return False
+        ways = [there - here for here, there in zip(seen.start, self.at, strict=True)]
+        z = AXES.index("Z")
+        if not any(way < 0.0 or way > 0.0 for way in ways) and self.at[z] != self.modal[0]:
+            self.at[z], self.feed = NAN, self.feed if self.modal[1] else NAN
+            return True
+        self._retract(self.modal)
+        return True

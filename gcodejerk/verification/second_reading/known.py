@@ -29,7 +29,7 @@ KINDS = {
     **dict.fromkeys(("doubt", "turns", "habits", "strayed"), "ever"),
     **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter"), "mode"),
     **dict.fromkeys(("selected", "told"), "mode"),
-    **dict.fromkeys(("cycle", "feed_whole", "spindle"), "mode"),
+    **dict.fromkeys(("cycle", "modal", "feed_whole", "spindle"), "mode"),
     **dict.fromkeys(("dialect", "facts", "fixed", "dark", "burns"), "given"),
     # where in the file the reading is; a line that may be skipped changes none of these for good
     **dict.fromkeys(("ended", "opened", "begun", "started", "depth", "contour"), "place"),
@@ -118,6 +118,8 @@ class Known:
             self.system = self.offsets_of(self.selected)
         self.cycle: int | None = None
         self.level = self.r = NAN
+        self.modal: tuple[float, bool] | None = None
+        """Where a cycle behind MCALL retracts to, and whether F outlives it."""
         self.frames: dict[str, bool | None] = {}
         """Rotations and their kin: whether in force."""
         self.bars: dict[str, bool | None] = {}

@@ -78,6 +78,8 @@ class Line:
     """The plane is turned from here on."""
     group: bool = False
     """F is from here on the speed of some axes only."""
+    cycle: tuple[str, bytes] | None = None
+    """Name and arguments of a cycle."""
     relative: dict[str, str] = field(default_factory=dict)
     """Address -> ``IC`` or ``AC``, whatever G90 or G91 says."""
 
@@ -324,6 +326,8 @@ class Text:
             effect = self.dialect.names.get(match[1].decode(), "flow")
             if effect == "feed group":
                 line.group = (match[2] or b"").strip(b"() \t") != b""
+            if effect == "cycle":
+                line.cycle = match[1].decode(), match[2] or b""
             if effect == "swivel":
                 line.swivelled = (match[2] or b"").strip(b"() \t") != b""
             if effect != "none":

@@ -146,6 +146,8 @@ class Tracker(Drilling):
             for effect in line.effects:
                 self.write(effect, line)
             return Observation()
+        if self.drill_by_name(line):
+            return Observation(against="it calls a cycle")
         if not line.understood or any(effect not in _READ for effect in line.effects):
             return self._lost(line)
         if _SHIFTS.issuperset(line.effects) and line.effects:
@@ -153,7 +155,7 @@ class Tracker(Drilling):
         if not {"frames", "swivel"}.isdisjoint(line.effects):
             return self._new_frame(line)
         if self.contour is not None:
-            self._in_contour(line)
+            self.in_contour(line)
             return Observation()
         block = Sorted()
         if not block.sort(line, dialect, self.unit == INCH, self.facts.decimal_point):
@@ -209,12 +211,6 @@ class Tracker(Drilling):
         self.forget()
         self.strayed = True
         return Observation()
-
-    def _in_contour(self, line: Line) -> None:
-        self.lose()
-        self.g["motion"], self.feed = None, NAN
-        if any(letter == "N" and number == self.contour for letter, number, _ in line.words):
-            self.contour = None
 
     def _run_block(self, block: Sorted) -> Observation:
         """Execute a block: its modal words, then its motion, then what stops or ends."""
@@ -416,7 +412,8 @@ class Tracker(Drilling):
             if compensation is not None:
                 seen.against = seen.against or "cutter compensation is active"
         if self.turned():
-            self.lose()
+            if not self.drilled_behind(seen):
+                self.lose()
             if True in self.frames.values():
                 seen.against = seen.against or "a rotation, scaling or mirroring is active"
         seen.against = seen.against or self._barred(block, seen)
