@@ -55,6 +55,11 @@ from gcodejerk.start import NOTHING_KNOWN, Start
 _CYCLE = re.compile(rb"[gG][0+ \t]*[78]")
 # What may change the spindle or the path mode.
 _NOTED = re.compile(rb"[mMoO]|[gG][0+ \t]*6")
+# What may lead to a block from elsewhere than the one in front of it, in macro B and its kin.
+_JUMPS = re.compile(
+    rb"GOTO|WHILE|IF[ \t]*\[|M[ \t]*0*9[67](?![0-9])|M[ \t]*0*99[^\n]*P|G[ \t]*0*6[56](?![0-9])",
+    re.IGNORECASE,
+)
 ROOM = 16
 """Characters by which a line may become longer than the block: its code, blanks, a sign, a dot."""
 _SHOWN = 20
@@ -143,6 +148,8 @@ def expand(
         )
     begin = source.tell()
     judging = _Expander(name, chosen, start, comments, None, None)
+    judging.jumps = judging.rules.own_group and _finds_jumps(source)
+    source.seek(begin)
     digest = judging.walk(source)
     if any(verdict.reason is None for verdict in judging.verdicts):
         source.seek(begin)
@@ -158,6 +165,16 @@ def expand(
     columns = np.array(places, dtype=np.int64).reshape(-1, 8).T
     findings = _findings(judging.verdicts)
     return Expansion(judging.blocks, judging.holes, columns.shape[1], findings, LineMap(*columns))
+
+
+def _finds_jumps(source: BinaryIO) -> bool:
+    """Whether a program may come to a block from elsewhere; read to its end."""
+    tail = b""
+    while piece := source.read(1 << 20):
+        if _JUMPS.search(tail + piece):
+            return True
+        tail = piece[-64:]
+    return False
 
 
 def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
@@ -206,6 +223,8 @@ class _Expander(Reader):
         """The verdicts of the first walk; None during it."""
         self.verdicts: list[_Verdict] = []
         self.series: Series | None = None
+        self.jumps = False
+        """A block may be reached in another way than from the one in front of it."""
         self.reason_at = 0
         self.holes = 0
         self.dwell_series: list[int] = []
@@ -260,6 +279,8 @@ class _Expander(Reader):
         why = str(Reason.NOT_UNDERSTOOD) if faults != self.problem_count else doubt(block)
         if inside or self.inside:
             why = str(Reason.SUBPROGRAM)
+        if self.jumps:
+            why = why or "the program jumps, and may come to a hole in another way"
         if self.collecting and self.series is None:
             # The structure runs once it is complete; what drills in it is left to the controller.
             if self.dialect.cycles & {*g_codes(block)}:

@@ -144,6 +144,9 @@ LEFT = {
     "no repeats": ("haas", b"G81 X1. Z-5. R2. L0\n", None, START),
     "G0 beside": ("fanuc", b"G0 G81 X1. Z-5. R2.\n", None, START),
     "block delete": ("fanuc", CYCLE + b"/X2.\n", "block delete", START),
+    "a jump back": ("fanuc", CYCLE + b"N20 X2.\nG80\nG0 Z50.\nGOTO 20\n", "jumps", START),
+    "a loop": ("fanuc", b"WHILE[#1LT3]DO1\n" + CYCLE + b"X2.\nG80\nEND1\n", None, START),
+    "a local call": ("haas", CYCLE + b"N20 X2. Y2.\nG80\nM97 P20\n", "jumps", START),
     "pole": ("haas", b"G81 X1. Y1. Z-5. R2. P5\n", None, START),
 }  # fmt: skip
 
@@ -318,7 +321,7 @@ def test_the_proof_does_not_guess_a_setting(field):
 
 DOUBTLESS = (
     *("seconds", "revolutions", "a dwell that stays", "setting 28", "no motion"),
-    *("a stop", "a stop in the block", "R alone"),
+    *("a stop", "a stop in the block", "R alone", "a jump back", "a local call"),
 )
 
 
@@ -326,6 +329,7 @@ DOUBTLESS = (
 def test_a_writer_that_does_not_doubt_is_found_out(case, monkeypatch):
     dialect, series, _, start = LEFT[case]
     program = HEAD + series + END
+    monkeypatch.setattr("gcodejerk.cycles.expansion._finds_jumps", lambda *_: False)
     series_of = "gcodejerk.cycles.series."
     monkeypatch.setattr("gcodejerk.cycles.expansion.why_left_alone", lambda *_: None)
     monkeypatch.setattr("gcodejerk.cycles.expansion.passes", lambda *_: True)

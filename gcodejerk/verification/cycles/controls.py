@@ -7,15 +7,22 @@ decides comes from the machine file, or is None: then nobody knows.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import BinaryIO
 
 from gcodejerk.nc import Dialect, Start
 from gcodejerk.nc.dialects.gcodes import G17, G18, G19
 from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.verification.second_reading.reading import pieces
 
 INCH = Fraction(254, 10)
+_ELSEWHERE = re.compile(
+    rb"(?:GOTO|DO)[ \t]*[0-9#\[]|WHILE[ \t]*\[|M[ \t]*0*9[67](?![0-9])|M[ \t]*0*99[^\n(]*P",
+    re.IGNORECASE,
+)
 NEAR = Fraction(1, 10**8)
 
 
@@ -130,3 +137,8 @@ def cycle_of(state: State, dialect: Dialect) -> int | None:
     if not dialect.drilling.own_group:
         return state.motion if state.motion in dialect.cycles else None
     return state.cycle[0] if state.cycle is not None else None
+
+
+def comes_from_elsewhere(original: BinaryIO) -> bool:
+    """Whether a block of a program may be reached otherwise than from the one in front of it."""
+    return any(_ELSEWHERE.search(piece) for piece in pieces(original))

@@ -22,7 +22,7 @@ from gcodejerk.nc.program import read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.verification.bytes.source import Window
-from gcodejerk.verification.cycles.controls import control_of, cycle_of
+from gcodejerk.verification.cycles.controls import comes_from_elsewhere, control_of, cycle_of
 from gcodejerk.verification.cycles.holes import (
     CLOSE,
     QUIET_G,
@@ -95,6 +95,8 @@ def check_expansion(
     proof = _Proof(
         Window(expanded), find_dialect(dialect), Start() if start is None else start, most
     )
+    proof.jumps = proof.control.beside and comes_from_elsewhere(original)
+    original.seek(begin)
     for chunk in read_chunks(original, names[0]):
         if not proof.take(chunk):
             break
@@ -117,6 +119,8 @@ class _Proof:
         self.control = control_of(dialect, start)
         self.reader = Reader("<original>", dialect, start)
         self.found = Findings(most)
+        self.jumps = False
+        """A hole may be reached from elsewhere than the block in front of it."""
         self.holes = self.written = self.kept = 0
         self.series: Series | None = None
         self.turning = 0
@@ -268,6 +272,7 @@ class _Proof:
         self.holes += 1
         code = cycle_of(self.reader.state, self.dialect)
         doubt = series.doubt or doubt_of(series, self.reader.state, code, line.here)
+        doubt = "the program jumps" if self.jumps else doubt
         if series.written is False:
             doubt = "an earlier hole of the series is not written out"
         if doubt is not None:
