@@ -148,8 +148,9 @@ def expand(
         )
     begin = source.tell()
     judging = _Expander(name, chosen, start, comments, None, None)
-    judging.jumps = judging.rules.own_group and _finds_jumps(source)
-    source.seek(begin)
+    if judging.rules.own_group:
+        judging.jumps = _finds_jumps(source)
+        source.seek(begin)
     digest = judging.walk(source)
     if any(verdict.reason is None for verdict in judging.verdicts):
         source.seek(begin)

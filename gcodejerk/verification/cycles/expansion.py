@@ -95,8 +95,9 @@ def check_expansion(
     proof = _Proof(
         Window(expanded), find_dialect(dialect), Start() if start is None else start, most
     )
-    proof.jumps = proof.control.beside and comes_from_elsewhere(original)
-    original.seek(begin)
+    if proof.control.beside:
+        proof.jumps = comes_from_elsewhere(original)
+        original.seek(begin)
     for chunk in read_chunks(original, names[0]):
         if not proof.take(chunk):
             break
