@@ -11,7 +11,6 @@ Rule 2: what is not a block of a series that is certain is copied byte for byte.
 
 from __future__ import annotations
 
-import hashlib
 import re
 from array import array
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from typing import BinaryIO
 import numpy as np
 
 from gcodejerk.cycles.blocks import write_block
+from gcodejerk.cycles.called import JUMPS, CallExpander
 from gcodejerk.cycles.drilling import DRILLING, rules_for
 from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.cycles.numbers import decimal
@@ -38,15 +38,13 @@ from gcodejerk.cycles.series import (
     passes,
     why_left_alone,
 )
+from gcodejerk.cycles.walk import Place, Verdict, Walker
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G61, G61_1, G64
 from gcodejerk.nc.interpreter.runner import Finding
-from gcodejerk.nc.program import read_chunk
-from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.block import Block
-from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.nc.text.tokenizer import parse_line
 from gcodejerk.reasons import Reason
 from gcodejerk.start import NOTHING_KNOWN, Start
@@ -79,16 +77,6 @@ class Expansion:
     findings: tuple[Finding, ...]
     """One for each series that was left to the controller, up to a number."""
     map: LineMap
-
-
-@dataclass(frozen=True, slots=True)
-class _Verdict:
-    """What the first walk found about one series."""
-
-    line: int
-    reason: str | None
-    at: int
-    """The line that the reason is about."""
 
 
 def expand(
@@ -140,45 +128,47 @@ def expand(
     ['G61', 'G0 X5', 'G0 Z2.', 'G1 Z-3.', 'G0 Z10.', 'G64']
     """
     chosen = find_dialect(dialect)
-    if chosen.name not in DRILLING:
-        known = ", ".join(sorted(DRILLING))
+    called = bool(chosen.drilling.named)
+    if chosen.name not in DRILLING and not called:
+        known = ", ".join(sorted([*DRILLING, "siemens"]))
         raise ProgramError(
             f"the cycles of dialect '{chosen.name}' cannot be written out",
             f"leave --expand-cycles out; it knows the cycles of: {known}",
         )
     begin = source.tell()
-    judging = _Expander(name, chosen, start, comments, None, None)
-    if judging.rules.own_group:
-        judging.jumps = _finds_jumps(source)
+    expander = CallExpander if called else _Expander
+    judging = expander(name, chosen, start, comments, None, None)
+    if called or chosen.drilling.own_group:
+        judging.jumps = _finds_jumps(source, JUMPS if called else _JUMPS)
         source.seek(begin)
     digest = judging.walk(source)
     if any(verdict.reason is None for verdict in judging.verdicts):
         source.seek(begin)
-        writing = _Expander(name, chosen, start, comments, target, judging.verdicts)
+        writing = expander(name, chosen, start, comments, target, judging.verdicts)
         if writing.walk(source) != digest:
             raise EmitError(
                 f"{name} was changed while it was being read",
                 "run the command again when nothing writes to the file",
             )
-        places = writing.places
+        places, written = writing.places, writing.written
     else:
-        places = array("q")
+        places, written = array("q"), 0
     columns = np.array(places, dtype=np.int64).reshape(-1, 8).T
     findings = _findings(judging.verdicts)
-    return Expansion(judging.blocks, judging.holes, columns.shape[1], findings, LineMap(*columns))
+    return Expansion(judging.blocks, judging.holes, written, findings, LineMap(*columns))
 
 
-def _finds_jumps(source: BinaryIO) -> bool:
+def _finds_jumps(source: BinaryIO, jumps: re.Pattern[bytes]) -> bool:
     """Whether a program may come to a block from elsewhere; read to its end."""
     tail = b""
     while piece := source.read(1 << 20):
-        if _JUMPS.search(tail + piece):
+        if jumps.search(tail + piece):
             return True
         tail = piece[-64:]
     return False
 
 
-def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
+def _findings(verdicts: Sequence[Verdict]) -> tuple[Finding, ...]:
     """What the user should know of the series that were left alone."""
     left = [v for v in verdicts if v.reason is not None]
     found = []
@@ -191,20 +181,7 @@ def _findings(verdicts: Sequence[_Verdict]) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """Where a block stands in the file."""
-
-    begin: int
-    end: int
-    """It is the bytes begin:end, without its line end."""
-    number: int
-    returns: int
-    """CRs and LFs of its line end, 0 or 1 each."""
-    terminator: int
-
-
-class _Expander(Reader):
+class _Expander(Walker):
     """Reads a program, and judges or writes its series on the way."""
 
     def __init__(
@@ -214,51 +191,23 @@ class _Expander(Reader):
         start: Start,
         comments: bool,
         target: BinaryIO | None,
-        verdicts: list[_Verdict] | None,
+        verdicts: list[Verdict] | None,
     ) -> None:
-        super().__init__(name, dialect, start)
+        super().__init__(name, dialect, start, comments, target, verdicts)
         self.rules = rules_for(dialect.name, start)
-        self.comments = comments
-        self.target = target
-        self.known = verdicts
-        """The verdicts of the first walk; None during it."""
-        self.verdicts: list[_Verdict] = []
         self.series: Series | None = None
-        self.jumps = False
-        """A block may be reached in another way than from the one in front of it."""
-        self.reason_at = 0
-        self.holes = 0
         self.dwell_series: list[int] = []
         """Series to be written out whose dwell a later cycle might take."""
-        self.places = array("q")
-        """The columns of the map, row by row."""
         self.spindle: int | None = None
         self.path: PathWords | None = None
         if start.startup:
             startup = parse_line(start.startup.encode("latin-1", "replace"), dialect)
             self._note(startup, 0, sure=True)
-        self.newline = b"\n"
-        self._chunk = Chunk(b"", 0, 1)
-        self._at = 0
-        self._out = 0
-        self._added = 0
-        """Lines of the result beyond those of the original."""
 
-    def walk(self, source: BinaryIO) -> bytes:
-        """Take a whole file; the digest of its bytes."""
-        digest = hashlib.blake2b(digest_size=16)
-        for chunk in read_chunks(source, self.name):
-            digest.update(chunk.data)
-            if not chunk.offset:
-                first = chunk.data.find(b"\n")
-                crlf = first > 0 and chunk.data[first - 1 : first] == b"\r"
-                self.newline = b"\r\n" if crlf else b"\n"
-            self._chunk = chunk
-            read_chunk(self, chunk, fast=True)
-            self._copy(chunk.offset + len(chunk.data))
+    def finish_series(self) -> None:
+        """The program ends: so does the series."""
         if self.series is not None:
             self._close(self.series)
-        return digest.digest()
 
     def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
         """Take one line; its cycles are noticed before and after it acts."""
@@ -285,7 +234,7 @@ class _Expander(Reader):
         if self.collecting and self.series is None:
             # The structure runs once it is complete; what drills in it is left to the controller.
             if self.dialect.cycles & {*g_codes(block)}:
-                self.verdicts.append(_Verdict(number, why, number))
+                self.verdicts.append(Verdict(number, why, number))
             return
         self._note(block, number, sure=why is None)
         if self.rules.borrows_dwell & {*g_codes(block)}:
@@ -300,7 +249,7 @@ class _Expander(Reader):
             self.series = begin_series(number, moment)
             if cycle is not None:
                 why = str(Reason.START_UNKNOWN)  # a cycle from before the program
-        place = _Place(begin, begin + len(bare), number, len(text) - len(bare), terminator)
+        place = Place(begin, begin + len(bare), number, len(text) - len(bare), terminator)
         self._follow(self.series, block, bare, moment, why, place)
 
     def _follow(
@@ -310,7 +259,7 @@ class _Expander(Reader):
         text: bytes,
         moment: Moment,
         why: str | None,
-        place: _Place,
+        place: Place,
     ) -> None:
         """One line of a series."""
         if why is not None:
@@ -342,7 +291,7 @@ class _Expander(Reader):
         block: Block,
         text: bytes,
         moment: Moment,
-        place: _Place,
+        place: Place,
     ) -> None:
         """A block that makes a hole: judge it, or write what it was judged to be."""
         if series.reason is not None:
@@ -362,18 +311,8 @@ class _Expander(Reader):
         verdict = self.known[len(self.verdicts)]
         if verdict.reason is not None or verdict.line != series.line:
             return
-        number = place.number
-        self._copy(place.begin)
-        last = b"\r" * place.returns + b"\n" * place.terminator
-        line_end = last if place.terminator else self.newline
         lines = write_block(text, block, call, moment, self.rules, self.comments)
-        new = line_end.join(lines) + last if lines else b""
-        kind = (0, 1, 3, 2)[2 * place.returns + place.terminator]
-        self.places.extend((number + self._added, len(lines), self._out, self._out + len(new)))
-        self.places.extend((number, place.begin, place.end, kind))
-        self._put(new)
-        self._added += len(lines) - 1
-        self._at = place.end + len(last)
+        self.replace(place, lines)
 
     def _give_up(self, series: Series, reason: str, line: int) -> None:
         """Leave a series to the controller; the first reason counts."""
@@ -387,14 +326,14 @@ class _Expander(Reader):
             self.dwell_series = (
                 [*self.dwell_series, len(self.verdicts)] if series.reason is None else []
             )
-        self.verdicts.append(_Verdict(series.line, series.reason, self.reason_at))
+        self.verdicts.append(Verdict(series.line, series.reason, self.reason_at))
         self.series = None
 
     def _borrow(self, line: int) -> None:
         """A cycle may take its dwell from those before it: the controller has to read them."""
         for index in self.dwell_series if self.rules.borrows_dwell else ():
             reason = "a later cycle takes its dwell from this one"
-            self.verdicts[index] = _Verdict(self.verdicts[index].line, reason, line)
+            self.verdicts[index] = Verdict(self.verdicts[index].line, reason, line)
         self.dwell_series = []
 
     def _note(self, block: Block, line: int, *, sure: bool) -> None:
@@ -417,16 +356,3 @@ class _Expander(Reader):
         if (unit is None and words) or any(number < 0 for _, number in words):
             return None
         return PathWords(words, unit)
-
-    def _copy(self, end: int) -> None:
-        """Copy the original up to an offset within the chunk."""
-        if self.target is not None:
-            data = self._chunk.data[self._at - self._chunk.offset : end - self._chunk.offset]
-            self._put(data)
-        self._at = end
-
-    def _put(self, data: bytes) -> None:
-        """Write."""
-        assert self.target is not None
-        self.target.write(data)
-        self._out += len(data)

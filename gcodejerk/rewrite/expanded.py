@@ -30,7 +30,7 @@ SPOOL = 8 << 20
 """An expanded program is held in memory up to this size, then on disk. [bytes]"""
 TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
 """Bytes of a line end, by `Rapids.terminator`."""
-_COMMENT = b"(gcodejerk: "
+_COMMENTS = (b"\n(gcodejerk: ", b"\n; gcodejerk: ")
 
 
 @contextlib.contextmanager
@@ -195,7 +195,7 @@ def _names_blocks(processed: BinaryIO) -> bool:
     found, tail = False, b"\n"
     while not found and (piece := processed.read(SPOOL)):
         data = tail + piece
-        found, tail = b"\n" + _COMMENT in data, data[-len(_COMMENT) :]
+        found, tail = any(comment in data for comment in _COMMENTS), data[-len(_COMMENTS[1]) :]
     processed.seek(0)
     return found
 

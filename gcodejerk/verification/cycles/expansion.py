@@ -22,6 +22,7 @@ from gcodejerk.nc.program import read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.verification.bytes.source import Window
+from gcodejerk.verification.cycles.called import check_calls, has_calls
 from gcodejerk.verification.cycles.controls import comes_from_elsewhere, control_of, cycle_of
 from gcodejerk.verification.cycles.holes import (
     CLOSE,
@@ -92,9 +93,10 @@ def check_expansion(
     ('moves of a cycle', 5, 3)
     """
     begin = original.tell()
-    proof = _Proof(
-        Window(expanded), find_dialect(dialect), Start() if start is None else start, most
-    )
+    chosen, start = find_dialect(dialect), Start() if start is None else start
+    if has_calls(chosen):
+        return check_calls(original, expanded, chosen, start, names, most)
+    proof = _Proof(Window(expanded), chosen, start, most)
     if proof.control.beside:
         proof.jumps = comes_from_elsewhere(original)
         original.seek(begin)
@@ -104,7 +106,6 @@ def check_expansion(
     else:
         proof.end()
     # Where the tool stands in front of a hole, and in which modes, has so far one reader's word.
-    start = Start() if start is None else start
     original.seek(begin)
     confirmed = confirm_contexts(original, dialect, start, proof.contexts, proof.found)
     return Verification(

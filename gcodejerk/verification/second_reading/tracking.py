@@ -146,8 +146,9 @@ class Tracker(Drilling):
             for effect in line.effects:
                 self.write(effect, line)
             return Observation()
+        here, modes = list(self.at), self._in_force()
         if self.drill_by_name(line):
-            return Observation(against="it calls a cycle")
+            return Observation("it calls a cycle", start=here, modes=modes)
         if not line.understood or any(effect not in _READ for effect in line.effects):
             return self._lost(line)
         if _SHIFTS.issuperset(line.effects) and line.effects:
