@@ -85,8 +85,14 @@ class DrillingRules:
     """Cycles that come out with feed do so with the one in force."""
     own_group: bool = False
     """The cycles are a modal group beside G0 and G1, which hold on behind them. The ways between
-    holes are then level, from where the tool stands; G90 and G91 say once for a series what R and
-    depth mean; and an M code of a cycle's block acts with its first positioning."""
+    holes are then level, from where the tool stands, and an M code of a cycle's block acts with its
+    first positioning."""
+    unmeasured: bool = False
+    """Nobody has watched the control: a series is certain only where R is not above the tool, which
+    stands where the hole before has left it, and where G90 or G91 holds throughout."""
+    plain_levels: bool = False
+    """Where G98 leads behind a hole with G99, what R counts from in G91 there, and how G85 goes
+    beyond R, the sources tell in two ways: such holes are left alone."""
     exact_stop: bytes = b""
     """What lets a feed move end in a standstill, in front of it; empty where a path mode does."""
     exact_pecks: bool = False
@@ -156,6 +162,7 @@ FANUC = DrillingRules(
     break_back=UNSAID,
     feed_out=False,
     own_group=True,
+    unmeasured=True,
     exact_stop=b"G9 ",
     exact_pecks=True,
     dwell_form="whole",
@@ -174,7 +181,31 @@ HAAS = replace(
     pecks_dwell=True,
     dwell_form="point",
 )
-DRILLING: dict[str, DrillingRules] = {"linuxcnc": LINUXCNC, "fanuc": FANUC, "haas": HAAS}
+_UNTOLD = "no source tells {} of Mach"
+MACH = DrillingRules(
+    # NIST RS274/NGC, from which Mach's language comes (gcodes.net/rs274ngc-g81-cycle; Smithy manual
+    # azmanual.top/manuals/787958 pp. 32, 33, 108, 117). How far its pecks go back, and whether its
+    # dwells count as G4 does, which a setting decides, was not found.
+    cycles={810: Cycle(), 850: Cycle(out=Out.FEED_TO_R)},
+    planes=frozenset({G17}),
+    repeats="L",
+    peck="Q",
+    dwell="P",
+    borrows_dwell=frozenset(),
+    clearance=UNSAID,
+    unmeasured=True,
+    plain_levels=True,
+    refused={
+        **dict.fromkeys((730, 830), _UNTOLD.format("the way back of the pecks")),
+        **dict.fromkeys((820, 860, 890), _UNTOLD.format("the unit of a cycle's dwell")),
+    },
+)
+DRILLING: dict[str, DrillingRules] = {
+    "linuxcnc": LINUXCNC,
+    "fanuc": FANUC,
+    "haas": HAAS,
+    "mach": MACH,
+}
 """By dialect; a dialect that is missing has cycles that nobody writes out."""
 
 

@@ -209,12 +209,26 @@ def why_left_alone(
         (series.level is None, str(Reason.START_UNKNOWN)),
         (state.feed_mode not in (94, 95) or not state.feed > 0.0, str(Reason.FEED_UNKNOWN)),
         (_on_diameter(state), "the drilling axis is programmed as a diameter"),
+        *(_not_told(series, moment, rules) if rules.unmeasured else ()),
         *(_beside_motion(series, moment, block, rules) if rules.own_group else ()),
     ]
     for applies, reason in reasons:
         if applies:
             return reason
     return None if _words_are_known(code, block, state, rules) else str(Reason.OTHER_WORDS)
+
+
+def _not_told(series: Series, moment: Moment, rules: DrillingRules) -> Iterator[tuple[bool, str]]:
+    """What else has to be certain where nobody has watched the control."""
+    state = moment.state
+    yield state.distance != series.distance, "G90 and G91 change within the series"
+    along = AXES.index(PLANES[G17][2])
+    here = moment.before[along] / state.scale(along)
+    # Somebody may have moved the axes meanwhile (M0).
+    stands = series.at is not None and abs(here - float(series.at)) < 10.0**-KNOWN_DECIMALS
+    yield not stands, str(Reason.START_UNKNOWN)
+    fell = series.at != series.level and (state.retract != G99 or state.distance == G91)
+    yield rules.plain_levels and fell, "what G98 or G91 means behind G99 is told in two ways"
 
 
 def _beside_motion(
@@ -224,12 +238,6 @@ def _beside_motion(
     state, cycle = moment.state, rules.cycles[moment.cycle or 0]
     yield state.motion not in (G0, G1), "whether G0 or G1 is in force behind it is not known"
     yield state.path not in (61, 64), str(Reason.PATH_UNKNOWN)
-    yield state.distance != series.distance, "G90 and G91 change within the series"
-    along = AXES.index(PLANES[G17][2])
-    here = moment.before[along] / state.scale(along)
-    # Somebody may have moved the axes meanwhile (M0).
-    stands = series.at is not None and abs(here - float(series.at)) < 10.0**-KNOWN_DECIMALS
-    yield not stands, str(Reason.START_UNKNOWN)
     named = any(word.letter in PLANES[G17][:2] for word in block.words)
     yield rules.needs_position and not named, "a setting decides whether it drills without X and Y"
     yield cycle.dwells and state.feed_mode != 94, "a dwell may count revolutions in G95"
@@ -318,8 +326,10 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
         binary=binary,
         exact_pecks=rules.exact_pecks,
     )
-    if rules.own_group and min(call.start, call.level) < r:
+    if rules.unmeasured and min(call.start, call.level) < r:
         return LeftAlone("R is above where the tool stands")
+    if rules.plain_levels and cycle.out is Out.FEED_TO_R and end_of(call) != r:
+        return LeftAlone("how it goes beyond R is told in two ways")
     if rules.own_group and cycle.pecks is not Pecks.NONE and call.clearance >= call.peck:
         return LeftAlone("its pecks are not longer than the way back")
     if most_moves(call) > MOST_MOVES:

@@ -1,4 +1,4 @@
-"""Cycles of Fanuc and Haas: written out as the manuals tell, or left alone; damage is found."""
+"""Cycles of Fanuc, Haas and Mach: written out as manuals tell, or left alone; damage is found."""
 
 import io
 import random
@@ -337,6 +337,70 @@ def test_a_writer_that_does_not_doubt_is_found_out(case, monkeypatch):
     text, found = written(program, dialect, start)
     assert found.written
     assert not check(program, text, dialect, start).ok
+
+
+MACH = Start(startup="G17 G90 G94 G21 G40 G64", spindle="mill")
+MACH_HEAD = b"G17 G21 G90 G94 G40 G61\nG0 X0 Y0 Z10 F100\n"
+MACH_WAYS = {
+    b"G98 G81 X1 Z-5 R2\nX3 L2\n": (
+        "G98|G0 X1|G0 Z2.|G1 Z-5.|G0 Z10.|G0 X3|G0 Z2.|G1 Z-5.|G0 Z10.|G0 Z2.|G1 Z-5.|G0 Z10."
+    ),
+    b"G99 G85 X1 Z-5 R2\nX3 R1\n": ("G99|G0 X1|G0 Z2.|G1 Z-5.|G1 Z2.|G0 X3|G0 Z1.|G1 Z-5.|G1 Z1."),
+    b"G91 G99 G81 X1 Z-7 R-8 L2\n": "G91 G99|G0 X1|G0 Z-8.|G1 Z-7.|G0 Z7.|G0 X1|G1 Z-7.|G0 Z7.",
+}
+MACH_LEFT = {
+    b"G99 G83 X1 Z-5 R2 Q1\n": "way back of the pecks",
+    b"G99 G73 X1 Z-5 R2 Q1\n": "way back of the pecks",
+    b"G99 G82 X1 Z-5 R2 P1\n": "dwell",
+    b"G98 G85 X1 Z-5 R2\n": "beyond R",
+    b"G99 G81 X1 Z-5 R2\nG98 X2\n": "two ways",
+    b"G91 G99 G81 X1 Z-5 R-2\nX2\n": "two ways",
+    b"G99 G81 X1 Z-5 R12\n": "R is above",
+    b"G99 G81 X1 Z-5 R2\nX2 R5\n": "R is above",
+    b"G99 G81 X1 Z-5 R2\nM0\nX2\n": "start unknown",
+    b"G99 G81 X1 Z-5 R2\nG90 G91\nX2\n": None,
+    b"G81 X1 Z-5 R2\n": "G98 or G99",
+    b"G99 G18 G81 X1 Y-5 R2\n": None,
+    b"G99 G81 X1 Z-5 R2 K2\n": "order",
+}
+
+
+@pytest.mark.parametrize("series", MACH_WAYS)
+def test_a_cycle_of_mach_goes_as_nist_tells(series):
+    program = MACH_HEAD + series + END
+    text, found = written(program, "mach", MACH)
+    assert not found.findings
+    lines = text.removeprefix(MACH_HEAD).removesuffix(END).decode().splitlines()
+    assert "|".join(lines) == MACH_WAYS[series]
+    judged = check(program, text, "mach", MACH)
+    assert judged.ok, judged.violations
+    for k, line in enumerate(lines):
+        if line.startswith(("G0 ", "G1 ")):
+            other = [*lines[:k], *lines[k + 1 :]]
+            damaged = MACH_HEAD + "\n".join(other).encode() + b"\n" + END
+            assert not check(program, damaged, "mach", MACH).ok, line
+
+
+@pytest.mark.parametrize("series", MACH_LEFT)
+def test_what_mach_has_settings_for_is_left_whole(series):
+    _, found = written(MACH_HEAD + series + END, "mach", MACH)
+    assert found.written == 0
+    reason = MACH_LEFT[series]
+    assert reason is None or any(reason in f.message for f in found.findings), found.findings
+
+
+MACH_DOUBTS = [
+    series for series, reason in MACH_LEFT.items() if reason in ("two ways", "start unknown")
+]
+
+
+@pytest.mark.parametrize("series", MACH_DOUBTS)
+def test_a_writer_that_does_not_doubt_mach_is_found_out(series, monkeypatch):
+    monkeypatch.setattr("gcodejerk.cycles.series._not_told", lambda *_: ())
+    program = MACH_HEAD + series + END
+    text, found = written(program, "mach", MACH)
+    assert found.written
+    assert not check(program, text, "mach", MACH).ok
 
 
 def test_k_of_a_haas_is_no_number_of_repeats():

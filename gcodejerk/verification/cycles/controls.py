@@ -43,6 +43,11 @@ class Control:
     planes: frozenset[int] = frozenset({G17, G18, G19})
     beside: bool = False
     """Cycles do not replace G0 or G1: Fanuc's group 09."""
+    watched: bool = True
+    """It was run beside its interpreter; otherwise nothing is believed that the manuals leave open:
+    an R above the tool, G90 and G91 in one series, a tool that somebody may have moved."""
+    levels: bool = True
+    """G98 and G91 behind G99, and a G85 that goes beyond R, are told in one way only."""
     point: bool | None = None
     """A dwell counts as in G4 with a decimal point, without one; None: either way."""
     xy: bool = False
@@ -87,6 +92,10 @@ _LINUXCNC = Control(
     {730: "bzT", 810: "zT", 820: "zPT", 830: "czT", 850: "zrT", 860: "zPSTM", 890: "zPt"},
     back=_TENTH,
 )
+_MACH = Control(
+    {810: "zT", 850: "zrT"}, planes=frozenset({G17}), watched=False, levels=False, lent=frozenset()
+)
+"""NIST RS274/NGC, without what Mach's settings decide."""
 _ISO = {730: "bzT", 810: "zT", 820: "zPT", 830: "czT", 850: "zrT", 890: "zPrT"}
 
 
@@ -107,6 +116,8 @@ def control_of(dialect: Dialect, start: Start) -> Control:
     """
     if dialect.name == "linuxcnc":
         return _LINUXCNC
+    if dialect.name == "mach":
+        return _MACH
     if dialect.name not in ("fanuc", "haas"):
         return Control({})
     haas, said = dialect.name == "haas", start.cycles
@@ -117,6 +128,7 @@ def control_of(dialect: Dialect, start: Start) -> Control:
         lift=_exactly(said.clear_above_r) if haas else Fraction(0),
         planes=frozenset({G17}),
         beside=True,
+        watched=False,
         point=haas,
         xy=haas,
         carries=haas,

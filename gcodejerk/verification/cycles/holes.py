@@ -93,18 +93,27 @@ def doubt_of(series: Series, state: State, code: int | None, here: list[float]) 
         return "no feed"
     if series.level[0]:
         return "where it starts is not known"
-    return _doubt_beside(series, state, heights, here) if control.beside else None
+    doubt = None if control.watched else _doubt_unwatched(series, state, here)
+    return doubt or (_doubt_beside(series, state, heights) if control.beside else None)
 
 
-def _doubt_beside(series: Series, state: State, heights: str, here: list[float]) -> str | None:
-    """What more is not certain where a cycle leaves G0 or G1 in force."""
+def _doubt_unwatched(series: Series, state: State, here: list[float]) -> str | None:
+    """What more is not certain of a control that nobody has watched."""
     z = Fraction(0) if math.isnan(here[2]) else Fraction(here[2]) / Fraction(str(state.unit))
     if math.isnan(here[2]) or abs(z - series.at["Z"][1]) > CLOSE:
         return "where the tool stands in front of the hole is not known"
-    if state.motion not in (0, 10) or state.path not in (61, 64):
-        return "G0 or G1, or the path mode, is not known"
     if state.distance != series.distance:
         return "G90 and G91 change"
+    low = not series.control.levels and series.at["Z"] != series.level
+    if low and (state.retract != G99 or state.distance == G91):
+        return "G98 or G91 behind G99"
+    return None
+
+
+def _doubt_beside(series: Series, state: State, heights: str) -> str | None:
+    """What more is not certain where a cycle leaves G0 or G1 in force."""
+    if state.motion not in (0, 10) or state.path not in (61, 64):
+        return "G0 or G1, or the path mode, is not known"
     if "P" in heights and state.feed_mode != 94:
         return "a dwell in G95"
     if series.control.carries and series.dwelt and "P" not in heights and heights[0] in "bc":
@@ -155,7 +164,7 @@ def calls_for(
     r, z = _heights(series, state)
     if z > r or ("Q" in needs and series.said["Q"] <= 0):
         return Doubt("the controller refuses it")
-    if control.beside and (series.level[1] < r or series.at[plane[2]][1] < r):
+    if not control.watched and (series.level[1] < r or series.at[plane[2]][1] < r):
         return Doubt("R is above the tool")
     if not _pecks_are_told(series, code, state):
         return Doubt("the machine file does not say how it pecks")
@@ -165,6 +174,8 @@ def calls_for(
     if "S" in control.heights[code] and not turning:
         return Doubt("the spindle may stand")
     top = r if state.retract == G99 else max(r, level)
+    if not control.levels and "r" in control.heights[code] and top != r:
+        return Doubt("how G85 goes beyond R")
     out = []
     for pecks in _pecks(series, code, r, z):
         if (pecks + 1) * repeats > MOST_PECKS:
