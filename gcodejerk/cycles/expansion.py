@@ -284,6 +284,9 @@ class _Expander(Walker):
             self._close(series)
         elif not passes(block, self.rules):
             series.broken = f"something else stands between the holes (line {place.number})"
+            if self.rules.unmeasured:
+                # It may run a program of the builder's, whose positions the cycle in force drills.
+                self._give_up(series, "something else stands in the series", place.number)
 
     def _drill(
         self,

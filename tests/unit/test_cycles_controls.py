@@ -147,6 +147,7 @@ LEFT = {
     "a jump back": ("fanuc", CYCLE + b"N20 X2.\nG80\nG0 Z50.\nGOTO 20\n", "jumps", START),
     "a loop": ("fanuc", b"WHILE[#1LT3]DO1\n" + CYCLE + b"X2.\nG80\nEND1\n", None, START),
     "a local call": ("haas", CYCLE + b"N20 X2. Y2.\nG80\nM97 P20\n", "jumps", START),
+    "a tool's program": ("fanuc", CYCLE + b"T5\n", "stands in the series", START),
     "pole": ("haas", b"G81 X1. Y1. Z-5. R2. P5\n", None, START),
 }  # fmt: skip
 
@@ -321,7 +322,14 @@ def test_the_proof_does_not_guess_a_setting(field):
 
 DOUBTLESS = (
     *("seconds", "revolutions", "a dwell that stays", "setting 28", "no motion"),
-    *("a stop", "a stop in the block", "R alone", "a jump back", "a local call"),
+    *(
+        "a stop",
+        "a stop in the block",
+        "R alone",
+        "a jump back",
+        "a local call",
+        "a tool's program",
+    ),
 )
 
 

@@ -218,6 +218,8 @@ class _Proof:
                 return self._complain(Kind.SERIES, number, "it may make a hole, or end the series")
         elif in_cycle and not self._quiet(line.block):
             series.doubt = series.doubt or f"line {number} stands between its holes"
+            if series.written and not self.control.watched:
+                return self._complain(Kind.SERIES, number, "it may run a program that drills")
         if not in_cycle or state.ended:
             # The end of a series must be one beyond doubt, or a later block may be a hole.
             closes = state.ended or not {"motion", "cycle"}.isdisjoint(self._groups(line))
@@ -244,8 +246,6 @@ class _Proof:
 
     def _borrows(self, line: OriginalLine) -> bool:
         """Whether a block may drill with the P of an earlier cycle, or call what does."""
-        if not self.control.lent:
-            return False
         if any(code in self.control.lent for code in line.codes):
             return not line.dwells
         return line.block.o_word == "call" or any(
@@ -281,7 +281,7 @@ class _Proof:
             return self._uncertain(number, doubt)
         series.written = True
         self.written += 1
-        self.lent = self.lent or line.dwells
+        self.lent = self.lent or (line.dwells and bool(self.control.lent))
         series.dwelt |= line.dwells
         wanted = calls_for(series, line.block, self.reader.state, code or 0, self.turning)
         if isinstance(wanted, Doubt):
