@@ -251,7 +251,8 @@ def _words_are_known(code: int, block: Block, state: State, rules: DrillingRules
     own |= {rules.peck} if rules.cycles[code].pecks is not Pecks.NONE else set()
     own |= {rules.dwell} if rules.cycles[code].dwells else set()
     own |= HARMLESS_LETTERS - ({"T"} if rules.own_group else set())
-    switches = _SPINDLE_AND_COOLANT if rules.own_group else _HARMLESS_M | STOPS
+    # Behind a stop somebody may have moved the axes.
+    switches = _SPINDLE_AND_COOLANT if rules.unmeasured else _HARMLESS_M | STOPS
     for word in block.words:
         number = -1.0 if word.value is None else word.value
         if word.letter == "G":

@@ -239,6 +239,32 @@ def test_drawn_cycles_go_where_the_formulas_say(dialect, seed):
     assert judged.rewritten == found.written == judged.confirmed
 
 
+ODD = """
+G92 Z1.|G49|G55|G28 Z5.|G53 G0 Z-1.|/X3.|/G80|#1=3|X#1|G84 X1. Z-3. R2.|G20|G18|G17|G90|G91
+G95 F.3|G41 D1|M30|M6 T1|M5|R1.|R1. X2.|X2. K2|X2. L2|X2. A3.|G81|G81 X1. Z5. R1.|G0 X4..2|G1
+G2 X3. I1.|X3. P200|Z-4.|G83 X1. Z-9. R1. Q1.5|G4 P100|(c)||G98|G99 X9.|M8 X4.|M0|M1 X3.|T5|G0
+X3. F50|G16|G43 H1 Z30.|N5 X7. (x)|G9 X3.|x5. y5.|G99G81X1.Y1.Z-5.R2.F50.|G80 X3.|X3 Y4
+"""
+ODD_LINES = ODD.strip().replace("\n", "|").split("|")
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_whatever_stands_among_cycles_what_is_written_out_is_accepted(dialect):
+    rng, times = random.Random(dialect), 0
+    for _ in range(60):
+        program, _ = drawn(rng, dialect == "haas")
+        lines = program.splitlines(keepends=True)
+        for _ in range(rng.randint(1, 3)):
+            lines.insert(rng.randint(0, len(lines)), rng.choice(ODD_LINES).encode() + b"\n")
+        program = b"".join(lines)
+        text, found = written(program, dialect)
+        judged = check(program, text if found.written else program, dialect)
+        assert judged.ok, (judged.violations, program, text)
+        assert judged.rewritten == found.written
+        times += bool(found.written)
+    assert times > 20
+
+
 PROGRAM = (
     HEAD
     + b"""\
@@ -370,6 +396,7 @@ MACH_LEFT = {
     b"G81 X1 Z-5 R2\n": "G98 or G99",
     b"G99 G18 G81 X1 Y-5 R2\n": None,
     b"G99 G81 X1 Z-5 R2 K2\n": "order",
+    b"G99 G81 X1 Z-5 R2\nX3 M1\n": "order",
 }
 
 

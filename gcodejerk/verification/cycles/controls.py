@@ -93,7 +93,12 @@ _LINUXCNC = Control(
     back=_TENTH,
 )
 _MACH = Control(
-    {810: "zT", 850: "zrT"}, planes=frozenset({G17}), watched=False, levels=False, lent=frozenset()
+    {810: "zT", 850: "zrT"},
+    planes=frozenset({G17}),
+    watched=False,
+    levels=False,
+    lent=frozenset(),
+    switches=frozenset({3, 4, 5, 7, 8, 9}),
 )
 """NIST RS274/NGC, without what Mach's settings decide."""
 _ISO = {730: "bzT", 810: "zT", 820: "zPT", 830: "czT", 850: "zrT", 890: "zPrT"}
