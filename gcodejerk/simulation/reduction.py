@@ -20,14 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcodejerk.machine import Machine, Mode
-from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.simulation.equations import equations_of
 from gcodejerk.simulation.response import Response
 
 WELL_DAMPED = 0.3
 """Poles of this damping ratio and more are the servos' own: gone before a mode has turned twice."""
-FAINT = 1e-4
-"""Participations below this part of the largest are left out."""
+FAINT = 0.01
+"""Modes that an axis moves by less than this part of what it moves the strongest are left out."""
 IN_PHASE = 25.0
 """Axes are said to strike a mode out of phase beyond this. [deg]"""
 
@@ -40,24 +39,26 @@ class ReducedMode:
     ----------
     mode : Mode
         For a machine file; the participation is signed, and 0 for an axis that hardly strikes it.
-    direction : ndarray, shape (a,)
+    direction : dict of str to float
         Where the tool swings against the workpiece, a unit vector over the machine's axes.
     phase : dict of str to float
         How far each axis's blow is from being in phase, or in antiphase, with the strongest. [deg]
     """
 
     mode: Mode
-    direction: Array
+    direction: dict[str, float]
     phase: dict[str, float]
 
 
-def reduce_machine(machine: Machine) -> list[ReducedMode]:
+def reduce_machine(machine: Machine, faint: float = FAINT) -> list[ReducedMode]:
     """The lightly damped modes of a machine, the lowest frequency first.
 
     Parameters
     ----------
     machine : Machine
         With servos, a structure, or both.
+    faint : float
+        What to leave out; 0: nothing. Compared is what is left of an acceleration, p / omega^2. [-]
 
     Returns
     -------
@@ -82,28 +83,24 @@ def reduce_machine(machine: Machine) -> list[ReducedMode]:
     highest = 0.5 / machine.interval
     ratio = -response.poles.real / np.maximum(omega, 1e-300)
     light = (response.poles.imag > 0.0) & (ratio < WELL_DAMPED)
-    for k in np.flatnonzero(light & (omega < 2.0 * np.pi * highest)):
-        if amount[k].max() < FAINT * amount[light].max():
-            continue
-        strongest = int(np.argmax(amount[k]))
+    light &= omega < 2.0 * np.pi * highest
+    weight = amount / omega[:, np.newaxis] ** 2
+    kept = weight >= np.maximum(faint * weight[light].max(axis=0, initial=0.0), 1e-300)
+    for k in np.flatnonzero(light & kept.any(axis=1)):
+        strongest = int(np.argmax(np.where(kept[k], amount[k], 0.0)))
         turned = np.angle(struck[k] / struck[k, strongest], deg=True)
         sign = np.where(np.abs(turned) <= 90.0, 1.0, -1.0)
-        shape = seen[:, k] / seen[np.argmax(np.abs(seen[:, k])), k]
-        direction = shape.real / np.linalg.norm(shape.real)
-        kept = amount[k] >= FAINT * amount[light].max()
+        shape = (seen[:, k] / seen[np.argmax(np.abs(seen[:, k])), k]).real
         frequency = float(omega[k] / (2.0 * np.pi))
-        phase = {
-            axis: float(min(abs(turned[u]), 180.0 - abs(turned[u])))
-            for u, axis in enumerate(equations.axes)
-            if kept[u]
-        }
-        participation = tuple(
-            (axis, float(sign[u] * amount[k, u]))
-            for u, axis in enumerate(equations.axes)
-            if kept[u]
+        of = [(u, axis) for u, axis in enumerate(equations.axes) if kept[k, u]]
+        participation = tuple((axis, float(sign[u] * amount[k, u])) for u, axis in of)
+        found.append(
+            ReducedMode(
+                Mode(f"{frequency:.3g} Hz", frequency, float(ratio[k]), participation),
+                dict(zip(equations.axes, (shape / np.linalg.norm(shape)).tolist(), strict=True)),
+                {a: float(min(abs(turned[u]), 180.0 - abs(turned[u]))) for u, a in of},
+            )
         )
-        mode = Mode(f"{frequency:.3g} Hz", frequency, float(ratio[k]), participation)
-        found.append(ReducedMode(mode, direction, phase))
     return sorted(found, key=lambda one: one.mode.frequency)
 
 
@@ -124,12 +121,11 @@ def modes_yaml(found: list[ReducedMode]) -> str:
         amounts = ", ".join(f"{axis}: {amount:.6g}" for axis, amount in mode.participation)
         late = [axis for axis, angle in one.phase.items() if angle > IN_PHASE]
         swings = ", ".join(
-            f"{axis} {part:+.2f}"
-            for (axis, part) in zip(one.phase, one.direction, strict=False)
+            f"{axis} {part:+.2f}" for axis, part in one.direction.items() if abs(part) >= 0.01
         )
         lines.append(f"  # swings along {swings}" + _late(late, one.phase))
         lines.append(
-            f"  - {{name: {mode.name.replace(' ', '')}, frequency: {mode.frequency:.7g}, "
+            f"  - {{name: {mode.name}, frequency: {mode.frequency:.7g}, "
             f"damping: {mode.damping:.6g}, participation: {{{amounts}}}}}"
         )
     return "\n".join([*lines, ""])

@@ -5,11 +5,13 @@ While the jerk j is constant, the state follows the command as a polynomial of i
 .. math:: z = P_0 x + P_1 \dot x + P_2 \ddot x + P_3 j + h, \qquad \dot h = A h
 
 with :math:`A P_0 = -B_0`, :math:`A P_1 = P_0 - B_1`, :math:`A P_2 = P_1 - B_2`,
-:math:`A P_3 = P_2`: what is left over, h, vibrates freely. Where the command's velocity,
-acceleration or jerk steps by :math:`\Delta`, h steps by :math:`-P_k \Delta`, so that in the
+:math:`A P_3 = P_2`: what is left over, h, vibrates freely. Where the command's jerk steps by
+:math:`\Delta j` or its acceleration by :math:`\Delta a`, z goes on and h steps by
+:math:`-P_3 \Delta j` or :math:`-P_2 \Delta a`; where its velocity steps by :math:`\Delta v`, which is
+a blow of the acceleration, h steps by :math:`(B_2 - P_1) \Delta v = -A P_2 \Delta v`. In the
 coordinates of the poles
 
-.. math:: h(t) = -\sum_k v_k \sum_i (w_k P_3 \Delta j_i + w_k P_2 \Delta a_i + w_k P_1 \Delta v_i)
+.. math:: h(t) = -\sum_k v_k \sum_i w_k (P_3 \Delta j_i + P_2 \Delta a_i + A P_2 \Delta v_i)
           e^{\lambda_k (t - t_i)}
 
 There is no integration and so no error of integration. What is left after the last step is the sum
@@ -142,7 +144,7 @@ def polyline_steps(times: Array, positions: Array) -> Steps:
     Returns
     -------
     Steps
-        Of velocity only: a drive's feed-forward of acceleration sees none of it.
+        Of velocity only.
     """
     velocity = np.diff(positions, axis=0) / np.diff(times)[:, np.newaxis]
     size = np.zeros((len(times), ORDERS, positions.shape[1]))
@@ -194,7 +196,9 @@ class Response:
             right = told[0] if order == 0 else follows[-1] - (B[order] if order < 3 else 0.0)
             follows.append(_solved(A, np.asarray(right), equations))
         self.follows: Array = np.array(follows)
-        self.struck: Complex = -np.einsum("ms,jsa->jma", self.inverse, self.follows[1:])
+        # A step of the velocity is a blow of the acceleration, which acts on its own.
+        jumps = np.array([A @ self.follows[2], self.follows[2], self.follows[3]])
+        self.struck: Complex = -np.einsum("ms,jsa->jma", self.inverse, jumps)
 
     def __repr__(self) -> str:
         return f"<Response: {len(self.poles)} poles, axes {' '.join(self.equations.axes)}>"

@@ -38,12 +38,17 @@ WHOLE = ("bodies", "joints", "screws", "damping", "tool", "workpiece", "at")
 
 def servo_of(values: dict[str, Any]) -> Servo | None:
     """The servo of an axis, of values that were checked."""
-    if not values:
+    if not _stated(values):
         return None
     own = {field.name for field in fields(Servo)} - {"kpp", "friction"}
     given = {name: value for name, value in values.items() if name in own}
     kpp = values["kpp"] if "kpp" in values else PER_KV * values["kv"]
     return Servo(kpp=kpp, friction=_friction(values.get("friction", {})), **given)
+
+
+def _stated(servo: dict[str, Any]) -> bool:
+    """Whether the file has this servo: one that is left out has empty sections."""
+    return "velocity_bandwidth" in servo
 
 
 def _friction(values: dict[str, Any]) -> Friction | None:
@@ -58,9 +63,9 @@ def check_servos(values: dict[str, Any], checker: Checker) -> None:
     """Refuse servos that contradict themselves or their axis."""
     for name, axis in values.get("axes", {}).items():
         servo = axis.get("servo", {})
-        if not servo:
-            continue
         path: KeyPath = ("axes", name, "servo")
+        if not checker.given(path):
+            continue
         if name in checker.rotary:
             checker.problems.add(
                 checker.place(path),
@@ -168,13 +173,13 @@ def _check_names(values: dict[str, Any], path: KeyPath, known: list[Any], checke
 def _require_servos(moved: list[str], axes: dict[str, Any], checker: Checker) -> None:
     """Refuse screws that nothing turns, and servos that turn no screw."""
     for axis in moved:
-        if not axes.get(axis, {}).get("servo"):
+        if not _stated(axes.get(axis, {}).get("servo", {})):
             _tell(
                 checker, ("structure",), f"moves a body along {axis}, which has no servo",
                 f"add axes.{axis}.servo",
             )  # fmt: skip
     for axis, values in axes.items():
-        if values.get("servo") and axis not in moved and moved:
+        if _stated(values.get("servo", {})) and axis not in moved and moved:
             _tell(
                 checker, ("axes", axis, "servo"), "turns no screw of the structure",
                 "add it to structure.screws, or leave servo out",

@@ -1,0 +1,207 @@
+"""One command on a machine: how it is followed, and how long the tool then shakes.
+
+This module owns `Outcome`, what is told of a command: lag, vibration, settling. Commands come from
+profiles or from streams (`response.Steps`); both start and end at rest.
+
+Rule: moves are looked at one by one, each from rest. What a move before has left is not in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.simulation.equations import Equations, Row
+from gcodejerk.simulation.friction import follow
+from gcodejerk.simulation.response import Response, Steps
+
+MOVING = 400
+"""Moments at which a motion is looked at, at least."""
+OF_A_PERIOD = 24.0
+"""Moments in a period of the quickest pole that still matters."""
+QUIET = 0.02
+"""Part of the tolerance that a pole may keep to be left out behind the move."""
+LONGEST = 120.0
+"""Settling is looked for so long. [s]"""
+MOST_MOMENTS = 400_000
+FRICTION_SPACING = 1e-3
+"""Between moments that are seen, with friction. [s]"""
+FRICTION_LONGEST = 3.0
+"""Looked at behind a move, with friction. [s]"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What one command does to a machine of a axes.
+
+    Attributes
+    ----------
+    time : float
+        When the command ends. [s]
+    lag : ndarray, shape (a,)
+        The farthest that each table is behind or before its command. [mm]
+    lag_at_end : ndarray, shape (a,)
+        Where it is when the command ends. [mm]
+    lag_rms : ndarray, shape (a,)
+        Root of the mean square until then. [mm]
+    deviation_at_end : ndarray, shape (a,)
+        How far the tool then is from its place. [mm]
+    vibration : float
+        The farthest that the tool is from its place when the command has ended. [mm]
+    settling : float or None
+        From the command's begin until the tool stays within the tolerance; None: not within
+        `LONGEST`. [s]
+    """
+
+    time: float
+    lag: Array
+    lag_at_end: Array
+    lag_rms: Array
+    deviation_at_end: Array
+    vibration: float
+    settling: float | None
+
+    @property
+    def waiting(self) -> float | None:
+        """From the command's end until the tool stays within the tolerance. [s]."""
+        return None if self.settling is None else max(0.0, self.settling - self.time)
+
+
+class Watch:
+    """A machine that is looked at while it moves.
+
+    Parameters
+    ----------
+    equations : Equations
+        The machine.
+    tolerance : float
+        What counts as settled. [mm]
+    """
+
+    def __init__(self, equations: Equations, tolerance: float) -> None:
+        self.equations, self.tolerance = equations, tolerance
+        self.response = Response(equations)
+        self.lag = [equations.lag(axis) for axis in equations.axes]
+        self.places: list[Row] = [equations.deviation(axis) for axis in equations.axes]
+        if equations.structure is not None:
+            self.places.append(equations.structure)
+        self._seen = np.array([self.response.seen(row) for row in self.places])
+
+    def __repr__(self) -> str:
+        return f"<Watch of {self.equations!r}>"
+
+    def outcome(self, steps: Steps) -> Outcome:
+        """What a command does.
+
+        Parameters
+        ----------
+        steps : Steps
+
+        Returns
+        -------
+        Outcome
+
+        Raises
+        ------
+        PlanError
+            As `friction.follow`.
+        """
+        if self.equations.rubs:
+            return self._rubbed(steps)
+        count = len(self.lag)
+        moving = np.unique(np.concatenate([np.linspace(0.0, steps.end, MOVING), steps.time]))
+        seen = self.response.watch(steps, moving, [*self.lag, *self.places])
+        behind, poles = self._behind(steps)
+        vibration, settling = np.abs(seen[count:, -1]).max(initial=0.0), None
+        after = self._after(steps, behind, poles)
+        vibration = max(vibration, float(after.max(initial=0.0)))
+        out = np.flatnonzero(after > self.tolerance)
+        if not len(out) or behind[-1] < LONGEST:
+            settling = steps.end + (float(behind[out[-1]]) if len(out) else 0.0)
+        lag = seen[:count]
+        # The lag may still grow when the command has ended.
+        late = self._late(steps, behind)
+        return Outcome(
+            time=steps.end,
+            lag=np.maximum(np.abs(lag).max(axis=1, initial=0.0), late),
+            lag_at_end=lag[:, -1],
+            lag_rms=_rms(lag, moving),
+            deviation_at_end=seen[count : 2 * count, -1],
+            vibration=float(vibration),
+            settling=settling,
+        )
+
+    def _behind(self, steps: Steps) -> tuple[Array, Array]:
+        """Moments behind the command at which to look, from 0, and which poles matter there."""
+        left = np.abs(self._seen * self.response.left(steps, steps.end)).max(axis=0, initial=0.0)
+        quiet = QUIET * self.tolerance / max(len(left), 1)
+        poles = left > quiet
+        if not poles.any():
+            return np.zeros(1), poles
+        # An undamped mode rings for ever, whatever rounding made of its pole.
+        decay = np.maximum(-self.response.poles.real, 1e-12 * np.abs(self.response.poles))[poles]
+        until = min(LONGEST, float((np.log(left[poles] / quiet) / decay).max()))
+        quickest = np.abs(self.response.poles[poles]).max()
+        count = int(min(MOST_MOMENTS, 2 + until * quickest * OF_A_PERIOD / (2.0 * np.pi)))
+        return np.linspace(0.0, until, count), poles
+
+    def _after(self, steps: Steps, behind: Array, poles: Array) -> Array:
+        """How far the tool is from its place at most along any axis, shape (k,) [mm]."""
+        out = np.zeros(len(behind))
+        chosen = self.response.poles[poles]
+        amount = self._seen[:, poles] * self.response.left(steps, steps.end)[poles]
+        for begin in range(0, len(behind), 20_000):
+            part = slice(begin, begin + 20_000)
+            swings = np.exp(np.outer(chosen, behind[part]))
+            out[part] = np.abs((amount @ swings).real).max(axis=0, initial=0.0)
+        return out
+
+    def _late(self, steps: Steps, behind: Array) -> Array:
+        """The largest lag behind the command, shape (a,) [mm]."""
+        seen = np.array([self.response.seen(row) for row in self.lag])
+        until = min(float(behind[-1]), 0.1)
+        times = np.linspace(0.0, until, 200)
+        left = seen * self.response.left(steps, steps.end)
+        swings = np.exp(np.outer(self.response.poles, times))
+        late: Array = np.abs((left @ swings).real).max(axis=1, initial=0.0)
+        return late
+
+    def _rubbed(self, steps: Steps) -> Outcome:
+        """The same with dry friction: in fine steps, until it moves no more."""
+        count = len(self.lag)
+        moments = int(np.ceil((steps.end + FRICTION_LONGEST) / FRICTION_SPACING)) + 1
+        times = np.arange(moments) * FRICTION_SPACING
+        rows = [*self.lag, *self.places]
+        seen, _ = follow(self.response, steps, times, rows, 0.1 * self.tolerance)
+        last = int(np.searchsorted(times, steps.end))
+        off = np.abs(seen[count:]).max(axis=0)
+        out = np.flatnonzero(off[last:] > self.tolerance)
+        settled = not len(out) or last + out[-1] + 1 < len(times)
+        settling = steps.end if not len(out) else float(times[last + out[-1]])
+        lag = seen[:count]
+        return Outcome(
+            time=steps.end,
+            lag=np.abs(lag).max(axis=1),
+            lag_at_end=lag[:, last],
+            lag_rms=np.sqrt((lag[:, : last + 1] ** 2).mean(axis=1)),
+            deviation_at_end=seen[count : 2 * count, last],
+            vibration=float(off[last:].max()),
+            settling=settling if settled else None,
+        )
+
+    def record(self, steps: Steps, times: Array, rows: Sequence[Row]) -> Array:
+        """What some rows see, with friction if there is any, shape (r, k)."""
+        if not self.equations.rubs:
+            return self.response.watch(steps, times, rows)
+        return follow(self.response, steps, times, rows, 0.1 * self.tolerance)[0]
+
+
+def _rms(values: Array, times: Array) -> Array:
+    """Root of the mean square over a time, shape (r, k) -> (r,)."""
+    gap = np.diff(times)
+    square = 0.5 * (values[:, 1:] ** 2 + values[:, :-1] ** 2)
+    mean: Array = np.sqrt((square * gap).sum(axis=1) / max(float(gap.sum()), 1e-12))
+    return mean
