@@ -172,7 +172,9 @@ class _Maker:
             played=self._held(written, times) if self.play is Play.HELD else None,
         )
 
-    def _held(self, written: dict[int, Array], times: NDArray[np.int64]) -> tuple[Grid, dict[int, Array]]:
+    def _held(
+        self, written: dict[int, Array], times: NDArray[np.int64]
+    ) -> tuple[Grid, dict[int, Array]]:
         """Where a control that holds F is, at the knots."""
         return self.grid, {a: played_positions(q, times, self.grid) for a, q in written.items()}
 

@@ -93,8 +93,8 @@ def _given(matrices: Matrices) -> Frame:
 def _built(structure: Structure) -> Frame:
     count = 6 * len(structure.bodies)
     mass, damping, stiffness = (np.zeros((count, count)) for _ in range(3))
-    for k, body in enumerate(structure.bodies):
-        own = range(6 * k, 6 * k + 6)
+    for n, body in enumerate(structure.bodies):
+        own = range(6 * n, 6 * n + 6)
         mass[own, own] = [body.mass] * 3 + list(body.inertia)
     for joint in structure.joints:
         for point in joint.points:

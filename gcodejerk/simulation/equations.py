@@ -14,7 +14,7 @@ lags) and its integral; for each mode of the machine file its displacement and v
 without `servo` is where it is told to be, and excites the modes by its commanded acceleration, as
 planning assumes.
 
-Source: the axis drive model of feed drives (P position, PI velocity, two masses), as in Y. Altintas,
+Source: the usual model of feed drives (P position, PI velocity, two masses), as in Y. Altintas,
 Manufacturing Automation, ch. 6; modes as in `motion.residual`.
 """
 
@@ -24,7 +24,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Axis, Machine
@@ -129,11 +128,11 @@ class Equations:
         return Row(np.zeros(len(self.A)), row)
 
     def lag(self, axis: str) -> Row:
-        """How far a table is behind its command. [mm]"""
+        """How far a table is behind its command [mm]."""
         return self.command(axis) - self.table[axis]
 
     def deviation(self, axis: str) -> Row:
-        """How far the tool is from where it should be along an axis. [mm]"""
+        """How far the tool is from where it should be along an axis [mm]."""
         return self.table[axis] + self.vibration[axis] - self.command(axis)
 
 
@@ -163,7 +162,7 @@ def equations_of(machine: Machine) -> Equations:
     for axis in machine.axes:
         if axis.spectrum is not None:
             raise PlanError(
-                f"axis {axis.name} has a spectrum: without phase and damping it cannot be simulated",
+                f"axis {axis.name} has a spectrum, which has no phase and no damping to simulate",
                 "give it modes (`gcodejerk identify` finds them in a record of free vibration)",
             )
     made = _Assembly(machine).equations()
@@ -247,7 +246,7 @@ class _Assembly:
         A, B = np.zeros((size, size)), np.zeros((3, size, len(self.axes)))
         force = {a.name: 2 * n + k for k, a in enumerate(lagging)}
         integral = {a.name: 2 * n + len(lagging) + k for k, a in enumerate(whole)}
-        inverse = np.linalg.inv(self.M)
+        inverse: Array = np.linalg.inv(self.M).astype(np.float64)
         A[:n, n : 2 * n] = np.eye(n)
         A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = -inverse @ self.K, -inverse @ self.C
         for axis in self.driven:
@@ -257,7 +256,7 @@ class _Assembly:
         vibration, structure = self._vibration(displaced, table, A, B)
         return Equations(
             self.axes, A, B, table, vibration, structure,
-            {f"{label} {mode.name}": row for (label, mode), row in zip(modes, displaced, strict=True)},
+            {f"{axis} {m.name}": row for (axis, m), row in zip(modes, displaced, strict=True)},
             tuple(self._rubs(size, inverse)), self._pushed(size, inverse), tuple(names),
         )  # fmt: skip
 
@@ -387,13 +386,13 @@ def _servo(axis: Axis) -> Servo:
 
 
 def _radius(servo: Servo) -> float:
-    """What the nut moves for a radian. [m]"""
+    """What the nut moves for a radian [m]."""
     return MM * servo.lead / (2.0 * np.pi)
 
 
 def _require_stable(equations: Equations) -> None:
     """Refuse a machine that shakes by itself."""
-    poles: NDArray[np.complex128] = np.linalg.eigvals(equations.A)
+    poles = np.linalg.eigvals(equations.A)
     if len(poles) and poles.real.max() > 1e-9 * np.abs(poles).max():
         worst = poles[np.argmax(poles.real)]
         frequency = abs(worst) / (2.0 * np.pi)

@@ -12,12 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.simulation.equations import Equations, Row
 from gcodejerk.simulation.friction import follow
 from gcodejerk.simulation.response import Response, Steps
 
+LIGHT = 0.3
+"""Poles below this damping ratio vibrate; the others are gone before they have turned twice."""
 MOVING = 400
 """Moments at which a motion is looked at, at least."""
 OF_A_PERIOD = 24.0
@@ -49,6 +52,8 @@ class Outcome:
         Root of the mean square until then. [mm]
     deviation_at_end : ndarray, shape (a,)
         How far the tool then is from its place. [mm]
+    residual : float
+        The largest amplitude that any lightly damped pole keeps at the tool. [mm]
     vibration : float
         The farthest that the tool is from its place when the command has ended. [mm]
     settling : float or None
@@ -61,6 +66,7 @@ class Outcome:
     lag_at_end: Array
     lag_rms: Array
     deviation_at_end: Array
+    residual: float
     vibration: float
     settling: float | None
 
@@ -130,13 +136,30 @@ class Watch:
             lag_at_end=lag[:, -1],
             lag_rms=_rms(lag, moving),
             deviation_at_end=seen[count : 2 * count, -1],
+            residual=self._residual(steps),
             vibration=float(vibration),
             settling=settling,
         )
 
-    def _behind(self, steps: Steps) -> tuple[Array, Array]:
+    def left(self, steps: Steps) -> Array:
+        """What each pole keeps at the tool when the command ends, shape (m,) [mm]."""
+        kept = np.abs(self._seen * self.response.left(steps, steps.end))
+        left: Array = np.sqrt((kept**2).sum(axis=0))
+        return left
+
+    @property
+    def light(self) -> NDArray[np.bool_]:
+        """Which poles are lightly damped modes; the others are the servos' own, shape (m,)."""
+        poles = self.response.poles
+        light: NDArray[np.bool_] = (poles.imag > 0.0) & (-poles.real < LIGHT * np.abs(poles))
+        return light
+
+    def _residual(self, steps: Steps) -> float:
+        return float(self.left(steps)[self.light].max(initial=0.0))
+
+    def _behind(self, steps: Steps) -> tuple[Array, NDArray[np.bool_]]:
         """Moments behind the command at which to look, from 0, and which poles matter there."""
-        left = np.abs(self._seen * self.response.left(steps, steps.end)).max(axis=0, initial=0.0)
+        left = self.left(steps)
         quiet = QUIET * self.tolerance / max(len(left), 1)
         poles = left > quiet
         if not poles.any():
@@ -148,7 +171,7 @@ class Watch:
         count = int(min(MOST_MOMENTS, 2 + until * quickest * OF_A_PERIOD / (2.0 * np.pi)))
         return np.linspace(0.0, until, count), poles
 
-    def _after(self, steps: Steps, behind: Array, poles: Array) -> Array:
+    def _after(self, steps: Steps, behind: Array, poles: NDArray[np.bool_]) -> Array:
         """How far the tool is from its place at most along any axis, shape (k,) [mm]."""
         out = np.zeros(len(behind))
         chosen = self.response.poles[poles]
@@ -173,7 +196,7 @@ class Watch:
         """The same with dry friction: in fine steps, until it moves no more."""
         count = len(self.lag)
         moments = int(np.ceil((steps.end + FRICTION_LONGEST) / FRICTION_SPACING)) + 1
-        times = np.arange(moments) * FRICTION_SPACING
+        times: Array = np.arange(moments, dtype=np.float64) * FRICTION_SPACING
         rows = [*self.lag, *self.places]
         seen, _ = follow(self.response, steps, times, rows, 0.1 * self.tolerance)
         last = int(np.searchsorted(times, steps.end))
@@ -188,6 +211,7 @@ class Watch:
             lag_at_end=lag[:, last],
             lag_rms=np.sqrt((lag[:, : last + 1] ** 2).mean(axis=1)),
             deviation_at_end=seen[count : 2 * count, last],
+            residual=self._residual(steps),
             vibration=float(off[last:].max()),
             settling=settling if settled else None,
         )

@@ -35,7 +35,7 @@ class Rapids:
         [s]
     lag, lag_at_end, lag_rms : ndarray, shape (n,)
         The largest of any axis. [mm]
-    vibration : ndarray, shape (n,)
+    residual, vibration : ndarray, shape (n,)
         As in `Outcome`. [mm]
     settling : ndarray, shape (n,)
         Infinite where it was not seen. [s]
@@ -45,6 +45,7 @@ class Rapids:
     lag: Array
     lag_at_end: Array
     lag_rms: Array
+    residual: Array
     vibration: Array
     settling: Array
 
@@ -183,6 +184,7 @@ def _columns(outcomes: list[Outcome]) -> Rapids:
         np.array([one.lag.max() for one in outcomes]),
         np.array([np.abs(one.lag_at_end).max() for one in outcomes]),
         np.array([one.lag_rms.max() for one in outcomes]),
+        np.array([one.residual for one in outcomes]),
         np.array([one.vibration for one in outcomes]),
         np.array([NEVER if one.settling is None else one.settling for one in outcomes]),
     )

@@ -21,10 +21,9 @@ import numpy as np
 
 from gcodejerk.machine import Machine, Mode
 from gcodejerk.simulation.equations import equations_of
+from gcodejerk.simulation.moves import LIGHT
 from gcodejerk.simulation.response import Response
 
-WELL_DAMPED = 0.3
-"""Poles of this damping ratio and more are the servos' own: gone before a mode has turned twice."""
 FAINT = 0.01
 """Modes that an axis moves by less than this part of what it moves the strongest are left out."""
 IN_PHASE = 25.0
@@ -82,7 +81,7 @@ def reduce_machine(machine: Machine, faint: float = FAINT) -> list[ReducedMode]:
     amount = size[:, np.newaxis] * np.abs(struck)
     highest = 0.5 / machine.interval
     ratio = -response.poles.real / np.maximum(omega, 1e-300)
-    light = (response.poles.imag > 0.0) & (ratio < WELL_DAMPED)
+    light = (response.poles.imag > 0.0) & (ratio < LIGHT)
     light &= omega < 2.0 * np.pi * highest
     weight = amount / omega[:, np.newaxis] ** 2
     kept = weight >= np.maximum(faint * weight[light].max(axis=0, initial=0.0), 1e-300)

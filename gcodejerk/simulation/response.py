@@ -7,8 +7,8 @@ While the jerk j is constant, the state follows the command as a polynomial of i
 with :math:`A P_0 = -B_0`, :math:`A P_1 = P_0 - B_1`, :math:`A P_2 = P_1 - B_2`,
 :math:`A P_3 = P_2`: what is left over, h, vibrates freely. Where the command's jerk steps by
 :math:`\Delta j` or its acceleration by :math:`\Delta a`, z goes on and h steps by
-:math:`-P_3 \Delta j` or :math:`-P_2 \Delta a`; where its velocity steps by :math:`\Delta v`, which is
-a blow of the acceleration, h steps by :math:`(B_2 - P_1) \Delta v = -A P_2 \Delta v`. In the
+:math:`-P_3 \Delta j` or :math:`-P_2 \Delta a`; where its velocity steps by :math:`\Delta v`, which
+is a blow of the acceleration, h steps by :math:`(B_2 - P_1) \Delta v = -A P_2 \Delta v`. In the
 coordinates of the poles
 
 .. math:: h(t) = -\sum_k v_k \sum_i w_k (P_3 \Delta j_i + P_2 \Delta a_i + A P_2 \Delta v_i)
@@ -26,7 +26,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
 from gcodejerk.motion.profiles.profile import Array, Profiles
@@ -190,11 +189,9 @@ class Response:
         self.equations = equations
         A, B = equations.A, equations.B
         self.poles, self.shapes, self.inverse = _modal(A)
-        follows = []
-        told = [-B[0], None, None, None]
-        for order in range(4):
-            right = told[0] if order == 0 else follows[-1] - (B[order] if order < 3 else 0.0)
-            follows.append(_solved(A, np.asarray(right), equations))
+        follows = [_solved(A, -B[0])]
+        for given in (B[1], B[2], np.zeros_like(B[0])):
+            follows.append(_solved(A, follows[-1] - given))
         self.follows: Array = np.array(follows)
         # A step of the velocity is a blow of the acceleration, which acts on its own.
         jumps = np.array([A @ self.follows[2], self.follows[2], self.follows[3]])
@@ -210,7 +207,7 @@ class Response:
 
     def static(self, row: Row) -> Array:
         """What a row sees of position, velocity, acceleration and jerk, shape (4, a)."""
-        out = np.einsum("s,jsa->ja", row.state, self.follows)
+        out: Array = np.einsum("s,jsa->ja", row.state, self.follows)
         out[:3] += row.command
         return out
 
@@ -284,9 +281,9 @@ def _condition(shapes: Complex) -> float:
     return float(np.linalg.cond(shapes / np.linalg.norm(shapes, axis=1, keepdims=True)))
 
 
-def _solved(A: Array, right: Array, equations: Equations) -> Array:
+def _solved(A: Array, right: Array) -> Array:
     try:
-        out: NDArray[np.float64] = np.linalg.solve(A, right)
+        out: Array = np.linalg.solve(A, right).astype(np.float64)
     except np.linalg.LinAlgError:
         raise PlanError(
             "the machine has a coordinate that nothing holds in its place",

@@ -44,7 +44,8 @@ SERVO = Key("servo", Section(
         Key("feedforward", Number("-", at_least=0.0, at_most=2.0),
             "Share of the commanded velocity that is fed forward. Left out: none.", example="0.7"),
         Key("acceleration_feedforward", Number("-", at_least=0.0, at_most=2.0),
-            "Share of the force for the commanded acceleration that is fed forward. Left out: none.",
+            "Share of the force for the commanded acceleration that is fed forward. Left out: "
+            "none.",
             example="1"),
         Key("feedback", Choice(FEEDBACKS),
             "motor: an encoder on it (semi-closed). table: a scale (full-closed). Left out: motor.",
@@ -67,8 +68,8 @@ SERVO = Key("servo", Section(
             "Dry friction of the axis: simulation then goes in fine steps.",
             example="{coulomb: 120, static: 180}"),
     )),
-    "The axis's drive, for `gcodejerk simulate`; planning does not look at it. Left out: the axis is "
-    "where it is told to be.",
+    "The axis's drive, for `gcodejerk simulate`; planning does not look at it. Left out: the axis "
+    "is where it is told to be.",
     example="{kpp: 40, velocity_bandwidth: 240, mass: 250, inertia: 0.03, lead: 10, "
     "stiffness: 150}")  # fmt: skip
 

@@ -230,12 +230,8 @@ def _load(name: str, folder: Path, checker: Checker) -> Matrices | None:
         )
 
     square = {key: found.get(key, np.zeros((count, count))) for key in ("M", "K", "C")}
-    return Matrices(
-        name,
-        *(tuple(map(tuple, square[key].tolist())) for key in ("M", "K", "C")),
-        rows("nut_"),
-        rows("tool_"),
-    )
+    M, K, C = (tuple(map(tuple, square[key].tolist())) for key in ("M", "K", "C"))
+    return Matrices(name, M, K, C, rows("nut_"), rows("tool_"))
 
 
 def _wrong_matrices(found: dict[str, Any]) -> str:
