@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.residual import Complex
 from gcodejerk.simulation.equations import Equations, Row
 from gcodejerk.simulation.friction import follow
 from gcodejerk.simulation.response import Response, Steps
@@ -29,7 +30,15 @@ QUIET = 0.02
 """Part of the tolerance that a pole may keep to be left out behind the move."""
 LONGEST = 120.0
 """Settling is looked for so long. [s]"""
-MOST_MOMENTS = 400_000
+MOST_MOMENTS = 100_000
+"""In one of the parts."""
+PARTS = 40
+FINER = 60
+"""Moments between two, where the last one above the tolerance is looked for."""
+FINER = 60
+"""Moments between two, where the last one above the tolerance is looked for."""
+TINY = 1e-6
+"""Of the whole, what may be left out where no tolerance says it. [-]"""
 FRICTION_SPACING = 1e-3
 """Between moments that are seen, with friction. [s]"""
 FRICTION_LONGEST = 3.0
@@ -120,16 +129,11 @@ class Watch:
         count = len(self.lag)
         moving = np.unique(np.concatenate([np.linspace(0.0, steps.end, MOVING), steps.time]))
         seen = self.response.watch(steps, moving, [*self.lag, *self.places])
-        behind, poles = self._behind(steps)
-        vibration, settling = np.abs(seen[count:, -1]).max(initial=0.0), None
-        after = self._after(steps, behind, poles)
-        vibration = max(vibration, float(after.max(initial=0.0)))
-        out = np.flatnonzero(after > self.tolerance)
-        if not len(out) or behind[-1] < LONGEST:
-            settling = steps.end + (float(behind[out[-1]]) if len(out) else 0.0)
+        ringing = self._ringing(steps)
+        behind = ringing.last_above(self.tolerance)
         lag = seen[:count]
         # The lag may still grow when the command has ended.
-        late = self._late(steps, behind)
+        late = self._late(steps)
         return Outcome(
             time=steps.end,
             lag=np.maximum(np.abs(lag).max(axis=1, initial=0.0), late),
@@ -137,8 +141,8 @@ class Watch:
             lag_rms=_rms(lag, moving),
             deviation_at_end=seen[count : 2 * count, -1],
             residual=self._residual(steps),
-            vibration=float(vibration),
-            settling=settling,
+            vibration=ringing.peak(),
+            settling=None if behind is None else steps.end + behind,
         )
 
     def left(self, steps: Steps) -> Array:
@@ -157,40 +161,21 @@ class Watch:
     def _residual(self, steps: Steps) -> float:
         return float(self.left(steps)[self.light].max(initial=0.0))
 
-    def _behind(self, steps: Steps) -> tuple[Array, NDArray[np.bool_]]:
-        """Moments behind the command at which to look, from 0, and which poles matter there."""
-        left = self.left(steps)
-        quiet = QUIET * self.tolerance / max(len(left), 1)
-        poles = left > quiet
-        if not poles.any():
-            return np.zeros(1), poles
-        # An undamped mode rings for ever, whatever rounding made of its pole.
-        decay = np.maximum(-self.response.poles.real, 1e-12 * np.abs(self.response.poles))[poles]
-        until = min(LONGEST, float((np.log(left[poles] / quiet) / decay).max()))
-        quickest = np.abs(self.response.poles[poles]).max()
-        count = int(min(MOST_MOMENTS, 2 + until * quickest * OF_A_PERIOD / (2.0 * np.pi)))
-        return np.linspace(0.0, until, count), poles
+    def _ringing(self, steps: Steps) -> _Ringing:
+        """What goes on behind the command."""
+        return _Ringing(
+            self.response.poles,
+            self._seen * self.response.left(steps, steps.end),
+            QUIET * self.tolerance,
+        )
 
-    def _after(self, steps: Steps, behind: Array, poles: NDArray[np.bool_]) -> Array:
-        """How far the tool is from its place at most along any axis, shape (k,) [mm]."""
-        out = np.zeros(len(behind))
-        chosen = self.response.poles[poles]
-        amount = self._seen[:, poles] * self.response.left(steps, steps.end)[poles]
-        for begin in range(0, len(behind), 20_000):
-            part = slice(begin, begin + 20_000)
-            swings = np.exp(np.outer(chosen, behind[part]))
-            out[part] = np.abs((amount @ swings).real).max(axis=0, initial=0.0)
-        return out
-
-    def _late(self, steps: Steps, behind: Array) -> Array:
+    def _late(self, steps: Steps) -> Array:
         """The largest lag behind the command, shape (a,) [mm]."""
         seen = np.array([self.response.seen(row) for row in self.lag])
-        until = min(float(behind[-1]), 0.1)
-        times = np.linspace(0.0, until, 200)
         left = seen * self.response.left(steps, steps.end)
-        swings = np.exp(np.outer(self.response.poles, times))
-        late: Array = np.abs((left @ swings).real).max(axis=1, initial=0.0)
-        return late
+        return np.array(
+            [_Ringing(self.response.poles, row[np.newaxis], 0.0).peak() for row in left]
+        )
 
     def _rubbed(self, steps: Steps) -> Outcome:
         """The same with dry friction: in fine steps, until it moves no more."""
@@ -199,7 +184,7 @@ class Watch:
         times: Array = np.arange(moments, dtype=np.float64) * FRICTION_SPACING
         rows = [*self.lag, *self.places]
         seen, _ = follow(self.response, steps, times, rows, 0.1 * self.tolerance)
-        last = int(np.searchsorted(times, steps.end))
+        last = int(np.searchsorted(times, steps.end - 1e-9))
         off = np.abs(seen[count:]).max(axis=0)
         out = np.flatnonzero(off[last:] > self.tolerance)
         settled = not len(out) or last + out[-1] + 1 < len(times)
@@ -221,6 +206,79 @@ class Watch:
         if not self.equations.rubs:
             return self.response.watch(steps, times, rows)
         return follow(self.response, steps, times, rows, 0.1 * self.tolerance)[0]
+
+
+class _Ringing:
+    """Free vibration behind a command, looked at no finer than what is still alive in it.
+
+    Parameters
+    ----------
+    poles : ndarray of complex, shape (m,)
+        [rad/s]
+    amount : ndarray of complex, shape (r, m)
+        What each of r places sees of each pole at the beginning. [mm]
+    quiet : float
+        What may be left out, of all poles together. [mm]
+    """
+
+    def __init__(self, poles: Complex, amount: Complex, quiet: float) -> None:
+        left = np.abs(amount).max(axis=0, initial=0.0)
+        alive = left > max(quiet, TINY * left.max(initial=0.0)) / max(len(left), 1)
+        self.poles, self.amount, self.left = poles[alive], amount[:, alive], left[alive]
+        # An undamped mode rings for ever, whatever rounding made of its pole.
+        self.decay = np.maximum(-self.poles.real, 1e-12 * np.abs(self.poles))
+        least = max(quiet, TINY * left.max(initial=0.0)) / max(len(left), 1)
+        self.least = least
+        until = (np.log(self.left / least) / self.decay).max(initial=0.0)
+        self.until = min(LONGEST, float(until))
+        self.edges = self.until * np.linspace(0.0, 1.0, PARTS + 1) ** 2
+
+    def envelope(self, time: float) -> float:
+        """What the vibration cannot be above from a moment on. [mm]."""
+        return float((self.left * np.exp(-self.decay * time)).sum())
+
+    def _part(self, k: int) -> tuple[Array, Array]:
+        """Moments of one part, and the largest of all places at each [mm]."""
+        begin, end = self.edges[k], self.edges[k + 1]
+        alive = self.left * np.exp(-self.decay * begin) > self.least
+        if not alive.any():
+            return np.array([begin]), np.zeros(1)
+        quickest = np.abs(self.poles[alive]).max()
+        count = int(min(MOST_MOMENTS, 2 + (end - begin) * quickest * OF_A_PERIOD / (2.0 * np.pi)))
+        times = np.linspace(begin, end, count)
+        return times, self._at(times, alive)
+
+    def _at(self, times: Array, alive: NDArray[np.bool_] | slice = slice(None)) -> Array:
+        """The largest of all places at some moments, shape (k,) [mm]."""
+        swings = np.exp(np.outer(self.poles[alive], times))
+        size: Array = np.abs((self.amount[:, alive] @ swings).real).max(axis=0)
+        return size
+
+    def peak(self) -> float:
+        """The largest of all. [mm]."""
+        peak = 0.0
+        for k in range(PARTS):
+            if self.envelope(self.edges[k]) <= peak:
+                break
+            peak = max(peak, float(self._part(k)[1].max(initial=0.0)))
+        return peak
+
+    def last_above(self, tolerance: float) -> float | None:
+        """When it is above a tolerance for the last time; None: still at `LONGEST`. [s]."""
+        if self.until >= LONGEST and self.envelope(LONGEST) > tolerance:
+            return None
+        for k in reversed(range(PARTS)):
+            if self.envelope(self.edges[k]) <= tolerance:
+                continue
+            times, size = self._part(k)
+            above = np.flatnonzero(size > tolerance)
+            if not len(above):
+                continue
+            # Between the last moment above and the next: finer.
+            last = int(above[-1])
+            fine = np.linspace(times[last], times[min(last + 1, len(times) - 1)], FINER)
+            return float(fine[np.flatnonzero(self._at(fine) > tolerance)[-1]])
+        return 0.0
 
 
 def _rms(values: Array, times: Array) -> Array:

@@ -87,8 +87,8 @@ class Steps:
         base = begins[done]
         since = times - np.concatenate([[0.0], self.time])[done]
         out[:] = _advanced(base.transpose(1, 0, 2), since[:, np.newaxis])
-        # Rounding of the last sums: after the end it stands.
-        out[1:, times >= self.end] = 0.0
+        # Behind the last step it stands, whatever rounding makes of the sums.
+        out[1:, done == len(self.time)] = 0.0
         return out
 
 

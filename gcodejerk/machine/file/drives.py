@@ -118,7 +118,6 @@ def structure_of(
         matrices = _load(values["file"], folder, checker)
         _require_servos([axis for axis, _ in matrices.nut] if matrices else [], axes, checker)
         return None if matrices is None else Structure(matrices=matrices)
-    before = len(checker.problems.found)
     missing = [name for name in ("bodies", "tool", "workpiece", "at") if not values.get(name)]
     if missing:
         _tell(checker, path, f"has no {missing[0]}", f"add {missing[0]}, or file")
@@ -136,7 +135,7 @@ def structure_of(
     _check_names(values, path, [*names, GROUND], checker)
     screws = [screw.get("axis") for screw in values.get("screws", {}).values()]
     _require_servos([axis for axis in screws if axis], axes, checker)
-    if len(checker.problems.found) > before or missing:
+    if checker.problems.found or missing:
         return None
     return Structure(
         tuple(_body(body) for body in bodies.values()),
