@@ -16,7 +16,9 @@ from gcodejerk.simulation.programs import Rapids, Simulation
 from gcodejerk.simulation.single import MoveSimulation
 
 UM, MS = 1e3, 1e3
-MOST_POLES = 12
+MOST_POLES = 8
+SEEN = 0.02
+"""Part of the tolerance that a mode has to keep to be shown."""
 MOST_RAPIDS = 20
 
 
@@ -49,7 +51,9 @@ def move_tables(found: MoveSimulation) -> list[ScreenTable]:
     row(f"settled to {tolerance:g} um [ms]", today.settling, planned.settling, MS)
     row("of that, waiting [ms]", today.waiting, planned.waiting, MS)
     poles = found.poles()
-    shown = sorted(poles, key=lambda pole: -max(pole.left.values()))[:MOST_POLES]
+    least = SEEN * found.machine.design.tolerance
+    seen = [pole for pole in poles if max(pole.left.values()) >= least]
+    shown = sorted(seen, key=lambda pole: -max(pole.left.values()))[:MOST_POLES]
     modes = ScreenTable(
         ("mode [Hz]", "right"), ("damping", "right"), ("today [um]", "right"),
         ("planned [um]", "right"), ("ratio", "right"),
@@ -61,7 +65,7 @@ def move_tables(found: MoveSimulation) -> list[ScreenTable]:
             f"{pole.frequency:.2f}", f"{pole.damping:.4f}", digits(UM * before),
             digits(UM * after), ratio,
         )  # fmt: skip
-    return [table, modes] if poles else [table]
+    return [table, modes] if shown else [table]
 
 
 def _driven(found: MoveSimulation) -> list[str]:
