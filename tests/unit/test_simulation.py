@@ -25,7 +25,7 @@ from gcodejerk.simulation.equations import Equations, Row, Rub, equations_of
 from gcodejerk.simulation.friction import follow
 from gcodejerk.simulation.moves import Watch
 from gcodejerk.simulation.programs import planned_steps, today_steps, written_steps
-from gcodejerk.simulation.reduction import modes_yaml, reduce_machine
+from gcodejerk.simulation.reduction import reduce_machine
 from gcodejerk.simulation.response import Response, Steps, polyline_steps
 from gcodejerk.simulation.single import MoveSimulation
 
@@ -284,11 +284,6 @@ def test_a_plan_for_the_reduced_modes_is_true_of_the_whole_machine(move):
     for pole, one in zip(poles, said, strict=True):
         k = np.argmin(np.abs(watch.response.poles - pole))
         assert kept[k] == pytest.approx(one, rel=1e-6, abs=1e-12)
-
-
-def test_the_shipped_machine_has_the_modes_that_it_is_reduced_to():
-    text = modes_yaml(reduce_machine(VMC33))
-    assert text in find_machine("vmc33").read_text()
 
 
 def test_moves_of_several_axes_add_with_their_sign():
