@@ -420,7 +420,7 @@ STRUCTURES = [
     ("between: [column, bed]", "between: [column]", "a list of 2 names"),
     ("at: [0, -100, 1100]", "at: [0, -100]", "a list of 3 numbers"),
     ("{name: head, ", "{name: bed, ", "that of another body"),
-    ("    - {axis: Z, moves: head,   carried_by: column, at: [0, 350, 1550]}\n", "",
+    ("    - {axis: Z, moves: head,   carried_by: column, at: [0, 350, 1550]}   # made up\n", "",
      "turns no screw"),
     ("size: [350, 800, 600],", "", "needs size or inertia"),
 ]  # fmt: skip
