@@ -30,6 +30,7 @@ from gcodejerk.cli.machines import (
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.new_machine import machine_new
 from gcodejerk.cli.programs import inspect, process, verify
+from gcodejerk.cli.simulation import machine_reduce, simulate
 from gcodejerk.cli.tuning import parameters
 from gcodejerk.errors import GcodejerkError
 
@@ -52,11 +53,13 @@ app.command("plan")(plan)
 app.command("map")(map_amplitudes)
 app.command("compare")(compare)
 app.command("parameters")(parameters)
+app.command("simulate")(simulate)
 app.command("controllers")(controllers)
 app.command("filter")(filter_program)
 app.command("install")(install)
 machine_app.command("new")(machine_new)
 machine_app.command("check")(machine_check)
+machine_app.command("reduce")(machine_reduce)
 machine_app.command("list")(machine_list)
 machine_app.command("show")(machine_show)
 machine_app.command("test-program")(machine_test_program)

@@ -69,7 +69,7 @@ def plan(
     # LinuxCNC follows the profile between the points: judged at every interval, like a table.
     held = emitter.play is Play.HELD
     planned = plan_move(
-        _displacement(moves),
+        displacement_of(moves),
         described,
         profile,
         time=time,
@@ -222,7 +222,7 @@ def compare(
         raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
     if as_json is not None and as_json == plot:
         raise typer.BadParameter("--json and --plot are two files")
-    displacement = _displacement(moves)
+    displacement = displacement_of(moves)
     described = load_machine(machine)
     with progress(False) as show:
         found = compare_move(
@@ -275,7 +275,7 @@ def _survey(
     return Survey.of(machine, axis, length, condition, chosen.name)
 
 
-def _displacement(moves: list[str]) -> dict[str, float]:
+def displacement_of(moves: list[str]) -> dict[str, float]:
     """`Z=1 X=-5` as lengths."""
     out: dict[str, float] = {}
     for move in moves:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gcodejerk.errors import MachineError
+from gcodejerk.machine.drives import Servo, Structure
 from gcodejerk.start import CycleSettings, RapidFeed
 
 OSCILLATORS = 4
@@ -185,6 +186,8 @@ class Axis:
     """Quantities of `LAWS` that the planner needs. [mm or deg, s, Hz]"""
     filter: Filter | None = None
     """What acts behind it; the same for all axes of straight rapids."""
+    servo: Servo | None = None
+    """Its drive, for `gcodejerk.simulation`; None: it is where it is told to be."""
 
     def conventional(self, lone: bool = True) -> Limits:
         """What the controller's own G0 does: this sets the conventional time.
@@ -325,6 +328,8 @@ class Description:
     """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
     rapid_feed: RapidFeed | None = None
     """Feed moves that count as rapids in one run; no machine file says so."""
+    structure: Structure | None = None
+    """What it is built of, for `gcodejerk.simulation`."""
     inch: bool = field(default=False, compare=False)
     """The file's lengths are inches."""
     source: str = field(default="<machine>", compare=False)

@@ -61,6 +61,10 @@ class Grid:
         knots = np.where(block > 0, block * stride + late, 0)
         return cls(counts, knots.astype(np.int64), interval)
 
+    def take(self, rows: NDArray[np.int64]) -> Grid:
+        """Those of some of the moves."""
+        return Grid(self.counts[rows], self.knots[rows], self.interval)
+
     @property
     def blocks(self) -> Counts:
         """Number of written points of each move, the start not counted."""

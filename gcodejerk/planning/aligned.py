@@ -110,6 +110,7 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         | (off > TOLERANCE)
         | ~written.punctual(),
         path_speed=written.speed,
+        played=(grid, positions),
     )
 
 

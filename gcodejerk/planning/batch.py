@@ -94,6 +94,9 @@ class Batch:
         points, of the profile with what rounding may add. NaN where the plans do not say. [mm]
     profiles : Profiles
         The profiles that are written, one for each of the plans' profiles of these moves.
+    played : (Grid, dict of int to ndarray), optional
+        Where the control has the axes go, by its own way of following the points, and when; as
+        `grid` and `written` where it is left out. [mm] or [deg]
     """
 
     moves: NDArray[np.int64]
@@ -112,6 +115,7 @@ class Batch:
     profiles: Profiles
     unplayable: NDArray[np.bool_]
     path_speed: Array | None = None
+    played: tuple[Grid, dict[int, Array]] | None = None
 
     def __len__(self) -> int:
         return len(self.moves)
@@ -135,9 +139,13 @@ class Batch:
                 *("worst_in_band", "unplayable"),
             )
         }
+        played = self.played
+        if played is not None:
+            played = played[0].take(rows), {axis: x[rows] for axis, x in played[1].items()}
         return replace(
             self,
-            grid=replace(self.grid, counts=self.grid.counts[rows], knots=self.grid.knots[rows]),
+            grid=self.grid.take(rows),
+            played=played,
             number_format=self.number_format.take(rows),
             profiles=self.profiles.take(np.flatnonzero(np.isin(owner, rows))),
             path_speed=None if self.path_speed is None else self.path_speed[rows],
@@ -147,13 +155,25 @@ class Batch:
 
     def positions(self, row: int) -> tuple[Array, Array]:
         """Moments [s] and positions [mm], shape (k, 9), of one move as written; ends exact."""
-        knots = self.grid.knots[row]
-        begin = len(knots) - 1 - int(np.count_nonzero(knots))
-        out = np.tile(self.number_format.start[row], (len(knots) - begin, 1))
-        for axis, written in self.written.items():
+        out = np.tile(self.number_format.start[row], (self.grid.blocks[row] + 1, 1))
+        return self._moved(row, self.grid, self.written, out)
+
+    def drives(self, row: int) -> tuple[Array, Array]:
+        """Moments [s] and ways [mm] that the drives are given, shape (k, 9), from 0."""
+        grid, ways = self.played or (self.grid, self.written)
+        times, out = self._moved(row, grid, ways, np.zeros((grid.blocks[row] + 1, len(AXES))))
+        return times, out - out[0]
+
+    def _moved(
+        self, row: int, grid: Grid, ways: dict[int, Array], out: Array
+    ) -> tuple[Array, Array]:
+        """Moments of a move, and places of the axes that it moves put into `out`."""
+        knots = grid.knots[row]
+        begin = len(knots) - len(out)
+        for axis, way in ways.items():
             if self.plans.displacement[self.moves[row], axis]:
-                out[:, axis] = written[row, begin:]
-        return knots[begin:] * self.grid.interval, out
+                out[:, axis] = way[row, begin:]
+        return knots[begin:] * grid.interval, out
 
 
 class Sampler:

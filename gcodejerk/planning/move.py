@@ -138,6 +138,7 @@ def plan_move(
     T1: float | None = None,
     stride: int = 1,
     play: Play = Play.TABLE,
+    as_played: bool = False,
 ) -> Plan:
     """Plan one move from rest to rest.
 
@@ -158,6 +159,8 @@ def plan_move(
         own points are those of every interval.
     play : Play, optional
         What the control makes of the points that it is judged by, `Controller.play`.
+    as_played : bool
+        The plan's own points are those that it is judged by, not those of every interval.
 
     Returns
     -------
@@ -184,7 +187,7 @@ def plan_move(
     check_time(time, row, machine)
     plans = plan_moves(row, machine, profile, time=time, T1=T1)
     batches = _streams(plans, stride, play)
-    if batches and (stride, play) != (1, Play.TABLE):
+    if batches and (stride, play) != (1, Play.TABLE) and not as_played:
         judged = batches[0]
         points = _streams(replace(plans, most_in_band=np.full(len(plans), np.nan)))
         batches = [

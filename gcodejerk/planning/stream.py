@@ -169,7 +169,14 @@ class _Maker:
             worst_in_band=worst,
             profiles=profiles,
             unplayable=np.zeros(len(self.moves), dtype=np.bool_),
+            played=self._held(written, times) if self.play is Play.HELD else None,
         )
+
+    def _held(
+        self, written: dict[int, Array], times: NDArray[np.int64]
+    ) -> tuple[Grid, dict[int, Array]]:
+        """Where a control that holds F is, at the knots."""
+        return self.grid, {a: played_positions(q, times, self.grid) for a, q in written.items()}
 
     def _with_ends(self, positions: Array, start: Array, end: Array) -> Array:
         """Positions between exact ends."""
@@ -197,7 +204,7 @@ class _Maker:
         early = np.zeros(len(self.moves), dtype=np.int64)
         if self.play is Play.HELD:
             early = missing_times(times, self.grid)
-            written = {a: played_positions(q, times, self.grid) for a, q in written.items()}
+            written = self._held(written, times)[1]
         residual, worst = left_by_lines(self.plans, self.moves, written, self.grid, early)
         if self.play is Play.SCALED:
             residual *= smoothed(self.modes.poles * self.interval)

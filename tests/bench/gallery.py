@@ -30,6 +30,7 @@ COMMANDS = {
     "map.png": "map --machine paper --axis Z --length 1 -o",
     "conditions.png": "map --machine centre --axis Z --length 1 --conditions -o",
     "compare.png": "compare --machine centre Z=1 --plot",
+    "simulate.png": "simulate --machine vmc33 Z=1 --time 0.040 --T1 0.001 --plot",
     "parameters.png": "parameters samples/plate.ngc --machine centre --controller grblhal --plot",
 }
 BEFORE, AFTER = "#c1440e", "#1f6f8b"

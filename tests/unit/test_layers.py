@@ -39,7 +39,7 @@ ROOMS = {
     _version axes errors units reasons start advice
  <- nc | machine | motion
  <- cycles | planning
- <- studies | parameters | verification | testing | identification
+ <- studies | parameters | verification | testing | identification | simulation
  <- emit
  <- rewrite
  <- report
@@ -54,7 +54,8 @@ ROOMS = {
  <- maps rounding | search | servo
 """),
     "machine": order("""
-    parts problems reading
+    drives
+ <- parts problems reading
  <- spectrum find
  <- file
  <- model | sources

@@ -8,8 +8,8 @@ from gcodejerk.machine import LINUXCNC, Machine, find_machine
 from gcodejerk.machine.find import shipped_machines
 
 
-def test_four_machines_and_the_papers_example_are_shipped():
-    assert list(shipped_machines()) == ["centre", "drill", "paper", "router", "vmc"]
+def test_five_machines_and_the_papers_example_are_shipped():
+    assert list(shipped_machines()) == ["centre", "drill", "paper", "router", "vmc", "vmc33"]
 
 
 @pytest.mark.parametrize("name", sorted(shipped_machines()))
@@ -36,7 +36,7 @@ def test_an_unknown_name_is_refused_with_the_shipped_ones_and_the_nearest():
     with pytest.raises(MachineError) as caught:
         find_machine("vcm")
     assert str(caught.value) == (
-        "no machine is called 'vcm', shipped are centre, drill, paper, router, vmc; "
+        "no machine is called 'vcm', shipped are centre, drill, paper, router, vmc, vmc33; "
         "did you mean 'vmc'?\n"
         "  for a file of your own give its path and suffix, for example ./vcm.yaml"
     )

@@ -474,7 +474,7 @@ def test_a_key_that_is_not_a_word_is_refused():
         (
             MILL[: MILL.index("    rapid")],
             "4:5: axes.X is empty, expected a mapping with the keys "
-            "type, wrap, diameter, resolution, rapid, limit, travel, modes, spectrum",
+            "type, wrap, diameter, resolution, rapid, limit, travel, modes, spectrum, servo",
         ),
     ],
 )

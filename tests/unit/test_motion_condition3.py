@@ -161,7 +161,7 @@ def test_the_reported_worst_is_that_of_the_reported_profile():
         T1, T2 = float(profiles.T1[i]), float(profiles.T2[i])
         J1 = 6.0 / (T1**2 * T[i] * (2 * T2 / T1 + 1))  # noqa: N806
         times = [0, T1, T1 + T2, T1 + 2 * T2, 2 * T1 + 2 * T2]
-        K = J1 * T1 / T2  # noqa: N806
+        K = J1 * T1 / T2
         steps = [J1, -J1 - K, 0.0, J1 + K, -J1]
         for f, zeta, weight in zip((30.0, 90.0), (0.02, 0.0), weights[i], strict=True):
             A = float(residual_acceleration(times, steps, f, zeta))

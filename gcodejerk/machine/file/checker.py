@@ -163,10 +163,14 @@ class Checker:
         return values
 
     def _list(self, node: yaml.Node, kind: kinds.ListOf, path: KeyPath) -> Any:
-        if not isinstance(node, yaml.SequenceNode) or len(node.value) > kind.at_most:
+        count = len(node.value) if isinstance(node, yaml.SequenceNode) else -1
+        if count < (kind.at_most if kind.exactly else 0) or count > kind.at_most:
             what = f"a list of at most {kind.at_most} entries, each in braces or after a dash"
-            return self._wrong(node, path, what)
+            of = f"{kind.at_most} {'names' if isinstance(kind.of, kinds.Text) else 'numbers'}"
+            return self._wrong(node, path, f"a list of {of}" if kind.exactly else what)
         values = [self._read(n, kind.of, (*path, i)) for i, n in enumerate(node.value)]
+        if kind.exactly and any(value is _MISSING for value in values):
+            return _MISSING
         return {i: value for i, value in enumerate(values) if value is not _MISSING}
 
     def _pair(self, node: yaml.Node, kind: kinds.Pair, path: KeyPath) -> Any:

@@ -82,9 +82,11 @@ class Pair:
 class ListOf:
     """A list."""
 
-    of: Section | Choice | Text
+    of: Section | Choice | Text | Number | ListOf
     at_most: int
     """More make no sense on a machine, and aliases could stand for very many."""
+    exactly: bool = False
+    """Fewer make no sense either: the coordinates of a point."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ not fit together. What a single key may hold is the table's.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import MachineError
 from gcodejerk.machine.file.checker import Checker, KeyPath, dotted
 from gcodejerk.machine.file.document import Document
+from gcodejerk.machine.file.drives import check_servos, servo_of, structure_of
 from gcodejerk.machine.file.planner import choose_planners, own_law, planner_warnings
 from gcodejerk.machine.file.plausibility import COARSEST_RESOLUTION, plausibility_warnings
 from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
@@ -67,9 +69,12 @@ def load_text(text: str, name: str) -> Description:
     _check_frequencies(values, checker)
     _check_participations(values, checker)
     _check_m_codes(values, checker)
+    check_servos(values, checker)
+    folder = Path(name).parent
+    structure = structure_of(values.get("structure", {}), values.get("axes", {}), folder, checker)
     planners = choose_planners(values, checker)
     problems.raise_any()
-    return _machine(values, spectra, planners, name, checker)
+    return replace(_machine(values, spectra, planners, name, checker), structure=structure)
 
 
 def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
@@ -284,6 +289,7 @@ def _axis(
         planner=planner,
         law=own_law(values["rapid"], planner),
         filter=_filter(values["rapid"].get("filter")),
+        servo=servo_of(values.get("servo", {})),
     )
 
 

@@ -56,8 +56,9 @@ def _of(kind: kinds.Kind) -> dict[str, Any]:
             }
         case kinds.OrMapping(plain=plain, mapping=mapping):
             return {"anyOf": [_of(plain), _of(mapping)]}
-        case kinds.ListOf(of=of, at_most=at_most):
-            return {"type": "array", "items": _of(of), "maxItems": at_most}
+        case kinds.ListOf(of=of, at_most=at_most, exactly=exactly):
+            least = {"minItems": at_most} if exactly else {}
+            return {"type": "array", "items": _of(of), **least, "maxItems": at_most}
         case kinds.Pair(of=of):
             return {"type": "array", "items": _of(of), "minItems": 2, "maxItems": 2}
         case kinds.Number():

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Final
 
 from gcodejerk.axes import AXES
+from gcodejerk.machine.file.drive_keys import SERVO, STRUCTURE
 from gcodejerk.machine.file.kinds import (
     Choice,
     Flag,
@@ -212,6 +213,7 @@ _AXIS = Section(
             "Modes that this axis alone excites, as a list; or {spectrum: FILE}, which is the key "
             "spectrum."),
         _SPECTRUM,
+        SERVO,
     )
 )  # fmt: skip
 
@@ -390,6 +392,7 @@ MACHINE: Final = Section(
             _mode(Table(((_LETTERS, Number("-")),), _AXIS_NAMES, tuple(AXES), at_least=1),
                   "How strongly each axis excites the mode.", True), at_most=100),
             "Structure modes, which several axes excite together."),
+        STRUCTURE,
         Key("design", _DESIGN, "How profiles are chosen."),
         Key("controller_options", _CONTROLLER_OPTIONS,
             "What is set in the control and streams depend on; of LinuxCNC in this version."),

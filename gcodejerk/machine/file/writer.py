@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from gcodejerk.machine.file.drives import digest
+from gcodejerk.machine.file.drives_text import servo_text, structure_text
+from gcodejerk.machine.file.scalar_text import braces, number_text, quoted
 from gcodejerk.machine.file.table import SCHEMA_VERSION
 from gcodejerk.machine.parts import (
     AVERAGES,
@@ -59,6 +61,7 @@ def machine_yaml(machine: Description) -> str:
             "axes:",
             *(line for axis in machine.axes for line in _axis(axis)),
             *_modes(machine.modes, ""),
+            *structure_text(machine.structure),
             "design:",
             f"  profile: {design.profile}",
             f"  band: {number_text(design.band)}",
@@ -70,7 +73,7 @@ def machine_yaml(machine: Description) -> str:
             *_controller_parameters(machine.controller_parameters),
             "program:",
             f"  start: {_flow(program.start)}",
-            f"  offsets: {_braces(offsets | lengths)}",
+            f"  offsets: {braces(offsets | lengths)}",
             f"  startup: {quoted(program.startup)}",
             *(
                 [f"  decimal_point: {program.decimal_point}"]
@@ -123,7 +126,7 @@ def _controller_options(options: ControllerOptions) -> list[str]:
         "max_acceleration": _flow(options.max_acceleration),
         "override_guard": str(options.override_guard).lower(),
         "counts_per_unit": _flow(options.counts_per_unit),
-        "axis_names": _braces({axis: quoted(name) for axis, name in options.axis_names.items()}),
+        "axis_names": braces({axis: quoted(name) for axis, name in options.axis_names.items()}),
         "isx90": "" if options.isx90 is None else number_text(options.isx90),
         "fanuc_distance": str(options.fanuc_distance),
         "confirmed": f"[{', '.join(options.confirmed)}]",
@@ -162,7 +165,9 @@ def settings_text(machine: Description) -> str:
     str
         What `machine_yaml` writes, with what is in a spectrum file in place of its name.
     """
-    return machine_yaml(replace(machine, axes=tuple(_with_lines(axis) for axis in machine.axes)))
+    structure = None if machine.structure is None else digest(machine.structure)
+    axes = tuple(_with_lines(axis) for axis in machine.axes)
+    return machine_yaml(replace(machine, axes=axes, structure=structure))
 
 
 def _with_lines(axis: Axis) -> Axis:
@@ -186,8 +191,8 @@ def _axis(axis: Axis) -> list[str]:
     if axis.travel is not None:
         lines.append(f"    travel: [{', '.join(map(number_text, axis.travel))}]")
     if axis.spectrum is not None:
-        return [*lines, f"    spectrum: {_spectrum(axis.spectrum)}"]
-    return lines + _modes(axis.modes, "    ", axis.name)
+        return [*lines, f"    spectrum: {_spectrum(axis.spectrum)}", *servo_text(axis.servo)]
+    return lines + _modes(axis.modes, "    ", axis.name) + servo_text(axis.servo)
 
 
 def _spectrum(spectrum: Spectrum) -> str:
@@ -196,7 +201,7 @@ def _spectrum(spectrum: Spectrum) -> str:
         "file": json.dumps(spectrum.source, ensure_ascii=False),
         "participation": number_text(spectrum.participation),
     }
-    return _braces(values)
+    return braces(values)
 
 
 def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> list[str]:
@@ -213,7 +218,7 @@ def _modes(modes: tuple[Mode, ...], indent: str, axis: str | None = None) -> lis
             if axis
             else _flow(dict(mode.participation)),
         }
-        lines.append(f"{indent}  - {_braces(values)}")
+        lines.append(f"{indent}  - {braces(values)}")
     return lines
 
 
@@ -226,9 +231,9 @@ def _rapid(axis: Axis) -> str:
 
 def _filter(behind: Filter) -> str:
     if behind.kind in AVERAGES:
-        return _braces({"type": behind.kind, "time": number_text(behind.time)})
+        return braces({"type": behind.kind, "time": number_text(behind.time)})
     shaped = {"frequency": behind.frequency, "damping": behind.damping}
-    return _braces({"type": behind.kind} | {k: number_text(x) for k, x in shaped.items()})
+    return braces({"type": behind.kind} | {k: number_text(x) for k, x in shaped.items()})
 
 
 def _limits(limits: Limits, more: Mapping[str, str] | None = None) -> str:
@@ -236,24 +241,8 @@ def _limits(limits: Limits, more: Mapping[str, str] | None = None) -> str:
     values = {"velocity": limits.velocity, "acceleration": limits.acceleration}
     if math.isfinite(limits.jerk):
         values["jerk"] = limits.jerk
-    return _braces({key: number_text(value) for key, value in values.items()} | dict(more or {}))
+    return braces({key: number_text(value) for key, value in values.items()} | dict(more or {}))
 
 
 def _flow(values: Mapping[str, float]) -> str:
-    return _braces({key: number_text(value) for key, value in values.items()})
-
-
-def _braces(values: dict[str, str]) -> str:
-    return "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
-
-
-def number_text(value: float) -> str:
-    """Shortest text that reads back as the same number, also for readers of YAML 1.1."""
-    return re.sub(r"^(-?\d+)e", r"\1.0e", repr(float(value)))
-
-
-def quoted(text: str) -> str:
-    """Double-quoted scalar, which JSON and YAML write alike; simple words go without quotes."""
-    if re.fullmatch(r"(?!(true|false|yes|no|on|off|null)$)[a-z][a-z0-9_-]*", text):
-        return text
-    return json.dumps(text, ensure_ascii=False)
+    return braces({key: number_text(value) for key, value in values.items()})

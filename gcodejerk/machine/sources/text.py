@@ -9,7 +9,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 
-from gcodejerk.machine.file.writer import number_text, quoted
+from gcodejerk.machine.file.scalar_text import number_text, quoted
 from gcodejerk.machine.sources.draft import Draft, DraftAxis, Fact
 
 COLUMN = 36
