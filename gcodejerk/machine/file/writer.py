@@ -106,7 +106,7 @@ def _cycles(cycles: CycleSettings) -> list[str]:
         for name, value in values.items()
         if value is not None
     }
-    return [f"  cycles: {_braces(texts)}"] if texts else []
+    return [f"  cycles: {braces(texts)}"] if texts else []
 
 
 def _lists(program: ProgramStart) -> list[str]:
