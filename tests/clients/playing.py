@@ -135,14 +135,19 @@ def settings_of(machine, factor=1.0, **others):
     return out
 
 
+def run_or_skip(path, **how):
+    """Play a program on LinuxCNC; where there is none, the test is skipped, and says so."""
+    try:
+        return lcnc.run(path, **how)
+    except lcnc.Unavailable as reason:
+        pytest.skip(f"LinuxCNC cannot run here: {reason}")
+
+
 def record(program, tmp_path, settings, period=0.001, timeout=120.0):
     """Rows of (t, X, Y, Z, line) of a program, one each servo period."""
     path = tmp_path / "played.ngc"
     path.write_bytes(program)
-    try:
-        run = lcnc.run(path, settings=settings, period=period, timeout=timeout)
-    except lcnc.Unavailable as reason:
-        pytest.skip(f"LinuxCNC cannot run here: {reason}")
+    run = run_or_skip(path, settings=settings, period=period, timeout=timeout)
     return np.array([row[:5] for row in run.rows])
 
 

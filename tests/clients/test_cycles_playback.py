@@ -12,7 +12,7 @@ from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "linuxcnc"))
-import lcnc  # noqa: E402
+from playing import run_or_skip  # noqa: E402
 
 pytestmark = [
     pytest.mark.linuxcnc,
@@ -44,10 +44,7 @@ def played(program, folder):
     """Rows of t, X, Y, Z as LinuxCNC moved, one for each servo period."""
     path = folder / "played.ngc"
     path.write_bytes(program)
-    try:
-        run = lcnc.run(path, acceleration=ACCELERATION, velocity=1000, timeout=90)
-    except lcnc.Unavailable as reason:
-        pytest.skip(f"LinuxCNC cannot run here: {reason}")
+    run = run_or_skip(path, acceleration=ACCELERATION, velocity=1000, timeout=90)
     return np.array([row[:4] for row in run.rows])
 
 

@@ -20,8 +20,7 @@ from gcodejerk.rewrite.pipeline import process
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(HERE / "linuxcnc"))
-import lcnc  # noqa: E402
-from playing import MARKS, streams  # noqa: E402
+from playing import MARKS, run_or_skip, streams  # noqa: E402
 
 pytestmark = MARKS
 
@@ -67,7 +66,7 @@ def play(result, events=None, guard=True, cycle=PERIOD):
     with open(handle, "wb") as file:
         file.write(result.output)
     try:
-        run = lcnc.run(
+        run = run_or_skip(
             path,
             acceleration=5250,
             velocity=500,
@@ -79,8 +78,6 @@ def play(result, events=None, guard=True, cycle=PERIOD):
             prepare=prepare,
             events=events,
         )
-    except lcnc.Unavailable as reason:
-        pytest.skip(f"LinuxCNC cannot run here: {reason}")
     finally:
         os.unlink(path)
     return np.array([row[:5] for row in run.rows]), run

@@ -21,7 +21,7 @@ from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "linuxcnc"))
-import lcnc  # noqa: E402
+from playing import run_or_skip  # noqa: E402
 
 pytestmark = [
     pytest.mark.linuxcnc,
@@ -103,7 +103,7 @@ def play(data, form, *, events=None, change=None, timeout=30):
     with open(handle, "wb") as file:
         file.write(output)
     try:
-        run = lcnc.run(
+        run = run_or_skip(
             path,
             acceleration=ACCELERATION,
             velocity=VELOCITY,
@@ -112,8 +112,6 @@ def play(data, form, *, events=None, change=None, timeout=30):
             events=events,
             prepare=prepare,
         )
-    except lcnc.Unavailable as reason:
-        pytest.skip(f"LinuxCNC cannot run here: {reason}")
     finally:
         os.unlink(path)
     return result, run

@@ -17,7 +17,7 @@ from gcodejerk.rewrite.pipeline import process
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "linuxcnc"))
-import lcnc  # noqa: E402
+from playing import run_or_skip  # noqa: E402
 
 pytestmark = [
     pytest.mark.linuxcnc,
@@ -74,10 +74,7 @@ def played(data, machine, tmp_path):
         settings |= {f"JOINT_{number}": limits, f"AXIS_{axis}": limits}
     program = tmp_path / "today.ngc"
     program.write_bytes(data)
-    try:
-        run = lcnc.run(program, settings=settings, timeout=120)
-    except lcnc.Unavailable as reason:
-        pytest.skip(f"LinuxCNC cannot run here: {reason}")
+    run = run_or_skip(program, settings=settings, timeout=120)
     rows = np.array([row[:5] for row in run.rows])
     return result, {
         int(row): left_by(result, row, rows) for row in np.flatnonzero(result.plans.planned)
