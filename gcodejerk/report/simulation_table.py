@@ -20,6 +20,8 @@ MOST_POLES = 8
 SEEN = 0.02
 """Part of the tolerance that a mode has to keep to be shown."""
 MOST_RAPIDS = 20
+SAME = 1e-6
+"""Times that differ by less are the same. [s]"""
 
 
 def move_tables(found: MoveSimulation) -> list[ScreenTable]:
@@ -90,6 +92,8 @@ def _gain(today: Outcome, planned: Outcome) -> str:
     if today.settling is None or planned.settling is None:
         return "nothing damps what is left, so it never settles"
     saved = today.settling - planned.settling
+    if abs(saved) < SAME:
+        return "planned, it settles as today"
     word = "sooner" if saved >= 0.0 else "later"
     return f"planned, it has settled {abs(saved) * MS:.3g} ms {word}"
 

@@ -51,10 +51,11 @@ def main():
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
             written = len(list((Path(folder) / "out").rglob("*.ngc")))
+            each = 1e3 / given.programs
             print(
-                f"{' '.join(more) or 'first run':12} exit {done.returncode}, {written} outputs, "
-                f"{1e3 * cpu / given.programs:.1f} ms CPU, {1e3 * clock / given.programs:.1f} ms clock "
-                f"each, largest process {after.ru_maxrss / 1024:.0f} MB"
+                f"{' '.join(more) or 'first run':12} exit {done.returncode}, {written} outputs; "
+                f"each {each * cpu:.1f} ms CPU, {each * clock:.1f} ms clock; "
+                f"largest process {after.ru_maxrss / 1024:.0f} MB"
             )
             if done.returncode:
                 print(done.stderr[-2000:])
