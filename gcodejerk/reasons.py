@@ -37,6 +37,7 @@ class Reason(enum.StrEnum):
     START_UNKNOWN = "start unknown"
     ROTARY_WAY = "a rotary axis may turn another way"
     MIXED_AXES = "linear and rotary axes move together"
+    APART = "axes of the rapid move one after another"
     OTHER_WORDS = "other words of the block cannot keep their order"
     FEED_UNKNOWN = "feed to restore unknown"
     BEAM = "a beam may be on, which G0 darkens"
@@ -174,6 +175,11 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.MIXED_AXES: Explanation(
         "what F means then is not known for this dialect",
         "move linear and rotary axes in blocks of their own",
+    ),
+    Reason.APART: Explanation(
+        "Centroid's G0 moves Z upwards before the other axes, and downwards behind them; of some "
+        "controls nobody could say",
+        "move Z in a block of its own",
     ),
     Reason.OTHER_WORDS: Explanation(
         "a word of which the dialect's table does not know whether the control runs it before the "

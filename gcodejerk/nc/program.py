@@ -190,6 +190,8 @@ def open_reader(
             reader.refer(calls(reader.runner))
     if why:
         reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
+    if chosen.note:
+        reader.runner.syntax_problems.append(Finding(None, f"dialect {chosen.name}: {chosen.note}"))
     return reader, file
 
 

@@ -10,8 +10,11 @@ import difflib
 from importlib.metadata import entry_points
 
 from gcodejerk.errors import ProgramError
+from gcodejerk.nc.dialects.centroid import CENTROID
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.duet import DUET
 from gcodejerk.nc.dialects.fanuc import FANUC, FANUC_LATHE_A, FANUC_LATHE_B
+from gcodejerk.nc.dialects.fanuc_relatives import MAZATROL_EIA, MITSUBISHI, SYNTEC
 from gcodejerk.nc.dialects.grbl import GRBL
 from gcodejerk.nc.dialects.haas import HAAS
 from gcodejerk.nc.dialects.heidenhain_iso import HEIDENHAIN_ISO
@@ -20,6 +23,7 @@ from gcodejerk.nc.dialects.klipper import KLIPPER
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 from gcodejerk.nc.dialects.mach import MACH
 from gcodejerk.nc.dialects.marlin import MARLIN
+from gcodejerk.nc.dialects.pc_controls import EDINGCNC, MASSO, PLANETCNC, UCCNC
 from gcodejerk.nc.dialects.rs274 import RS274
 from gcodejerk.nc.dialects.siemens import SIEMENS
 
@@ -32,6 +36,7 @@ DIALECTS: dict[str, Dialect] = {
     for dialect in (
         *(LINUXCNC, FANUC, FANUC_LATHE_A, FANUC_LATHE_B, HAAS, SIEMENS, HEIDENHAIN_ISO),
         *(GRBL, MACH, MARLIN, KLIPPER, RS274, ISO_MILL),
+        *(DUET, CENTROID, UCCNC, EDINGCNC, PLANETCNC, MASSO, MITSUBISHI, MAZATROL_EIA, SYNTEC),
     )
 }
 """Ours, by name."""

@@ -94,6 +94,8 @@ class Text:
     """``//`` begins a comment."""
     python: bool = False
     """A comment may run a program: ``(py, ...)``."""
+    live_comments: bool = False
+    """One that begins with a word and a comma may do something: ``(expr, ...)``, but for texts."""
     delete: Literal["first", "numbered", "ignored", "none"] = "first"
     """A ``/`` skips the block where the operator says so: in front of everything; there or behind
     N, also with a level ``/1`` to ``/9``; the ``/`` is thrown away and the block runs; an error."""
@@ -345,6 +347,17 @@ class Dialect:
     """Plain lines mean what they mean in RS274/NGC, so that they can be read as arrays."""
     writing: Writing | None = None
     """None where no form of a stream is known."""
+    note: str = ""
+    """What whoever has a program read so has to know."""
+    unknown_lasts: bool = False
+    """A code that the table does not name may turn, scale or mirror for good: behind it nothing is
+    rewritten. So is read what is known of a control only in part."""
+    macro_change: bool = False
+    """M6 runs a program of the owner's, as `other_m` "positions" says of others."""
+    apart: frozenset[str] = frozenset()
+    """Axes that a rapid may move before the others, or behind them."""
+    in_turn: frozenset[int] = frozenset()
+    """G codes behind which another command may stand, where `one_command` holds."""
 
     @property
     def cycles(self) -> frozenset[int]:

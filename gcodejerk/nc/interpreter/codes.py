@@ -107,7 +107,8 @@ def sort_words(
         codes.reject(b"axis words beside a harmless code")
     codes.expression = codes.expression or bool(block.assigns)
     codes.names = [*block.names, *codes.calls]
-    if dialect.one_command and codes.g and (codes.m or len(codes.g) > 1):
+    several = codes.g and (codes.m or len(codes.g) > 1)
+    if dialect.one_command and several and not _in_turn(block, dialect):
         codes.fault = True
     if sorter.whole and dialect.whole_numbers == "machine":
         _whole_numbers(codes, sorter.whole, dialect, inch, decimal_point)
@@ -184,6 +185,16 @@ class _Sorter:
             codes.feed_whole = word.whole and self._dialect.whole_numbers == "machine"
         if word.function:
             codes.functions[letter] = word.function
+
+
+def _in_turn(block: Block, dialect: Dialect) -> bool:
+    """Whether the commands of a block do the same in turn as together: modes, then one more."""
+    words = [word for word in block.words if word.letter != "N"]
+    last = max(k for k, word in enumerate(words) if word.letter in "GM")
+    return all(
+        word.letter == "G" and word.value is not None and round(word.value * 10.0) in dialect.in_turn
+        for word in words[:last]
+    )
 
 
 def _states_units(block: Block, dialect: Dialect) -> bool:

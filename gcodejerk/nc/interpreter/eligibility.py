@@ -50,6 +50,7 @@ BARS = {
     "another language": Reason.NOT_UNDERSTOOD,
     "exact path": Reason.PATH_UNKNOWN,
     "synchronized action": Reason.NOT_FOLLOWED,  # for good
+    "unknown code": Reason.NOT_UNDERSTOOD,  # for good
 }
 """What makes rapids unfit while it is, or may be, in force (`State.bars`), and the reason."""
 
@@ -223,7 +224,9 @@ def _check_known_move(
         return Reason.OTHER_WORDS
     if mixed and not dialect.feed_of_mixed:
         return Reason.MIXED_AXES
-    return None
+    moved = {AXES[k] for k in range(len(AXES)) if step.words >> k & 1}
+    moved = {axis for axis in moved if step.start[AXES.index(axis)] != step.end[AXES.index(axis)]}
+    return Reason.APART if dialect.apart & moved and len(moved) > 1 else None
 
 
 def _other_words(codes: Codes, dialect: Dialect, step: Step) -> bool:

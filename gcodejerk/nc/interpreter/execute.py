@@ -47,6 +47,8 @@ class Executor(Phases):
         before, ended = state.motion, state.ended
         self._execute(block, codes, step)
         state = self.state  # another one behind a code that some of the controls refuse
+        if self.dialect.unknown_lasts and self._is_unknown(block, codes):
+            state.put("bars", {**state.bars, "unknown code": True})
         step.beam |= state.spindle != 5
         step.habit |= block.problem is not None and inline_power(codes, block.rest)
         if reads_feed(block, self.dialect.arithmetic):
@@ -60,6 +62,12 @@ class Executor(Phases):
         if step.rapid:
             step.reason = why_left_alone(block, codes, step, state, self.dialect, ended, contour)
         return step
+
+    def _is_unknown(self, block: Block, codes: Codes) -> bool:
+        """Whether the block may do anything, for good."""
+        jumps = self.dialect.text.keywords
+        named = any(self._named(n) == "flow" and n.name not in jumps for n in codes.names)
+        return codes.unknown or block.problem is not None or named
 
     def _begin(self, block: Block, codes: Codes) -> Step:
         """What is said of a block before it acts."""

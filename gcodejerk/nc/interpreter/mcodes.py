@@ -54,7 +54,7 @@ def run_m_code(
     if group is None or m == 6 or group == "user":
         # A tool change may go anywhere, and so may a program of the user's.
         forget_shared(state, dialect.arithmetic)
-        if dialect.other_m == "positions" or f"M{m}" in dialect.refused:
+        if dialect.other_m == "positions" or f"M{m}" in dialect.refused or dialect.macro_change:
             _behind_macro(state)
         change_tool(state, tool_change if m == 6 and group is not None else None)
     elif m == 73 and group == "state":

@@ -206,6 +206,9 @@ def _reasons(
     moving = is_named & (start != target)
     moves = moving.any(axis=1)
     reason = np.full(len(named), CERTAIN, dtype=np.uint8)
+    apart = np.array([axis in dialect.apart for axis in AXES])
+    reason[moving[:, apart].any(axis=1) & moving[:, ~apart].any(axis=1)] = _INDEX[Reason.APART]
+    reason[(moving & apart).sum(axis=1) > 1] = _INDEX[Reason.APART]
     if not dialect.feed_of_mixed:
         both = moving[:, _IS_LINEAR].any(axis=1) & moving[:, ~_IS_LINEAR].any(axis=1)
         reason[both] = _INDEX[Reason.MIXED_AXES]

@@ -29,6 +29,7 @@ _TO_COMMENT = re.compile(rb"[^;]*")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
 _KEYWORD = re.compile(rb"[A-Za-z]*")
 _ACTIVE = re.compile(rb"[ \t]*py[ \t]*,", re.IGNORECASE)
+_LIVE = re.compile(rb"\([ \t]*(?!(?:msg|print|debug)[ \t]*,)[a-z_]+[ \t]*,", re.IGNORECASE)
 _BLOCK = re.compile(
     rb"[ \t]*(?:[A-Z][ \t]*[-+]?[0-9.]+[ \t]*)+(?:[;(].*)?|.*[#=\[].*", re.IGNORECASE
 )
@@ -80,6 +81,8 @@ class _Line(Cursor):
             self.at = len(text)
         if self.rules.python and _ACTIVE.match(text, begin + 1):
             raise SyntaxProblem("comment runs Python", begin)
+        if self.rules.live_comments and _LIVE.match(text, begin):
+            raise SyntaxProblem("comment may be a command", begin)
         self.comments.append((begin, self.at))
 
     def flow(self) -> None:

@@ -114,12 +114,14 @@ class Codes(Known):
                 self.unknown_call()
             elif group is None and self.dialect.other_m == "unknown":
                 self.forget()
+                self.bar_for_good(True)
             elif group in (None, "tool", "user"):
                 places = self.facts.tool_change if m == 6 and group is not None else None
                 if places is None or self.turned():
                     self.lose()
                 self.forget_shared()
-                if self.dialect.other_m == "positions" or f"M{m}" in self.dialect.refused:
+                may_be_macro = self.dialect.other_m == "positions" or self.dialect.macro_change
+                if may_be_macro or f"M{m}" in self.dialect.refused:
                     self.cancel_length()
                     if self.cycle is not None:
                         self.g["motion"], self.cycle = None, None

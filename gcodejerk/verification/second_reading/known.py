@@ -74,6 +74,11 @@ class Observation:
     modes: dict[str, Any] = field(default_factory=dict)
     """In force behind it."""
 
+    def moved(self, end: list[float]) -> set[str]:
+        """List the axes of its words that certainly move."""
+        ends = [(axis, a, b) for axis, a, b in zip(AXES, self.start, end, strict=True)]
+        return {axis for axis, a, b in ends if self.axes >> AXES.index(axis) & 1 and abs(a - b) > 0}
+
 
 class Known:
     """The state of the second reading."""
@@ -246,6 +251,19 @@ class Known:
         self.end_bar("tool data")
         if self.dialect.length_moves:
             self.lose(axes)
+
+    def bar_for_good(self, sure: bool) -> None:
+        """Something that the table does not name may last, where the dialect says so."""
+        if self.dialect.unknown_lasts:
+            self.bars["unknown code"] = sure or self.bars.get("unknown code") or None
+
+    def is_unknown(self, letter: str, number: float) -> bool:
+        """Whether a word is a code that the table certainly does not have."""
+        if number != number or letter not in "GM":
+            return False
+        if letter == "M":
+            return number not in self.dialect.m_groups
+        return round(number * 10.0) not in self.dialect.groups
 
     def end_bar(self, name: str) -> None:
         """End what forbade to rewrite."""

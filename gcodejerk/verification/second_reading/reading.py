@@ -211,6 +211,7 @@ class Text:
         """
         rules, line = self.dialect.text, Line(blank=not text.strip())
         runs_python = self.python is not None and self.python.search(text)
+        runs_python = runs_python or (rules.live_comments and _runs(text))
         if len(text) > rules.line_limit or runs_python:
             line.understood = False
             return line
@@ -341,6 +342,12 @@ class Text:
             take(match)
             return b""
         return _NAME.sub(take, text)
+
+
+def _runs(text: bytes) -> bool:
+    """Whether a comment of a line begins with a word and a comma, and is no text to be shown."""
+    words = re.findall(rb"\([ \t]*([A-Za-z_]+)[ \t]*,", text)
+    return any(word.upper() not in (b"MSG", b"PRINT", b"DEBUG") for word in words)
 
 
 def _assignment(name: bytes) -> bytes:

@@ -63,7 +63,8 @@ class Sorted:
         groups = [dialect.m_groups.get(m) for m in self.m]
         if any(groups.count(group) > 1 for group in _SINGLE):
             return False
-        return not dialect.one_command or len(self.g) + len(self.m) <= 1
+        alone = not dialect.one_command or len(self.g) + len(self.m) <= 1
+        return alone or _modes_first(line, dialect)
 
     def _g_code(self, number: float, dialect: Dialect) -> bool:
         """Sort a code; whether it is known, and the only one of its group."""
@@ -92,6 +93,14 @@ class Sorted:
         name = axis or letter
         if name in AXES:
             self.axes |= 1 << AXES.index(name)
+
+
+def _modes_first(line: Line, dialect: Dialect) -> bool:
+    """Whether nothing but modes that do the same anywhere stands in front of the last command."""
+    letters = "".join(letter for letter, _, _ in line.words)
+    last = max(letters.rfind("G"), letters.rfind("M"))
+    front = [(letter, number) for letter, number, _ in line.words[:last] if letter != "N"]
+    return all(a == "G" and round(number * 10.0) in dialect.in_turn for a, number in front)
 
 
 def _without_point(

@@ -30,13 +30,9 @@ _FRAMES: frozenset[Effect] = frozenset(
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
-_READ: frozenset[Effect] = (
-    QUIET
-    | frozenset[Effect](("frames", "swivel", "machine"))
-    | frozenset[Effect](("shift", "further shift", "turned frame"))
-)
+_SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame"))
+_READ: frozenset[Effect] = QUIET | _SHIFTS | frozenset[Effect](("frames", "swivel", "machine"))
 """Effects of names that are followed."""
-_SHIFTS: frozenset[Effect] = frozenset(("shift", "further shift", "turned frame"))
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
 
@@ -210,6 +206,7 @@ class Tracker(Drilling):
         if any(effect in ("transform", "swivel", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
+        self.bar_for_good(any(self.is_unknown(letter, n) for letter, n, _ in line.words))
         self.strayed = True
         return Observation()
 
@@ -438,6 +435,8 @@ class Tracker(Drilling):
                 continue
             if seen.start[k] != self.at[k] and seen.start[k] == seen.start[k]:
                 return f"nobody says which way {axis} turns"
+        if len(seen.moved(self.at)) > 1 and seen.moved(self.at) & self.dialect.apart:
+            return "its axes do not move together"
         if self.dialect.lengths_only and None not in (self.unit, self.feed_unit):
             return "F is not in the unit of lengths" if self.unit != self.feed_unit else None
         return None
