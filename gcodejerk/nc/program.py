@@ -206,7 +206,7 @@ def follow(
     for chunk in chunks:
         digest.update(chunk.data)
         if not size:
-            refuse_klartext(chunk.data, name)
+            refuse_klartext(chunk.data, chosen, name)
             stamp = find_stamp(chunk, chosen)
             first = chunk.data.find(b"\n")
             if first > 0 and chunk.data[first - 1 : first] == b"\r":

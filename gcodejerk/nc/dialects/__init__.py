@@ -19,6 +19,7 @@ from gcodejerk.nc.dialects.grbl import GRBL
 from gcodejerk.nc.dialects.haas import HAAS
 from gcodejerk.nc.dialects.heidenhain_iso import HEIDENHAIN_ISO
 from gcodejerk.nc.dialects.iso_mill import ISO_MILL
+from gcodejerk.nc.dialects.klartext import KLARTEXT
 from gcodejerk.nc.dialects.klipper import KLIPPER
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 from gcodejerk.nc.dialects.mach import MACH
@@ -37,6 +38,7 @@ DIALECTS: dict[str, Dialect] = {
         *(LINUXCNC, FANUC, FANUC_LATHE_A, FANUC_LATHE_B, HAAS, SIEMENS, HEIDENHAIN_ISO),
         *(GRBL, MACH, MARLIN, KLIPPER, RS274, ISO_MILL),
         *(DUET, CENTROID, UCCNC, EDINGCNC, PLANETCNC, MASSO, MITSUBISHI, MAZATROL_EIA, SYNTEC),
+        KLARTEXT,
     )
 }
 """Ours, by name."""

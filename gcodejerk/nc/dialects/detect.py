@@ -47,7 +47,16 @@ _IN_COMMENTS = (
     ("haas", rb"\bhaas\b"),
     ("siemens", rb"\bsinumerik|\bsiemens\b|\b840d|\b828d"),
     ("grbl", rb"\bgrbl"),
-    ("mach", rb"\bmach ?[34]|\buccnc\b|\buc-cnc\b|\bcentroid_post\b"),
+    ("mach", rb"\bmach ?[34]"),
+    ("uccnc", rb"\buccnc\b|\buccnc_post\b|\buc-cnc\b"),
+    # a centroid is also one of an area, and MITSUBISHI a maker of tools
+    ("centroid", rb"\bcentroid_post\b|\bcentroid (?:cnc|acorn|mill)|\bcnc1[12] centroid"),
+    ("edingcnc", rb"\beding ?cnc\b|\busbcnc\b"),
+    ("planetcnc", rb"\bplanet-?cnc\b"),
+    ("masso", rb"\bmasso(?:_|[ -](?:cnc|g[23]|touch|controller)\b)"),
+    ("mitsubishi", rb"\bmeldas\b|\bmitsubishi (?:cnc|control|m[678][0-9])"),
+    ("mazatrol-eia", rb"\bmazatrol\b|\bmazak\b"),
+    ("syntec", rb"\bsyntec\b"),
     ("marlin", rb"\bmarlin"),
     ("klipper", rb"\bklipper\b"),
 )
@@ -77,12 +86,14 @@ CODE = (
     _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
     # increments U and W, which system A alone has, in a block that no mill has
     _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
+    _code("duet", rb"^\s*M453\b", "M453, CNC mode of RepRapFirmware"),
     _code("grbl", rb"^\s*\$([$#GINXHC]\s*$|N\d*=|J=|\d+=)", "a $ command of grbl"),
     *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
       for name in ("marlin", "klipper")),
     _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
           rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
 )  # fmt: skip
+_LIKE_FANUC = frozenset({"fanuc", "haas", "mitsubishi", "mazatrol-eia", "syntec"})
 _INCREMENTS = _in_line(rb"(?<![A-Z_#\[])[UW]\s*[-+]?[.\d]")
 LATHE = (
     (_in_line(rb"(?<![A-Z_])T\d{4}(?!\d)"), "a tool with its offset, T0101"),
@@ -117,25 +128,34 @@ _PC_CONTROL = (
 _SMALL_LETTERS = re.compile(rb"\([^)\n]*[a-z]{3}|;[ \t]*[^\n]*[a-z]{3}")
 _FOREIGN = _in_line(rb"[A-Z_]{2,}\d*\s*[=(]|[A-Z]=|[A-Z]{4,}|(?<![A-Z_])G65(?!\d)")
 """Words with a name, which none of LinuxCNC, grbl and Mach has."""
-_KLARTEXT = _in_line(rb"^\s*\d+\s+BEGIN\s+PGM\b")
+_KLARTEXT = _in_line(rb"^\s*\d+\s+BEGIN\s+PGM\b", re.IGNORECASE)
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 
 
-def refuse_klartext(head: bytes, name: str) -> None:
-    """Refuse Heidenhain's own language, in which hardly a line looks like a block.
+def refuse_klartext(head: bytes, dialect: Dialect, name: str) -> None:
+    """Refuse Heidenhain's own language where another is stated, or another where it is.
 
     Parameters
     ----------
     head : bytes
         The beginning of a program.
+    dialect : Dialect
+        The one that is stated.
     name : str
         For messages.
     """
-    if match := _KLARTEXT.search(head[:HEAD]):
+    match = _KLARTEXT.search(head[:HEAD])
+    if match and not dialect.text.klartext:
         raise ProgramError(
-            "this is Heidenhain Klartext, which is not read",
-            "post the program as DIN/ISO (dialect heidenhain-iso)",
+            f"this is Heidenhain Klartext, and no program of the dialect {dialect.name}",
+            "choose the dialect klartext",
             Place(name, 1 + head.count(b"\n", 0, match.start())),
+        )
+    if dialect.text.klartext and not match:
+        raise ProgramError(
+            "no line BEGIN PGM: this is no program in Heidenhain Klartext",
+            "choose its dialect, or auto; of DIN/ISO: heidenhain-iso",
+            Place(name),
         )
 
 
@@ -169,7 +189,9 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
     'linuxcnc'
     """
     head = head[:HEAD]
-    refuse_klartext(head, name)
+    if match := _KLARTEXT.search(head):
+        line = 1 + head.count(b"\n", 0, match.start())
+        return DIALECTS["klartext"], f"BEGIN PGM of Heidenhain Klartext (line {line})"
     comments = b"\n".join(_COMMENT.findall(head))
     code = _COMMENT.sub(b" ", head)
     found: dict[str, str] = {}
@@ -245,7 +267,7 @@ def _refuse_mills(
         return
     upper = code.upper()
     why = "the machine's X is a diameter" if lathe else ""
-    if not why and not {"fanuc", "haas"}.isdisjoint(mills):
+    if not why and not _LIKE_FANUC.isdisjoint(mills):
         why = next((what for pattern, what in LATHE if pattern.search(upper)), "")
         if not why and _TURNING.search(comments.upper()):
             why = "a comment speaks of turning"

@@ -68,6 +68,7 @@ Effect = Literal[
     "watch",  # what is said here may act at any time from here on
     "transform",  # turns, scales or mirrors what follows, for good
     "home",  # moves the axes that it names, or all, to a place that is not known
+    "label",  # may be come to from elsewhere: nothing is known behind it but the unit of lengths
     "flow",  # a jump, a loop, a branch or a call: nothing is certain behind it
     "diameter",  # X is a diameter from here on
     "radius",  # it is none
@@ -85,6 +86,8 @@ Effect = Literal[
 class Text:
     """How a line is written."""
 
+    klartext: bool = False
+    """Lines are statements of Heidenhain Klartext; of the rest here only `line_limit` holds."""
     parentheses: Literal["comment", "open comment", "code"] = "comment"
     """A comment that has to close on its line; one that the line's end closes too; no comment."""
     semicolon: Literal["comment", "end", "error"] = "comment"

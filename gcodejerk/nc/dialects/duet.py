@@ -27,7 +27,19 @@ SILENT = (
     *(308, 400, 408, 409, 453, 500, 503, 566, 572, 593, 906, 913),
 )
 """M codes that move nothing and change no frame."""
-_META = ("IF", "ELIF", "ELSE", "WHILE", "BREAK", "CONTINUE", "ABORT", "VAR", "GLOBAL", "SET", "SKIP")
+_META = (
+    "IF",
+    "ELIF",
+    "ELSE",
+    "WHILE",
+    "BREAK",
+    "CONTINUE",
+    "ABORT",
+    "VAR",
+    "GLOBAL",
+    "SET",
+    "SKIP",
+)
 _EFFECTS: dict[int, Effect] = {
     40: "words",
     100: "data",
@@ -104,6 +116,6 @@ DUET = Dialect(
     after_m=frozenset(),
     # Positions are single-precision floats (GCodes.h), good for seven digits.
     writing=Writing((b"; ", b""), b"M400", digits=7),
-    note="programs are read as in CNC mode (M453 in config.g), where G0 is a rapid whatever F says; "
-    "as a printer the firmware runs G0 at F: choose marlin then",
+    note="programs are read as in CNC mode (M453 in config.g), where G0 is a rapid whatever F "
+    "says; as a printer the firmware runs G0 at F: choose marlin then",
 )

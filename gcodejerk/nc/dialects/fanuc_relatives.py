@@ -1,11 +1,11 @@
-"""Controls that speak Fanuc's language for mills with codes of their own: Mitsubishi, Mazak, Syntec.
+"""Mitsubishi, Mazak and Syntec mills: Fanuc's language, with codes of their own.
 
-They are read as what Fanuc and Haas read alike (the table `iso-mill`) as far as the control has that
-too, and no more, and every program that is read so says so. Every other code forbids to rewrite what
-stands behind it (`Dialect.unknown_lasts`): G12.1, G68.2, G61.1, G05.1, the mirrors that Mazak has as M
-codes (M90 to M92), and whatever a builder added; `program.harmless` declares those that the owner
-knows. G28, G30, G53, G52, G92 and G10 leave no position known, cycles move somewhere, and positions
-that are computed are not rewritten.
+They are read as what Fanuc and Haas read alike (the table `iso-mill`) as far as the control has
+that too, and no more, and every program that is read so says so. Every other code forbids to
+rewrite what stands behind it (`Dialect.unknown_lasts`): G12.1, G68.2, G61.1, G05.1, the mirrors
+that Mazak has as M codes (M90 to M92), and whatever a builder added; `program.harmless` declares
+those that the owner knows. G28, G30, G53, G52, G92 and G10 leave no position known, cycles move
+somewhere, and positions that are computed are not rewritten.
 
 Mitsubishi M70, M80: M700V/M70V programming manual IB-1500922 pp. 28-29 (a number without a decimal
 point counts the least increment, or does not, by a parameter), p. 314 (vacant variables), p. 508
@@ -15,10 +15,10 @@ Mazak, EIA/ISO programs of Mazatrol controls: the post of Keycult for HCN machin
 from Autodesk's (G61.1, G5 P2, G43.4, G54.1; ``M98 P``; programs with names). The rest is general
 knowledge that was not looked up; it is what every relative of Fanuc has.
 
-Syntec: derek1ee/fusion-syil-22ma: syil_syntec.cps, and SYNTEC-40101720/syntec-macro: src/codeDocs.js.
-G70 and G71 are inch and mm (G10 L1000 there; the post writes G71), G20 and G21 the same; whether
-X100 is 100 mm is parameter 3241; ``M98 P H L`` begins at the line that H names; G54 P selects
-another system.
+Syntec: derek1ee/fusion-syil-22ma: syil_syntec.cps, and SYNTEC-40101720/syntec-macro:
+src/codeDocs.js. G70 and G71 are inch and mm (G10 L1000 there; the post writes G71), G20 and G21 the
+same; whether X100 is 100 mm is parameter 3241; ``M98 P H L`` begins at the line that H names; G54 P
+selects another system.
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ def _read_in_part(
         arithmetic=Arithmetic(system=1, offsets=1),
         harmless=(ISO_MILL.harmless & _OWN) | set(inches),
         stops_after_rapid=False,
-        note=f"{title}'s own table was not verified: it is read as what Fanuc and Haas mills read "
-        "alike, unverified, and nothing is rewritten behind a code that is not among that",
+        note=f"the codes of {title} were not verified: it is read as what Fanuc and Haas mills "
+        "read alike, unverified, and nothing is rewritten behind a code that is not among that",
     )
 
 

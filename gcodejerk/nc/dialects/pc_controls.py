@@ -7,15 +7,15 @@ table `rs274`), and no more, and every program that is read so says so. In detai
   scales, so that it is seen. Every other code forbids to rewrite what stands behind it
   (`Dialect.unknown_lasts`); `program.harmless` declares those that the owner knows.
 - Drilling cycles move somewhere; G28, G30, G53, G52, G92 and G10 leave no position known.
-- A word with a name (``gosub``, ``if``, ``while`` of EdingCNC and PlanetCNC) may do anything, and so
-  may a comment that begins with a word and a comma, which PlanetCNC runs: ``(expr,...)``.
+- A word with a name (``gosub``, ``if``, ``while`` of EdingCNC and PlanetCNC) may do anything, and
+  so may a comment that begins with a word and a comma, which PlanetCNC runs: ``(expr,...)``.
 
 Sources: the posts for UCCNC of FreeCAD and of pacmansydney/uccnc-fusion-post (44182/uccnc.cps: G61
-and G64, G43 H, M6, ``G53 G0``, M10 Q for a beam), for MASSO of the same (44182/masso.cps: cycles G73,
-G81 to G83 with G98, M98 P, dwells in G4 P); macros of EdingCNC (GameOEver/EdingCNC_Macro: macro.cnc,
-whose flow has words without O) and of PlanetCNC (styletronix/planetcnc-expression). What their
-manuals say was not at hand: that lines with a number alone are real units and that G0 of several
-axes is one move is general knowledge, and for MASSO not even that.
+and G64, G43 H, M6, ``G53 G0``, M10 Q for a beam), for MASSO of the same (44182/masso.cps: cycles
+G73, G81 to G83 with G98, M98 P, dwells in G4 P); macros of EdingCNC (GameOEver/EdingCNC_Macro:
+macro.cnc, whose flow has words without O) and of PlanetCNC (styletronix/planetcnc-expression). What
+their manuals say was not at hand: that lines with a number alone are real units and that G0 of
+several axes is one move is general knowledge, and for MASSO not even that.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _EFFECTS: dict[int, Effect] = {
 
 def _read_in_part(name: str, title: str, *sources: str, apart: str = "") -> Dialect:
     """A control of which only what its relatives share is taken as known."""
-    own = f"{title}'s own table was not verified"
+    own = f"the codes of {title} were not verified"
     return replace(
         RS274,
         name=name,

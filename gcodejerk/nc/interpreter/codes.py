@@ -192,7 +192,9 @@ def _in_turn(block: Block, dialect: Dialect) -> bool:
     words = [word for word in block.words if word.letter != "N"]
     last = max(k for k, word in enumerate(words) if word.letter in "GM")
     return all(
-        word.letter == "G" and word.value is not None and round(word.value * 10.0) in dialect.in_turn
+        word.letter == "G"
+        and word.value is not None
+        and round(word.value * 10.0) in dialect.in_turn
         for word in words[:last]
     )
 

@@ -109,6 +109,12 @@ class Effects:
             state.put("feed", NAN)
         elif effect == "home":
             state.forget_positions()
+        elif effect == "label":
+            units = [(name, getattr(state, name)) for name in ("unit", "feed_unit")]
+            state.forget()
+            for name, unit in units:
+                state.put(name, unit)
+            step.feed_event = USES_FEED
         elif effect == "flow":
             self._leave(step)
 

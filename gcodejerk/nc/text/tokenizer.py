@@ -16,6 +16,7 @@ from functools import lru_cache
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.text.block import Block, Name, Word
 from gcodejerk.nc.text.cursor import BLANKS, CLOSED_NUMBER, LARGEST, SHAPE, Cursor, SyntaxProblem
+from gcodejerk.nc.text.klartext import parse_klartext
 
 CHECKSUM = "*"
 """Name of a checksum among the names of a block."""
@@ -400,6 +401,8 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     """
     text = text.rstrip(b"\r")  # CR CR LF, which a transfer in text mode makes of CR LF
     rules = dialect.text
+    if rules.klartext:
+        return parse_klartext(text, dialect)
     if not (rules.names or rules.hexadecimal) and _PLAIN.fullmatch(text):
         return Block(
             tuple(

@@ -15,6 +15,8 @@ from gcodejerk.verification.second_reading.sorting import Sorted
 
 SELECTIONS: frozenset[Effect] = frozenset(("system", "numbered system"))
 QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
+STATEMENTS: frozenset[Effect] = frozenset(("home", "cycle", "label"))
+"""Effects of statements of Klartext."""
 _CALLS = (47, 96, 97, 98, 198)
 _ENDS = (2, 17, 30, 99)
 _OUTPUTS = (*range(62, 69), *range(100, 200))
@@ -61,6 +63,36 @@ class Codes(Known):
         for letter, number in words:
             after[AXES.index(letter)] += number * self.scale(letter)
         self.g92 = self.rename(self.g92, after)
+        return Observation()
+
+    def is_statement(self, line: Line) -> bool:
+        """Whether a line is a statement of Klartext that is no straight line."""
+        stated = bool(line.effects) and STATEMENTS.issuperset(line.effects)
+        return stated and self.dialect.text.klartext
+
+    def statement(self, line: Line) -> Observation:
+        """A statement of Klartext that is no straight line: what it moves and forgets."""
+        unit, feed_unit = self.unit, self.feed_unit
+        if "label" in line.effects:
+            self.forget()
+            self.unit, self.feed_unit = unit, feed_unit
+            return Observation()
+        self.lose()
+        self.g["motion"] = None
+        for letter, number, _ in line.words:
+            if letter == "F":
+                self.feed = number
+            elif letter == "G" and 40 <= number <= 42:
+                self.g["compensation"] = round(number * 10.0)
+            elif letter == "T":
+                self.tool = [NAN] * len(AXES)
+            elif letter == "M" and number in (3, 4, 5, 13, 14):
+                self.spindle = None
+            elif letter == "M":
+                self.stray()
+                self.bar_for_good(sure=False)
+        if "cycle" in line.effects:
+            self.feed = NAN
         return Observation()
 
     def turning(self, effect: Effect) -> None:

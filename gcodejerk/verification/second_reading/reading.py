@@ -20,6 +20,7 @@ from typing import BinaryIO
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
+from gcodejerk.verification.second_reading.klartext import read_statement
 
 PIECE = 1 << 20
 """Bytes in memory at a time."""
@@ -210,7 +211,12 @@ class Text:
             No block stands in front of it.
         """
         rules, line = self.dialect.text, Line(blank=not text.strip())
-        runs_python = self.python is not None and self.python.search(text)
+        if rules.klartext:
+            said = read_statement(text, self.dialect)
+            line.words, line.relative, line.deleted = said.words, said.relative, said.deleted
+            line.effects, line.understood = said.effects, said.understood
+            return line
+        runs_python = self.python is not None and self.python.search(text) is not None
         runs_python = runs_python or (rules.live_comments and _runs(text))
         if len(text) > rules.line_limit or runs_python:
             line.understood = False

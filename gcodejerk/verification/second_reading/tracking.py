@@ -142,6 +142,8 @@ class Tracker(Drilling):
             for effect in line.effects:
                 self.write(effect, line)
             return Observation()
+        if line.understood and self.is_statement(line):
+            return self.statement(line)
         here, modes = list(self.at), self._in_force()
         if self.drill_by_name(line):
             return Observation("it calls a cycle", start=here, modes=modes)
