@@ -17,6 +17,7 @@ from gcodejerk.nc import Program, Start, find_dialect
 from gcodejerk.nc.interpreter.modal import MODES
 from gcodejerk.nc.program import follow, open_reader
 from gcodejerk.nc.text.chunks import read_chunks
+from gcodejerk.testing.klartext import klartext_programs
 from gcodejerk.testing.vocabulary import VOCABULARIES, draw_lines
 
 Draw = st.DrawFn
@@ -200,6 +201,8 @@ def programs(draw: Draw, dialect: str = "linuxcnc") -> bytes:
     >>> isinstance(programs(), st.SearchStrategy)
     True
     """
+    if dialect == "klartext":
+        return draw(klartext_programs())
     newline = draw(st.sampled_from([b"\n", b"\n", b"\r\n"]))
     if dialect == "linuxcnc":
         lines = _linuxcnc_lines(draw)
@@ -208,7 +211,7 @@ def programs(draw: Draw, dialect: str = "linuxcnc") -> bytes:
     else:
         raise ProgramError(
             f"no programs are drawn for '{dialect}'",
-            f"choose one of: linuxcnc, {', '.join(VOCABULARIES)}",
+            f"choose one of: linuxcnc, klartext, {', '.join(VOCABULARIES)}",
         )
     return newline.join(lines) + (newline if draw(st.booleans()) else b"")
 

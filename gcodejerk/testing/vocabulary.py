@@ -72,6 +72,42 @@ _PRINTER_MODES = (
     *("M400", "G1 F900", "G20", "G21", "M204 P500", "M3 S9", "M5", "M0", "G92", "G0Y0X10"),
 )
 
+_PC_HEAD = ("G21 G90 G17 G94 G64", "G0 X0 Y0 Z5 F200")
+_PC_MODES = (
+    *("G90", "G91", "G54", "G55", "G94", "G17", "G18", "G4 P1", "M9", "G20", "G21", "F90", "G64"),
+    *("G28", "G53 G0 Z0", "G92 X0", "G92.1", "G43 H1", "G49", "G69", "G50", "M3 S90", "M5", "M1"),
+    *("G2 X5 Y5 R20 F60", "/G1 X5 F90", "G52 X1", "G10 L2 P1 X0", "T1 M6", "G41 D1", "G40", "H2"),
+    *("G0 X5 G4 P1", "G54 P2", "G4 X2"),
+)
+_PC_UNKNOWN = ("G68.2", "M98 P5", "#1=5", "G1 X#1", "M62 P1", "gosub part", "endif", "(expr, a=1)")
+"""Behind one of these nothing is rewritten where a table is known in part."""
+_LIKE_FANUC_MODES = tuple(
+    line
+    for line in _FANUC_MODES
+    if line not in ("M10", "M198 P5", "M96 P5", "G10 L50", "#3006=1", "G68 X0. Y0. R30.")
+)
+
+
+def _of_a_pc(*more: str) -> Vocabulary:
+    """Words of a control on a PC that is known in part."""
+    return Vocabulary(
+        _PC_HEAD, (*_PC_MODES, *_PC_MODES, *_PC_UNKNOWN, *more), (*_ROUND, "; X99"), "M30",
+        drills=True,
+    )  # fmt: skip
+
+
+def _like_fanuc(*more: str) -> Vocabulary:
+    """Words of a relative of Fanuc that is known in part."""
+    return Vocabulary(
+        ("O1234 (part)", "G21 G17 G40 G49 G80 G90 G94 G64", "G0 X0. Y0. Z5. F200."),
+        (*_LIKE_FANUC_MODES, "G12.1", "M10", "G61.1", *more),
+        _ROUND,
+        "M30",
+        point=True,
+        drills=True,
+    )
+
+
 VOCABULARIES: dict[str, Vocabulary] = {
     "fanuc": Vocabulary(
         ("O1234 (part)", "G21 G17 G40 G49 G80 G90 G94 G64", "G0 X0. Y0. Z5. F200."),
@@ -184,6 +220,38 @@ VOCABULARIES: dict[str, Vocabulary] = {
         (*_ROUND, "; X99", "// X99"),
         "M30",
         drills=True,
+    ),
+    "centroid": Vocabulary(
+        _PC_HEAD,
+        (
+            *_PC_MODES,
+            *("G44 H2", "G43.4 H1", "G61", "G9 X5", "G29", "G30 Z1", "G22", "G10 P81 R15", "M25"),
+            *("M94/3", "M1004", "G117 P5", "gosub part", "G68 X0 Y0 R30", "G51 X0 I2"),
+        ),
+        (*_ROUND, "; X99"),
+        "M99",
+        drills=True,
+    ),
+    "uccnc": _of_a_pc("M10 Q5"),
+    "edingcnc": _of_a_pc("M54 P1", "if [#1>0]"),
+    "planetcnc": _of_a_pc("(print, G0 X5)"),
+    "masso": _of_a_pc("M10"),
+    "mitsubishi": _like_fanuc("G5 P2"),
+    "mazatrol-eia": _like_fanuc("M91"),
+    "syntec": _like_fanuc("G70", "G71"),
+    "duet": Vocabulary(
+        ("M453", "G90 G94 G17", "G21", "G0 X0 Y0 Z5", "G1 F200"),
+        (
+            *("G90", "G91", "G92 X0", "G28 X", "G28", "G4 P10", "T0", "M400", "G1 F900", "G20"),
+            *("G21", "M3 S900", "M5", "M0", "G92", "G54", "G59.1", "G53 G0 Z1", "G17 G21 G90"),
+            *("G0 X5 G91", "X7 Y3", "G0 X4 F600", "G1 H2 X3", "G1 R1 X3", "G2 X5 Y5 R20 F60"),
+            *("G10 L2 P1 X0", "G68 A0 B0 R20", "G69", "M98 P1", "G38.2 Z-5", "; M3", "G93", "G94"),
+            *("if var.a > 1", "  G0 X9", 'M291 P"jog"', "M121", "G91 G1 X2 F90"),
+        ),
+        (*_ROUND, "; X99 G91"),
+        "M0",
+        stated=True,
+        beside=("",),
     ),
     "marlin": Vocabulary(
         ("G21", "G90", "G0 F3000 X0 Y0 Z5"),

@@ -29,7 +29,11 @@ SETTINGS = settings(
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
     suppress_health_check=list(HealthCheck),
 )
-DIALECTS = ["linuxcnc", *sorted(VOCABULARIES)]
+SPELLED_ALIKE = {
+    *("uccnc", "edingcnc", "planetcnc", "masso", "mitsubishi", "mazatrol-eia", "syntec"),
+}
+"""Their streams are spelled as those of rs274 and iso-mill."""
+DIALECTS = ["linuxcnc", *sorted(VOCABULARIES.keys() - SPELLED_ALIKE)]
 POINT = re.compile(rb"G1 .*F[0-9.]+")
 ZEROS = b"0" * 240
 STANDSTILL = rb"((?:G4 [PF]|M400)[^\r\n]*\r?\n)"
@@ -489,6 +493,8 @@ def missed(dialect, program, pick, stride=1):
     """Kinds of damage to a processed program that nobody notices; None if it has no room for it."""
     # The form of LinuxCNC's own streams has damages of its own.
     own = {"linuxcnc": "mach", "rs274": "mach", "iso-mill": "haas"}
+    own |= dict.fromkeys(("centroid", "uccnc", "edingcnc", "planetcnc", "masso", "duet"), "mach")
+    own |= dict.fromkeys(("mitsubishi", "mazatrol-eia", "syntec"), "fanuc")
     machine, controller = machine_for(dialect), own.get(dialect, dialect.split("-")[0])
     output = process(program, machine, verify=False, controller=controller, dialect=dialect).output
     text = Damaged(program, output, dialect)

@@ -13,6 +13,7 @@ from gcodejerk.errors import ProgramError
 from gcodejerk.nc.dialects.centroid import CENTROID
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.duet import DUET
+from gcodejerk.nc.dialects.fagor import FAGOR
 from gcodejerk.nc.dialects.fanuc import FANUC, FANUC_LATHE_A, FANUC_LATHE_B
 from gcodejerk.nc.dialects.fanuc_relatives import MAZATROL_EIA, MITSUBISHI, SYNTEC
 from gcodejerk.nc.dialects.grbl import GRBL
@@ -24,6 +25,7 @@ from gcodejerk.nc.dialects.klipper import KLIPPER
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 from gcodejerk.nc.dialects.mach import MACH
 from gcodejerk.nc.dialects.marlin import MARLIN
+from gcodejerk.nc.dialects.okuma import OKUMA
 from gcodejerk.nc.dialects.pc_controls import EDINGCNC, MASSO, PLANETCNC, UCCNC
 from gcodejerk.nc.dialects.rs274 import RS274
 from gcodejerk.nc.dialects.siemens import SIEMENS
@@ -38,7 +40,7 @@ DIALECTS: dict[str, Dialect] = {
         *(LINUXCNC, FANUC, FANUC_LATHE_A, FANUC_LATHE_B, HAAS, SIEMENS, HEIDENHAIN_ISO),
         *(GRBL, MACH, MARLIN, KLIPPER, RS274, ISO_MILL),
         *(DUET, CENTROID, UCCNC, EDINGCNC, PLANETCNC, MASSO, MITSUBISHI, MAZATROL_EIA, SYNTEC),
-        KLARTEXT,
+        *(OKUMA, FAGOR, KLARTEXT),
     )
 }
 """Ours, by name."""

@@ -57,6 +57,8 @@ _IN_COMMENTS = (
     ("mitsubishi", rb"\bmeldas\b|\bmitsubishi (?:cnc|control|m[678][0-9])"),
     ("mazatrol-eia", rb"\bmazatrol\b|\bmazak\b"),
     ("syntec", rb"\bsyntec\b"),
+    ("okuma", rb"\bokuma\b|\bosp-?[eptu]?[0-9]"),
+    ("fagor", rb"\bfagor\b"),
     ("marlin", rb"\bmarlin"),
     ("klipper", rb"\bklipper\b"),
 )
@@ -86,6 +88,7 @@ CODE = (
     _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
     # increments U and W, which system A alone has, in a block that no mill has
     _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
+    _code("okuma", rb"(?<![A-Z_])G1[56]\s*H\d", "G15 H, a work system of Okuma's"),
     _code("duet", rb"^\s*M453\b", "M453, CNC mode of RepRapFirmware"),
     _code("grbl", rb"^\s*\$([$#GINXHC]\s*$|N\d*=|J=|\d+=)", "a $ command of grbl"),
     *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
@@ -93,7 +96,7 @@ CODE = (
     _code("klipper", rb"^\s*(SET_VELOCITY_LIMIT|SET_PRESSURE_ADVANCE|SET_INPUT_SHAPER|BED_MESH_\w+"
           rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
 )  # fmt: skip
-_LIKE_FANUC = frozenset({"fanuc", "haas", "mitsubishi", "mazatrol-eia", "syntec"})
+_LIKE_FANUC = frozenset({"fanuc", "haas", "mitsubishi", "mazatrol-eia", "syntec", "okuma", "fagor"})
 _INCREMENTS = _in_line(rb"(?<![A-Z_#\[])[UW]\s*[-+]?[.\d]")
 LATHE = (
     (_in_line(rb"(?<![A-Z_])T\d{4}(?!\d)"), "a tool with its offset, T0101"),

@@ -359,6 +359,8 @@ class Dialect:
     """M6 runs a program of the owner's, as `other_m` "positions" says of others."""
     apart: frozenset[str] = frozenset()
     """Axes that a rapid may move before the others, or behind them."""
+    feed_lost: bool = False
+    """An F beside G0 is ignored, so that a stream has nothing to restore F with."""
     in_turn: frozenset[int] = frozenset()
     """G codes behind which another command may stand, where `one_command` holds."""
 

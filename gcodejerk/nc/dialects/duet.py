@@ -9,7 +9,8 @@ src/GCodes/GCodes2.cpp (HandleGcode, HandleMcode). What is different from Marlin
 - G0 to G3 stay in force for lines of axis words alone, but every other command in between ends
   that, a comment on a line of its own too: such lines are left alone here.
 - In CNC mode G0 runs as fast as the axes can, and an F beside it is ignored; as a printer (M451) it
-  runs at F like G1. A block of G0 with an F is left alone, since the mode may be another.
+  runs at F like G1. A block of G0 with an F is left alone, since the mode may be another; and so
+  is a rapid behind which a feed move relies on the F before, which no G0 could restore.
 - ``( )`` is a comment in CNC mode alone; one that does not close ends with its line.
 - ``if``, ``while``, ``var`` and their kin in small letters are commands, whose blocks are told by
   their indentation: behind one, nothing is rewritten any more.
@@ -105,6 +106,7 @@ DUET = Dialect(
     transforms={680: ("rotation", True), 690: ("rotation", False)},
     modal_motion=False,
     one_command=True,
+    feed_lost=True,
     in_turn=_MODES,
     dark_rapids=True,
     incremental_set=True,

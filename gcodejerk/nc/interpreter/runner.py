@@ -160,7 +160,7 @@ class Runner:
         row.start, row.target = step.start, step.end
         row.turned, row.words = step.turned, step.words
         row.beam, row.fed = step.beam, step.fed
-        row.feed, row.speed = state.feed, speed
+        row.feed, row.speed = NAN if self.dialect.feed_lost else state.feed, speed
         if visit:
             self.log.visit(line.number, reason, row)
         else:

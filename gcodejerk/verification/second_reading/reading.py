@@ -261,7 +261,7 @@ class Text:
         elif rules.hexadecimal and _HEXADECIMAL.search(text):
             line.understood = False
         elif rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
-            line.effects.append("written")
+            line.effects += [e for e in (self.dialect.names["$"],) if e != "none"]
         else:
             return False
         return True

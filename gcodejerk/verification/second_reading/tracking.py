@@ -291,13 +291,12 @@ class Tracker(Drilling):
 
     def _in_force(self) -> dict[str, Any]:
         distance = self.g.get("distance")
-        feed_mode = self.feed_mode
         return {
             "unit": self.unit,
             "speed": self.feed * (self.unit or NAN) / SECONDS_PER_MINUTE,
             "incremental": None if distance is None else distance == G91,
             "diameter": self.diameter,
-            "feed mode": feed_mode,
+            "feed mode": self.feed_mode,
             "F": self.feed,
             "F without a point": self.feed_whole if self.feed == self.feed else None,
             "plane": self.g.get("plane"),
