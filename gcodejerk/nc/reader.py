@@ -30,7 +30,9 @@ from gcodejerk.nc.text.words import Lines
 from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.start import Start
 
-_FILE_NAME = re.compile(rb"[ \t]*[A-Za-z_][\w-]*\.[A-Za-z]{1,5}[ \t]*(?:\([^()]*\)[ \t]*)?")
+_FILE_NAME = re.compile(
+    rb"[ \t]*(?:\$[\w-]*|[A-Za-z_][\w-]*)\.[A-Za-z]{1,5}%?[ \t]*(?:\([^()]*\)[ \t]*)?"
+)
 
 
 class Reader:

@@ -11,14 +11,13 @@ from pathlib import Path
 import pytest
 
 from gcodejerk import Machine, process, verify
-from gcodejerk.errors import ProgramError
 from gcodejerk.reasons import CERTAIN, REASONS
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 TABLE = Path(__file__).with_name("table.md")
 POSTS = {
     **{name: name for name in ("linuxcnc", "fanuc", "grbl", "marlin")},
-    **dict.fromkeys(("mach3_mach4", "uccnc", "centroid"), "mach"),
+    **{"mach3_mach4": "mach", "uccnc": "uccnc", "centroid": "centroid"},
 }
 """Post-processor of FreeCAD -> dialect."""
 CORPUS = {
@@ -27,7 +26,7 @@ CORPUS = {
     "gEdit__f": "fanuc",
     "gEdit__l01": "fanuc-lathe-a",
     "gEdit__s04": "siemens",
-    "gEdit__h01": "heidenhain-iso",
+    "gEdit__h01": "klartext",
     "gcode-rs__mach3": "mach",
     "gcode-rs__reprap": "marlin",
     "cncjs__": "grbl",
@@ -35,13 +34,16 @@ CORPUS = {
 """Beginning of a file's name -> dialect; the first that fits."""
 SPINDLE = {"cncjs__jsdc-laser.gcode": "laser", "gcode-rs__mach3_plasma.gcode": "plasma"}
 """What M3 starts, where it is no spindle."""
-KLARTEXT = {"gEdit__h01-3tools.h"}
-"""Programs that are none of the dialect's, and are refused as such."""
+CONTROLLER = {
+    **{"heidenhain-iso": "csv", "klartext": "csv", "uccnc": "mach", "centroid": "mach"},
+}
+"""Dialect -> what writes its streams, where no controller has its name."""
 STARTUP = {
     "fanuc": "G90 G17 G21 G94",
     "fanuc-lathe-a": "G99 G21",
     "siemens": "G90 G71",
     "heidenhain-iso": "",
+    "klartext": "",
     "marlin": "",
 }
 """Codes in force when a program starts, as the machine of such a shop would be set up."""
@@ -84,22 +86,18 @@ def machine_for(dialect, name):
     """A machine of the kind that reads a dialect, as the shop would describe it."""
     turns = "lathe" in dialect or dialect == "siemens"
     startup = STARTUP.get(dialect, "G90 G17 G21")
-    burns = dialect in ("grbl", "mach", "marlin")
+    burns = dialect in ("grbl", "mach", "marlin", "uccnc", "centroid")
     spindle = f"spindle: {SPINDLE.get(name, 'mill')}" if burns else ""
     described = Machine.loads(
         MACHINE.format(diameter=str(turns).lower(), startup=startup, spindle=spindle)
     )
-    controller = "csv" if dialect == "heidenhain-iso" else dialect.split("-")[0]
+    controller = CONTROLLER.get(dialect, dialect.split("-")[0])
     return replace(described, controller=controller, dialect=dialect)
 
 
 def row_of(path, dialect):
     """Process, verify what came out by the files alone, and sum up."""
     machine, data = machine_for(dialect, path.name), path.read_bytes()
-    if path.name in KLARTEXT:
-        with pytest.raises(ProgramError) as refusal:
-            process(data, machine, name=path.name)
-        return f"| {path.name} | {dialect} |  |  | refused: {refusal.value.problem} |"
     # A table is verified by what has written it, all else here, from the two files.
     table = machine.controller == "csv"
     result = process(data, machine, name=path.name, verify=table)

@@ -34,7 +34,7 @@ def start_of(dialect, known=True):
         tool_lengths={1: 12.5},
         decimal_point="calculator",
         diameter="lathe" in dialect,
-        startup=("G71" if dialect == "siemens" else "G21") if known else "",
+        startup={"siemens": "G71", "klartext": ""}.get(dialect, "G21") if known else "",
         wraps={"A": "none", "B": "shortest", "C": "sign"} if known else {},
         spindle="mill" if known else None,
     )
@@ -52,7 +52,7 @@ def judge(data, dialect, start, rapids, rows=None):
     return found.violations, confirmed
 
 
-@pytest.mark.parametrize("dialect", WRITTEN)
+@pytest.mark.parametrize("dialect", [*WRITTEN, "klartext"])
 @CALM
 @given(st.data(), st.booleans())
 def test_the_second_reading_agrees_with_the_first(dialect, data, known):
@@ -282,14 +282,15 @@ SHARED = TESTS.parents[1] / "shared"
 REAL = {
     **{"hosts/nc/*__fanuc*": "fanuc", "hosts/nc/*__grbl*": "grbl", "hosts/nc/*__marlin*": "marlin"},
     **{"hosts/nc/*__linuxcnc*": "linuxcnc", "hosts/nc/*__mach3*": "mach"},
-    **{"hosts/nc/*__uccnc*": "mach", "hosts/nc/*__centroid*": "mach", "corpus/cncjs*": "grbl"},
+    **{"hosts/nc/*__uccnc*": "uccnc", "hosts/nc/*__centroid*": "centroid"},
+    **{"corpus/cncjs*": "grbl", "corpus/gEdit__h*": "klartext"},
     **{"corpus/easy_gcode_plot__[!T]*": "fanuc", "corpus/easy_gcode_plot__TEST_G*": "fanuc"},
     **{"corpus/*TEST_TURN*": "fanuc-lathe-a", "corpus/*mach3*": "mach"},
     **{"corpus/*reprap*": "marlin", "corpus/gEdit__f*": "fanuc", "corpus/*.MPF": "siemens"},
 }
 STARTUP = {
     **{"fanuc": "G90 G17 G21 G94", "fanuc-lathe-a": "G21 G99", "siemens": "G90 G71"},
-    **{"mach": "G90 G17 G21", "grbl": "G90 G17 G21"},
+    **dict.fromkeys(("mach", "grbl", "uccnc", "centroid"), "G90 G17 G21"),
 }
 """What shops of these files have set at their controls, and their programs do not say."""
 NONE_CERTAIN = ("corpus/*reprap*", "corpus/gEdit__f*", "corpus/*.MPF")

@@ -116,8 +116,8 @@ def test_every_table_is_accepted(part, machine, data):
 
 COMMON = {
     **{"rs274": ["linuxcnc", "grbl", "mach"], "iso-mill": ["fanuc", "haas"]},
-    **dict.fromkeys(("centroid", "uccnc", "edingcnc", "planetcnc", "masso"), ["mach"]),
-    **dict.fromkeys(("mitsubishi", "mazatrol-eia", "syntec"), ["fanuc"]),
+    **{name: ["mach"] for name in ("centroid", "uccnc", "edingcnc", "planetcnc", "masso")},
+    **{name: ["fanuc"] for name in ("mitsubishi", "mazatrol-eia", "syntec")},
     "duet": ["marlin", "mach"],
 }
 """Controllers that may read a dialect which is no control's own, or of a control without one."""

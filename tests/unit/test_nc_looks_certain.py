@@ -481,6 +481,8 @@ def test_klartext_is_refused_whatever_dialect_is_stated():
     klartext = b"0 BEGIN PGM PART MM\n1 TOOL CALL 1 Z S2000\n2 L X+10 FMAX\n3 END PGM PART MM\n"
     with pytest.raises(ProgramError, match="Klartext"):
         read_program(io.BytesIO(klartext), dialect="heidenhain-iso")
+    with pytest.raises(ProgramError, match="no line BEGIN PGM"):
+        read_program(io.BytesIO(b"G0 X1\n"), dialect="klartext")
 
 
 def test_every_reader_begins_in_a_state_without_a_unit():

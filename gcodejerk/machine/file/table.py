@@ -56,6 +56,7 @@ DIALECT_OF_CONTROLLER = {
     "fluidnc": "grbl",
     "g2core": "grbl",
     "kflop": "mach",
+    "fagor": "fagor",
     **dict.fromkeys(("acs", "csp", "elmo", "galil", "json", "pmac", "ros2"), "linuxcnc"),
     "fanuc15": "fanuc",
 }

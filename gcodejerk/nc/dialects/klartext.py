@@ -25,8 +25,6 @@ from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, grouped
 
-JUMP = "JUMP"
-"""Name of what may be come to from elsewhere, or goes elsewhere, within the program."""
 _DEFINITIONS = (14, 20, 21, 22, 23, 24, 25, 27, 32, *range(200, 216), 240, 241, *range(251, 258))
 """Numbers of cycles that do nothing until they are called; 32 is a tolerance."""
 _DATUMS = (7, 247)
@@ -40,13 +38,9 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys(("TOOL CALL", "CYCL CALL", "RND", "CHF"), "cycle"),
     "M91": "machine",
     # approaches and free contours begin and end cutter compensation by themselves
-    JUMP: "label",
+    **dict.fromkeys(("LBL", "APPR", "DEP", "FL", "FLT", "FC", "FCT", "FPOL"), "label"),
+    **dict.fromkeys((f"FN {n}" for n in (9, 10, 11, 12)), "label"),
 }
-JUMPS = frozenset(
-    ("LBL", "APPR", "DEP", "FL", "FLT", "FC", "FCT", "FPOL", *(f"FN {n}" for n in (9, 10, 11, 12)))
-)
-"""Statements that are read as `JUMP`."""
-
 KLARTEXT = Dialect(
     name="klartext",
     title="Heidenhain Klartext",

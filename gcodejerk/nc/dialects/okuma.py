@@ -35,6 +35,7 @@ OKUMA = Dialect(
         delete="numbered",
         o_word="program",
         percent="lone",
+        leader=True,  # $PART.MIN% in front of a program
         names=True,
         variables="none",
         blanks="between",
@@ -64,7 +65,6 @@ OKUMA = Dialect(
     ),
     defaults={"compensation": 400},
     effects=_EFFECTS,
-    names={"$": "none"},  # $PART.MIN% in front of a program
     feed_modes={940: 94, 950: 95},
     whole_numbers="machine",
     tool_frame=frozenset("TH"),

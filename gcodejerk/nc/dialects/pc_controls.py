@@ -79,6 +79,7 @@ def _read_in_part(name: str, title: str, *sources: str, apart: str = "") -> Dial
                 "non-modal": (100, 280, 300, 520, 530, 920, 921),
             }
         ),
+        uses={},
         defaults={"plane": 170, "compensation": 400, "system": 540},
         effects=_EFFECTS,
         feed_modes={940: 94},

@@ -12,7 +12,6 @@ from __future__ import annotations
 import re
 
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.dialects.klartext import JUMP, JUMPS
 from gcodejerk.nc.text.block import Block, Name, Word
 
 _HEAD = re.compile(rb"[ \t]*(/[ \t]*)?(?:([0-9]+)(?:[ \t]+|$))?(/[ \t]*)?")
@@ -193,7 +192,7 @@ class _Line:
         if feed is not None and not feed[1]:
             begin = self.at + feed.start()
             self._word("F", _number(feed[2]), begin, self.at + feed.end())
-        self.names.append(Name(JUMP if name in JUMPS else name, rest))
+        self.names.append(Name(name, rest))
 
     def _blank(self, end: int) -> bool:
         """Pass over blanks; whether something follows."""

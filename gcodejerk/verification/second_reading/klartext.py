@@ -10,7 +10,6 @@ import math
 import re
 
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
-from gcodejerk.nc.dialects.klartext import JUMP, JUMPS
 
 _FRONT = re.compile(r"\s*(?P<skip>/)?\s*(?P<number>\d+)?(?P<late>\s*/)?(?:\s+|$)?(?P<rest>.*)")
 _CYCLE = re.compile(r"CYCL\s+DEF\s+(\d+)(?:\.\d+)?(?!\d)")
@@ -144,7 +143,7 @@ def _named(found: Statement, said: str, dialect: Dialect, *, goes_on: bool) -> S
 
 def _other(found: Statement, name: str, said: str, dialect: Dialect) -> None:
     """What the table has by its name; anything else is of flow."""
-    effect = dialect.names.get(JUMP if name in JUMPS else name, "flow")
+    effect = dialect.names.get(name, "flow")
     if name == "TOOL CALL":
         found.put("T", math.nan)
     else:

@@ -44,7 +44,7 @@ _DEF = re.compile(
 )
 _DECLARED = re.compile(rb"(?:^|,)[ \t]*([A-Z_][A-Z_][A-Z0-9_]*)")
 _O_WORD = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?[O:][ \t]*(<[^<>]*>|[0-9]+)[ \t]*([A-Z0-9]*)")
-_FILE_NAME = re.compile(rb"[A-Z_][\w-]*\.[A-Z]{1,5}")
+_FILE_NAME = re.compile(rb"(?:\$[\w-]*|[A-Z_][\w-]*)\.[A-Z]{1,5}%?")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*$")
 _NAME = re.compile(rb"([A-Z_][A-Z_][A-Z0-9_]*)([ \t]*\((?:[^()\"]|\"[^\"]*\")*\))?")
 _PARAMETER = re.compile(rb"R[0-9]+[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;]*")
@@ -261,7 +261,7 @@ class Text:
         elif rules.hexadecimal and _HEXADECIMAL.search(text):
             line.understood = False
         elif rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
-            line.effects += [e for e in (self.dialect.names["$"],) if e != "none"]
+            line.effects.append("written")
         else:
             return False
         return True
