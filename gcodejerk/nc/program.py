@@ -18,7 +18,7 @@ from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
 from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.flow.outline import find_outline, read_body, refers, seekable
+from gcodejerk.nc.flow.outline import find_outline, may_go_back, read_body, refers, seekable
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.following_reader import FollowingReader, worth_following
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -173,6 +173,10 @@ def open_reader(
             f"choose the dialect of the lathe's control: {', '.join(lathe_dialects())}",
             Place(name),
         )
+    returns = False
+    if chosen.unknown_lasts:
+        file = seekable(file)
+        returns = may_go_back(file, chosen, name)
     if not refers(chosen):
         reader = Reader(name, chosen, start)
     else:
@@ -188,6 +192,11 @@ def open_reader(
         else:
             reader = Reader(name, chosen, start)
             reader.refer(calls(reader.runner))
+    if returns:
+        state = reader.runner.state
+        state.put("bars", {**state.bars, "unknown code": True})
+        message = "a word of flow (GOTO, IF and their kin), which is not followed in this dialect"
+        reader.runner.syntax_problems.append(Finding(None, message))
     if why:
         reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
     if chosen.note:

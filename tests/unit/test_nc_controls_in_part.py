@@ -104,9 +104,17 @@ def test_a_dwell_beside_axis_words_is_not_guessed_at(dialect):
 
 def test_a_branch_without_an_o_word_may_not_run():
     program = b"G0 X5\nif [#1 > 0]\nG91\nendif\nG0 X9\nG0 X10\n"
-    first, *behind = reasons(program, "edingcnc")
-    assert first is None
-    assert None not in behind
+    assert None not in reasons(program, "edingcnc")
+
+
+@pytest.mark.parametrize(
+    "dialect", ["centroid", "uccnc", "edingcnc", "planetcnc", "masso", "okuma"]
+)
+def test_a_jump_may_lead_back_to_lines_in_front_of_it(dialect):
+    program = b"G0 X5.\nN10 G0 X7.\nG1 X9. F90.\nG91\n%s\n"
+    assert None not in reasons(program % b"IF [#1 LT 5] GOTO 10", dialect)
+    assert None not in reasons(program % b"GOTO 10", dialect)
+    assert reasons(program % b"(GOTO 10, for ever)", dialect) == [None, None]
 
 
 def test_a_comment_of_planetcnc_may_be_a_command():
@@ -169,7 +177,7 @@ def test_units_of_syntec_have_two_names():
 def test_work_systems_of_okuma_are_no_tool_lengths_of_others():
     program = b"G0 X5. Z5.\nG15 H2\nG0 X7.\nG0 X8.\nG56 H1\nG0 X9.\n"
     assert reasons(program, "okuma") == [None, START_UNKNOWN, None, START_UNKNOWN]
-    for line in (b"VC1=5", b"G62 X1", b"G11 X5.", b"CALL O100", b"IF [VC1 EQ 5] NLAB"):
+    for line in (b"VC1=5", b"G62 X1", b"G11 X5.", b"MODIN O100"):
         first, *behind = reasons(b"G0 X5.\n%s\nG40 G21 G90 G0 X7.\nX8.\n" % line, "okuma")
         assert first is None
         assert None not in behind, line
@@ -181,7 +189,8 @@ def test_the_file_name_of_okuma_is_no_block():
 
 
 def test_statements_of_fagor_in_parentheses_are_no_comments():
-    assert reasons(b"G0 X5\n(GOTO N10)\nG0 X7\n", "fagor") == [None, NOT_UNDERSTOOD]
+    assert None not in reasons(b"G0 X5\n(GOTO N10)\nG0 X7\n", "fagor")
+    assert reasons(b"G0 X5\n(P1 = 5)\nG0 X7\n", "fagor") == [None, NOT_UNDERSTOOD]
     assert reasons(b"G0 X5\n;GOTO N10\nG0 X7\n", "fagor") == [None, None]
     assert reasons(b"G0 X5\nG0 X7I\nG0 X9\n", "fagor") == [None, NOT_UNDERSTOOD, NOT_UNDERSTOOD]
 

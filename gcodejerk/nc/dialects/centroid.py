@@ -73,11 +73,13 @@ CENTROID = Dialect(
             "spindle": (3, 4, 5),
             "coolant": (7, 8, 9),
             # files and outputs; M94/16 and M95/16 have a slash that is not read here
+            "clamp": (10, 11),
+            "user": (25,),  # Z goes home
             "silent": (107, 108, 109, 127, *range(1000, 1016)),
         }
     ),
-    # G0, G17, G64, G90 and G94 stand at the start by a configuration; G40, G49 and G80 need none.
-    defaults={"compensation": 400, "retract": 980},
+    # "G17 is the default plane", G98 the default; G93 lasts until G94 cancels it.
+    defaults={"plane": 170, "feed mode": 940, "compensation": 400, "retract": 980},
     effects={
         **dict.fromkeys((280, 290, 300), "home"),
         **dict.fromkeys(SYSTEMS, "system"),

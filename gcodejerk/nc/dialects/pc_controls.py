@@ -80,7 +80,7 @@ def _read_in_part(name: str, title: str, *sources: str, apart: str = "") -> Dial
             }
         ),
         uses={},
-        defaults={"plane": 170, "compensation": 400, "system": 540},
+        defaults={"plane": 170, "feed mode": 940, "compensation": 400, "system": 540},
         effects=_EFFECTS,
         feed_modes={940: 94},
         drilling=Drilling(CYCLES, CYCLES, missing="unknown"),

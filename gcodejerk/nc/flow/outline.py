@@ -27,6 +27,11 @@ MOST_NUMBERS = 100_000
 _SPOOLED = 1 << 23
 _CANDIDATES = re.compile(rb"GOTO|M[ \t]*0*(?:9[6-9]|47|2|30)(?![0-9])|REPEAT|CASE")
 _REFERS = re.compile(rb"GOTO|REPEAT|CASE|M[ \t]*0*9[69]")
+_FLOW = re.compile(
+    rb"(?<![A-Z0-9_])(?:GOTO|IF|WHILE|REPEAT|RPT|LOOP|FOR|CASE|UNTIL|GOSUB|CALL)(?![A-Z_])", re.I
+)
+_REMARK = re.compile(rb";[^\n]*")
+_COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 _G_CODE = re.compile(rb"[gG][ \t]*([0-9]+(?:\.[0-9]*)?)")
 _O_LINE = re.compile(
     rb"^[ \t]*(?:/[0-9]?[ \t]*)?(?:N[ \t]*[0-9]+[ \t]*)?[O:][ \t]*([0-9]+)", re.MULTILINE | re.I
@@ -80,6 +85,25 @@ def seekable(file: BinaryIO) -> BinaryIO:
     shutil.copyfileobj(file, copy)
     copy.seek(0)
     return copy  # type: ignore[return-value]
+
+
+def may_go_back(file: BinaryIO, dialect: Dialect, name: str) -> bool:
+    """Whether a program in a language that is known in part may come to a line twice.
+
+    Its words of flow are not known, so any that some control has counts; comments are left out.
+    """
+    text = dialect.text
+    if not (dialect.unknown_lasts and text.names and not dialect.one_command):
+        return False
+    begin = file.tell()
+    found = False
+    for chunk in read_chunks(file, name):
+        data = _REMARK.sub(b" ", chunk.data) if text.parentheses == "code" else chunk.data
+        data = data if text.parentheses == "code" else _COMMENT.sub(b" ", data)
+        if found := _FLOW.search(data) is not None:
+            break
+    file.seek(begin)
+    return found
 
 
 def find_outline(file: BinaryIO, dialect: Dialect, name: str) -> Outline:
