@@ -1,7 +1,7 @@
-"""Mach3 and Mach4, and what follows their language (UCCNC, Centroid's mill posts).
+"""Mach3 and Mach4.
 
 Sources: NIST RS274NGC (Smithy manual p. 7), from which the language comes; programs that the posts
-of FreeCAD for Mach3/4, UCCNC and Centroid write. Mach accepts more than RS274/NGC does: G53 without
+of FreeCAD for Mach3/4 write (UCCNC and Centroid have tables of their own). Mach accepts more than RS274/NGC does: G53 without
 axes, ``;`` comments. What its cycles, scalings and subprograms do in detail was not verified, so
 nothing is taken as known behind them.
 """
@@ -16,8 +16,8 @@ CYCLES = frozenset({730, *range(810, 900, 10)})
 
 MACH = Dialect(
     name="mach",
-    title="Mach3, Mach4, UCCNC",
-    sources=("NIST RS274NGC", "FreeCAD's posts mach3_mach4, uccnc, centroid"),
+    title="Mach3, Mach4",
+    sources=("NIST RS274NGC", "FreeCAD's post mach3_mach4"),
     text=Text(
         parentheses="open comment",
         semicolon="comment",
