@@ -125,6 +125,7 @@ def test_a_comment_of_planetcnc_may_be_a_command():
 @pytest.mark.parametrize(
     ("dialect", "together"), [("centroid", "axes of the rapid move one after another"),
                               ("masso", "axes of the rapid move one after another"),
+                              ("rs274", "axes of the rapid move one after another"),
                               ("mach", None), ("uccnc", None)],
 )  # fmt: skip
 def test_centroid_moves_z_before_the_other_axes_or_behind_them(dialect, together):

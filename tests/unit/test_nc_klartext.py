@@ -82,6 +82,13 @@ def test_inches_are_said_by_the_program():
     assert end("L X+1 FMAX", unit="INCH")[0] == 25.4
 
 
+def test_codes_in_force_at_power_on_are_none_of_its_words():
+    start = replace(START, startup="G17 G21 G90")
+    data = program("L X+10 FMAX")
+    rapids = read_program(io.BytesIO(data), dialect="klartext", start=start).rapids
+    assert rapids.reason.tolist() == [CERTAIN]
+
+
 def test_fmax_holds_for_its_block_and_the_feed_before_for_the_next():
     data = program("L X+10 F300", "L X+20 FMAX", "L X+30", "L X+40 FMAX")
     rapids = read_program(io.BytesIO(data), dialect="klartext", start=START).rapids

@@ -6,7 +6,8 @@ it has what is the more cautious: a code that one of them does not know, or that
 else there (G28.1, cycles, O words, variables), is not understood, and what it might have changed is
 unknown until it is stated again; what would go unseen so (scaling, rotation, diameters, G61) is
 named; a code that grbl may refuse is run and not run; M3 may fire a laser, as it may on grbl and
-Mach.
+Mach. A program of another control on a PC may be taken for one of these: what the tables of those
+say differently of G0 holds here too (`apart`, of Centroid).
 
 `tests/unit/test_nc_common.py` draws programs of all three and holds this reading to each of theirs.
 """
@@ -89,6 +90,8 @@ RS274 = Dialect(
     refused=GRBL.refused,
     feed_before_units=True,
     dark_rapids=True,
+    # Centroid's control has programs like these, and moves Z apart; nothing may tell it from them.
+    apart=frozenset("Z"),
     beam_codes=GRBL.beam_codes,
     harmless=frozenset({0, 40, 170, 180, 190, 200, 210, 400, 900, 910, 911, 930, 940}),
     before_m=frozenset({3, 4, 5, 7, 8, 9}),

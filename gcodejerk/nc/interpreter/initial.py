@@ -23,7 +23,7 @@ def initial_state(dialect: Dialect, start: Start) -> State:
     state = State()
     _set_defaults(state, dialect)
     _set_frames(state, start)
-    if start.startup:
+    if start.startup and not dialect.text.klartext:  # which has no codes, and says its modes
         _run_startup(state, dialect, start)
     for axis, letter in enumerate(AXES):
         state.position[axis] = start.positions.get(letter, NAN)
