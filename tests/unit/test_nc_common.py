@@ -18,6 +18,11 @@ from gcodejerk.testing import programs
 COMMON = {"rs274": rs274.MEMBERS, "iso-mill": iso_mill.MEMBERS}
 PAIRS = [(name, member.name) for name, members in COMMON.items() for member in members]
 ZERO = dict.fromkeys("XYZ", 0.0)
+PAIRS += [
+    *(("uccnc", "mach"), ("masso", "linuxcnc"), ("edingcnc", "grbl"), ("centroid", "mach")),
+    *(("mitsubishi", "fanuc"), ("mazatrol-eia", "haas"), ("syntec", "fanuc")),
+]
+"""What is read in part, and relatives that it must not contradict."""
 START = Start(
     positions=ZERO,
     offsets={"G54": {"X": -100.0, "Y": -50.0, "Z": -200.0}, "G55": {"X": 10.0, "Y": 0.0}},

@@ -169,6 +169,12 @@ def test_a_computed_position_is_not_rewritten_where_macros_are_not_verified():
     assert None not in found[1:]
 
 
+def test_an_angle_of_a_line_moves_axes_that_it_does_not_name():
+    for dialect in ("mitsubishi", "mazatrol-eia", "syntec"):
+        at = end(b"G0 X5. Y5. Z5.\nG1 X9. A45. F90.\n", dialect)
+        assert all(map(math.isnan, at))
+
+
 def test_units_of_syntec_have_two_names():
     for inch, mm in ((b"G70", b"G71"), (b"G20", b"G21")):
         assert end(inch + b"\nG0 X1.\n", "syntec")[0] == 25.4

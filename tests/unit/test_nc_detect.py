@@ -47,6 +47,7 @@ SHARED = Path(__file__).resolve().parents[2].parent / "shared"
         (b"%PART\n; FAGOR 8065\nG0 X1\n", "fagor"),
         (b"; for a Duet\nM453\nG0 X1\n", "duet"),
         (b"0 BEGIN PGM PART MM\n1 L X+1 FMAX\n", "klartext"),
+        (b"BEGIN PGM PART INCH\nL X+1 FMAX\n", "klartext"),
         (b"%\nO1000\nT0101\nG50 S2500\nG0 X1.\n", "fanuc-lathe-a"),
         (b"%O1200(PART)\nG92 S500\nG97 S300 M3\nG90 G0 X1.\n", "fanuc-lathe-b"),
         (b"(made for LinuxCNC)\n(keeps compatibility with Mach3)\nG0 X1\n", "linuxcnc"),

@@ -131,7 +131,7 @@ _PC_CONTROL = (
 _SMALL_LETTERS = re.compile(rb"\([^)\n]*[a-z]{3}|;[ \t]*[^\n]*[a-z]{3}")
 _FOREIGN = _in_line(rb"[A-Z_]{2,}\d*\s*[=(]|[A-Z]=|[A-Z]{4,}|(?<![A-Z_])G65(?!\d)")
 """Words with a name, which none of LinuxCNC, grbl and Mach has."""
-_KLARTEXT = _in_line(rb"^\s*\d+\s+BEGIN\s+PGM\b", re.IGNORECASE)
+_KLARTEXT = _in_line(rb"^\s*(?:\d+\s+)?BEGIN\s+PGM\b", re.IGNORECASE)
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 
 

@@ -80,6 +80,8 @@ def _read_in_part(
         ),
         defaults={"compensation": 400},
         effects=_EFFECTS,
+        # A may be the angle of a line, from which the control computes an axis that is not named
+        letters=ISO_MILL.letters.replace("A", ""),
         units=inches,
         feed_modes={940: 94, 950: 95},
         transforms={code: ISO_MILL.transforms[code] for code in _OWN & set(ISO_MILL.transforms)},

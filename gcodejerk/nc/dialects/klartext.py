@@ -25,8 +25,25 @@ from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, grouped
 
-_DEFINITIONS = (14, 20, 21, 22, 23, 24, 25, 27, 32, *range(200, 216), 240, 241, *range(251, 258))
-"""Numbers of cycles that do nothing until they are called; 32 is a tolerance."""
+_DEFINITIONS = (
+    9,
+    13,
+    14,
+    20,
+    21,
+    22,
+    23,
+    24,
+    25,
+    27,
+    32,
+    *range(200, 216),
+    240,
+    241,
+    *range(251, 258),
+)
+"""Numbers of cycles that do nothing until they are called; 9 is a dwell, 13 turns the spindle, 32
+is a tolerance."""
 _DATUMS = (7, 247)
 NAMES: dict[str, Effect] = {
     **dict.fromkeys(("BLK FORM", "TOOL DEF", "CC", "Q", "BEGIN PGM"), "none"),

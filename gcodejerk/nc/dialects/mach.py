@@ -1,9 +1,9 @@
 """Mach3 and Mach4.
 
 Sources: NIST RS274NGC (Smithy manual p. 7), from which the language comes; programs that the posts
-of FreeCAD for Mach3/4 write (UCCNC and Centroid have tables of their own). Mach accepts more than RS274/NGC does: G53 without
-axes, ``;`` comments. What its cycles, scalings and subprograms do in detail was not verified, so
-nothing is taken as known behind them.
+of FreeCAD for Mach3/4 write (UCCNC and Centroid have tables of their own). Mach accepts more than
+RS274/NGC does: G53 without axes, ``;`` comments. What its cycles, scalings and subprograms do in
+detail was not verified, so nothing is taken as known behind them.
 """
 
 from __future__ import annotations
