@@ -123,8 +123,8 @@ COMMON = {
 """Controllers that may read a dialect which is no control's own, or of a control without one."""
 
 
-TWINS = {"edingcnc", "planetcnc", "mazatrol-eia"}
-"""Their tables are those of uccnc and mitsubishi but for the name."""
+TWINS = {"edingcnc", "planetcnc", "masso", "mazatrol-eia", "syntec"}
+"""Their tables are those of uccnc and mitsubishi but for little that no output shows."""
 
 
 @pytest.mark.parametrize("dialect", sorted(VOCABULARIES.keys() - TWINS))

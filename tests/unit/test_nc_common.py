@@ -19,8 +19,7 @@ COMMON = {"rs274": rs274.MEMBERS, "iso-mill": iso_mill.MEMBERS}
 PAIRS = [(name, member.name) for name, members in COMMON.items() for member in members]
 ZERO = dict.fromkeys("XYZ", 0.0)
 PAIRS += [
-    *(("uccnc", "mach"), ("masso", "linuxcnc"), ("edingcnc", "grbl"), ("centroid", "mach")),
-    *(("mitsubishi", "fanuc"), ("mazatrol-eia", "haas"), ("syntec", "fanuc")),
+    *(("uccnc", "linuxcnc"), ("centroid", "mach"), ("mitsubishi", "haas"), ("syntec", "fanuc")),
 ]
 """What is read in part, and relatives that it must not contradict."""
 START = Start(
