@@ -27,6 +27,7 @@ SHARED = Path(__file__).resolve().parents[2].parent / "shared"
         (b"%_N_PART_MPF\n;$PATH=/_N_MPF_DIR\nG0 X1\n", "siemens"),
         (b'N30 MSG("ROUGH")\nG0 X1\n', "siemens"),
         (b"%PART G71 *\nN10 G00 X+1*\n", "heidenhain-iso"),
+        (b"N10 G00 X+1*\nN20 G15 H30 R5*\n", "heidenhain-iso"),  # an arc around a pole
         (b"%\nO1000 (HAAS VF2)\nG0 X1.\n", "haas"),
         (b"%\nO1000\nG187 P3\nG0 X1.\n", "haas"),
         (b"%\nO1000\nG5.1 Q1\nG0 X1.\n", "fanuc"),

@@ -88,7 +88,7 @@ CODE = (
     _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
     # increments U and W, which system A alone has, in a block that no mill has
     _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
-    _code("okuma", rb"(?<![A-Z_])G1[56]\s*H\d", "G15 H, a work system of Okuma's"),
+    _code("okuma", rb"^[^*\n]*(?<![A-Z_])G1[56]\s*H\d[^*\n]*$", "G15 H, a work system of Okuma's"),
     _code("duet", rb"^\s*M453\b", "M453, CNC mode of RepRapFirmware"),
     _code("grbl", rb"^\s*\$([$#GINXHC]\s*$|N\d*=|J=|\d+=)", "a $ command of grbl"),
     *(_code(name, rb"^\s*M(82|83|104|109|140|190|106|107|205)\b", "printer codes", sure=False)
