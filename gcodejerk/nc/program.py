@@ -195,7 +195,9 @@ def open_reader(
     if returns:
         state = reader.runner.state
         state.put("bars", {**state.bars, "unknown code": True})
-        message = "it has words of flow (GOTO, IF and their kin): not followed, nothing is rewritten"
+        message = (
+            "it has words of flow (GOTO, IF and their kin): not followed, nothing is rewritten"
+        )
         reader.runner.syntax_problems.append(Finding(None, message))
     if why:
         reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))

@@ -118,6 +118,8 @@ def test_the_sample_of_another_editor_has_its_two_certain_rapids():
         (["L Z+0 FMAX M91", "L Z+9 FMAX", "L Z+8 FMAX"],
          ["coordinate frame changes in the block", START_UNKNOWN, None]),
         (["STOP", "L X+1 FMAX", "L X+2 FMAX"], [START_UNKNOWN, None]),
+        (["STOP M0", "L X+1 FMAX", "L X+2 FMAX"], [START_UNKNOWN, None]),
+        (["CYCL DEF 5.0 CIRCULAR POCKET", "CYCL DEF 5.5 F50 DR-", "L X+1 FMAX"], [None]),
         (["M30", "LBL 1", "L X+1 FMAX", "L X+2 FMAX", "LBL 0"],
          ["after the end of the program"] * 2),
     ],

@@ -26,21 +26,8 @@ from __future__ import annotations
 from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, grouped
 
 _DEFINITIONS = (
-    9,
-    13,
-    14,
-    20,
-    21,
-    22,
-    23,
-    24,
-    25,
-    27,
-    32,
-    *range(200, 216),
-    240,
-    241,
-    *range(251, 258),
+    *(1, 2, 3, 4, 5, 6, 9, 13, 14, 15, 16, 17, 18, 20, 21, 22, 23, 24, 25, 27, 32),
+    *(*range(200, 216), 240, 241, *range(251, 258)),
 )
 """Numbers of cycles that do nothing until they are called; 9 is a dwell, 13 turns the spindle, 32
 is a tolerance."""

@@ -102,7 +102,7 @@ class _Line:
             self._word("M", 30.0, match.start(), end)
         elif name == "STOP":
             self._word("M", 0.0, match.start(), match.end())
-            self._functions(end)
+            self._functions(end, but=0)  # STOP M0 is one stop
         else:
             self._other(name, end)
 
@@ -169,14 +169,15 @@ class _Line:
         else:
             self._word("M", float(number), match.start(), match.end())
 
-    def _functions(self, end: int) -> None:
-        """Take M functions, and nothing else."""
+    def _functions(self, end: int, but: int | None = None) -> None:
+        """Take M functions, and nothing else; but this one, which was taken before."""
         while self._blank(end):
             match = _M.match(self.text, self.at, end)
             if match is None or not _END.match(self.text, match.end()):
                 raise _ProblemError("word is not known")
             self.at = match.end()
-            self._function(match)
+            if int(match[1]) != but:
+                self._function(match)
 
     def _other(self, name: str, end: int) -> None:
         """Take a statement that the table has by its name."""

@@ -134,8 +134,10 @@ def _named(found: Statement, said: str, dialect: Dialect, *, goes_on: bool) -> S
     elif name == "STOP" or re.fullmatch(r"(?:M\s*\d{1,3}\s*)+", said):
         if name == "STOP":
             found.put("M", 0.0)
-        for number in re.findall(r"M\s*(\d{1,3})", said):
-            _function(found, int(number))
+        numbers = [int(number) for number in re.findall(r"M\s*(\d{1,3})", said)]
+        for number in numbers:
+            if number or name != "STOP":
+                _function(found, number)
     else:
         _other(found, name, said, dialect)
     return found
