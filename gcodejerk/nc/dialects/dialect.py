@@ -353,8 +353,7 @@ class Dialect:
     note: str = ""
     """What whoever has a program read so has to know."""
     unknown_lasts: bool = False
-    """A code that the table does not name may turn, scale or mirror for good: behind it nothing is
-    rewritten. So is read what is known of a control only in part."""
+    """What the table does not name may turn or scale for good: behind it nothing is rewritten."""
     macro_change: bool = False
     """M6 runs a program of the owner's, as `other_m` "positions" says of others."""
     apart: frozenset[str] = frozenset()
