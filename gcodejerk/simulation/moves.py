@@ -277,7 +277,9 @@ class _Ringing:
             # Between the last moment above and the next: finer.
             last = int(above[-1])
             fine = np.linspace(times[last], times[min(last + 1, len(times) - 1)], FINER)
-            return float(fine[np.flatnonzero(self._at(fine) > tolerance)[-1]])
+            # The moment itself may be above by what this part leaves out.
+            inside = np.flatnonzero(self._at(fine) > tolerance)
+            return float(fine[inside[-1]] if len(inside) else times[last])
         return 0.0
 
 

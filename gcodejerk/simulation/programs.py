@@ -16,6 +16,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.threads import one_thread
 from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.plans import Plans
 from gcodejerk.simulation.moves import Outcome, Watch
@@ -152,6 +153,19 @@ def simulate_rapids(
         if key not in known:
             known[key] = watch.outcome(steps)
         return known[key]
+
+    with one_thread():
+        return _simulated(plans, moves, batches, outcome, progress)
+
+
+def _simulated(
+    plans: Plans,
+    moves: NDArray[np.int64],
+    batches: Iterable[Batch] | None,
+    outcome: Callable[[Steps], Outcome],
+    progress: Progress | None,
+) -> Simulation:
+    """The same, by what tells a command's outcome."""
 
     planned: dict[int, Outcome] = {}
     if batches is None:

@@ -51,7 +51,7 @@ ROOMS = {
     profiles
  <- families residual
  <- amplitudes sampling shapers
- <- maps rounding | search | servo
+ <- maps rounding | search | servo | threads
 """),
     "machine": order("""
     drives
