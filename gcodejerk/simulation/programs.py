@@ -166,7 +166,6 @@ def _simulated(
     progress: Progress | None,
 ) -> Simulation:
     """The same, by what tells a command's outcome."""
-
     planned: dict[int, Outcome] = {}
     if batches is None:
         commands = ((int(k), planned_steps(plans, int(k))) for k in moves)
