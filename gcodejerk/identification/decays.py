@@ -10,34 +10,44 @@ Rule: a stretch with a clipped or lost sample, or in which the next motion begin
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.identification.record import Record
-from gcodejerk.identification.ringing import Taken, take_apart
+from gcodejerk.identification.ringing import Taken, fitted, quick_poles, take_apart
 from gcodejerk.motion.profiles.profile import Array
 
 WINDOW = 0.015
 """Over which the strength of vibration is taken. [s]"""
-QUIET_SHARE = 20.0
-"""Percent of the windows that are taken for rest."""
+REST = 0.2
+"""Of the windows from which the noise is taken, [s], and the percentage of them that is rest."""
+QUIET_SHARE = 25.0
 ACTIVE = 5.0
 """Over the noise, from which on something happens. [-]"""
-JOINED = 0.03
-"""Stretches nearer than this are one. [s]"""
+JOINED = 0.3
+"""Stretches nearer than this are one motion: its ramps, and a beat of what follows. [s]"""
 SHORTEST = 0.06
 """Of a stretch that is taken apart. [s]"""
 LONGEST = 2.0
 """What is taken apart of one. [s]"""
-STEP = 0.004
+COARSE, FINE = 0.02, 0.004
 """Between begins that are tried. [s]"""
+LATER = 0.01
+"""Behind the earliest begin that holds, the stretch is taken: the last of a ramp looks free. [s]"""
+TRIES = 5
+"""Begins for which the modes are looked for in earnest, `COARSE` apart."""
+BLOCK, BLOCKS = 0.025, 4
+"""Its begin is judged in blocks, for there the motion would be. [s]"""
 EXPLAINED = 0.02
 """Share of the energy that the modes may leave, where noise is less."""
 OVER_NOISE = 1.6
 """Energy that they may leave, over that of the noise."""
 HIGHEST_RATE = 1200.0
 """Records are thinned out to about this. [Hz]"""
+QUICK_RATE, QUICK_ORDER, QUICK_ROWS = 4.0, 16, 50
+"""For the search of the begin: rate over the highest frequency of the band, poles, and rows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,18 +108,18 @@ def find_decays(record: Record, band: tuple[float, float]) -> Search:
     -------
     Search
     """
-    record = _thinned(record, band[1])
+    record = thinned(record, max(HIGHEST_RATE, 5.0 * band[1]))
     strength = _strength(record)
-    still = strength <= np.percentile(strength, QUIET_SHARE)
-    noise = record.values[:, still & ~record.broken].std(axis=1)
+    noise = _noise(record, strength)
     floor = float(np.sqrt((noise**2).sum()))
     stretches = _stretches(strength > ACTIVE * max(floor, 1e-12), record.rate)
+    quick = thinned(record, QUICK_RATE * band[1])
     decays, notes = [], []
     for k, (first, last) in enumerate(stretches):
         # A decay goes on below the threshold, until the next motion.
         limit = stretches[k + 1][0] if k + 1 < len(stretches) else record.values.shape[1]
         behind = min(limit - int(0.02 * record.rate), last + int(0.15 * record.rate))
-        found, why = _decay(record, k, first, max(behind, last), noise, band)
+        found, why = _decay(record, quick, k, first, max(behind, last), noise, band)
         if found is None:
             at = record.begin + first / record.rate
             notes.append(f"motion at {at:.2f} s: {why}")
@@ -118,33 +128,65 @@ def find_decays(record: Record, band: tuple[float, float]) -> Search:
     return Search(tuple(decays), len(stretches), noise, tuple(notes))
 
 
-def _thinned(record: Record, highest: float) -> Record:
-    """Fewer samples where the sensor is much quicker than anything that is looked for."""
-    by = int(record.rate // max(HIGHEST_RATE, 5.0 * highest))
+def thinned(record: Record, rate: float) -> Record:
+    """Fewer samples where the sensor is much quicker than anything that is looked for.
+
+    Parameters
+    ----------
+    record : Record
+    rate : float
+        That has to stay at least. [Hz]
+
+    Returns
+    -------
+    Record
+        Whatever would be folded into a fifth of its rate is filtered away.
+    """
+    by = int(record.rate // rate)
     if by < 2:
         return record
-    # A box over as many samples: exact enough below a fifth of the new rate, see `band`.
-    count = record.values.shape[1] // by
-    values = record.values[:, : count * by].reshape(len(record.values), count, by).mean(axis=2)
-    broken = record.broken[: count * by].reshape(count, by).any(axis=1)
-    shift = 0.5 * (by - 1) / record.rate
+    # A windowed sinc: flat below a quarter of the new rate, and symmetric, so nothing is shifted.
+    half = 6 * by
+    taps = np.sinc(np.arange(-half, half + 1) / by * 0.9) * np.kaiser(2 * half + 1, 6.0)
+    taps /= taps.sum()
+    smooth = [np.convolve(np.pad(row, half, mode="edge"), taps, "valid") for row in record.values]
+    marks = np.convolve(record.broken.astype(float), np.ones(2 * by + 1), "same") > 0.5
     return replace(
-        record, rate=record.rate / by, values=values, broken=broken, begin=record.begin + shift
+        record, rate=record.rate / by, values=np.array(smooth)[:, ::by], broken=marks[::by]
     )
+
+
+def _noise(record: Record, strength: Array) -> Array:
+    """Standard deviation of each channel where the record is quietest, shape (c,) [mm/s^2]."""
+    width = max(16, int(REST * record.rate))
+    count = max(1, len(strength) // width)
+    parts = [slice(k * width, (k + 1) * width) for k in range(count)]
+    whole = [part for part in parts if not record.broken[part].any()] or parts
+    loud = np.array([float(strength[part].max()) for part in whole])
+    still = np.flatnonzero(loud <= np.percentile(loud, QUIET_SHARE))
+    values = np.array([record.values[:, whole[int(k)]].std(axis=1) for k in still])
+    # Sensors without noise there are none; records of few bits there are.
+    least = 1e-6 * np.abs(record.values).max(axis=1)
+    noise: Array = np.maximum(np.median(values, axis=0), np.maximum(least, 1e-12))
+    return noise
 
 
 def _strength(record: Record) -> Array:
     """How strongly it shakes around each sample, all channels together, shape (k,) [mm/s^2]."""
-    width = max(3, int(WINDOW * record.rate))
-    kernel = np.ones(width) / width
-    slow = max(width, int(0.25 * record.rate))
-    out = np.zeros(record.values.shape[1])
+    count = record.values.shape[1]
+    width = min(max(3, int(WINDOW * record.rate)), count)
+    slow = min(max(width, int(0.25 * record.rate)), count)
+    out = np.zeros(count)
     for row in record.values:
-        drift = np.convolve(np.pad(row, slow // 2, mode="edge"), np.ones(slow) / slow, "same")
-        drift = drift[slow // 2 : slow // 2 + len(row)]
-        out += np.convolve((row - drift) ** 2, kernel, "same")
+        out += _mean_around((row - _mean_around(row, slow)) ** 2, width)
     strength: Array = np.sqrt(out)
     return strength
+
+
+def _mean_around(row: Array, width: int) -> Array:
+    sums = np.concatenate([[0.0], np.cumsum(np.pad(row, width // 2, mode="edge"))])
+    out: Array = (sums[width:] - sums[:-width])[: len(row)] / width
+    return np.pad(np.maximum(out, out.min()), (0, len(row) - len(out)), mode="edge")
 
 
 def _stretches(active: NDArray[np.bool_], rate: float) -> list[tuple[int, int]]:
@@ -162,31 +204,80 @@ def _stretches(active: NDArray[np.bool_], rate: float) -> list[tuple[int, int]]:
 
 
 def _decay(
-    record: Record, motion: int, first: int, end: int, noise: Array, band: tuple[float, float]
-) -> tuple[Decay | None, str]:
+    record: Record, quick: Record, motion: int, first: int, end: int, noise: Array,
+    band: tuple[float, float],
+) -> tuple[Decay | None, str]:  # fmt: skip
     """The free stretch behind a motion, or why there is none."""
     rate = record.rate
     shortest = max(int(SHORTEST * rate), int(2.5 * rate / band[1]), 24)
     if end - first < shortest:
         return None, f"it rings for {1e3 * (end - first) / rate:.0f} ms only"
-    step = max(1, int(STEP * rate))
-    best: tuple[int, Taken] | None = None
-    for begin in range(first + step, end - shortest, step):
-        part = record.values[:, begin : min(end, begin + int(LONGEST * rate))]
-        if record.broken[begin : begin + part.shape[1]].any():
-            continue
-        taken = take_apart(part, rate, noise, band)
-        if not taken.rings:
-            continue
-        energy = float(((part / noise[:, np.newaxis]) ** 2).mean())
-        allowed = max(EXPLAINED, OVER_NOISE / max(energy, 1e-12))
-        if taken.unexplained <= allowed:
-            best = (begin, taken)
-            break
-    if best is None:
-        if record.broken[first:end].any():
-            return None, "samples are clipped or missing"
-        return None, "no few modes explain what follows: it is no free vibration"
-    begin, taken = best
-    at = record.begin
-    return Decay(motion, at + first / rate, at + begin / rate, at + end / rate, taken), ""
+    # What a clipped or lost sample stands in is no stretch; the last whole one is behind arrival.
+    edges = [first - 1, *(first + np.flatnonzero(record.broken[first:end])).tolist(), end]
+    whole = [(a + 1, b) for a, b in pairwise(edges) if b - a - 1 >= shortest]
+    for low, high in reversed(whole):
+        high = min(high, low + int(3.0 * LONGEST * rate))
+        begin = _begin(quick, low / rate, high / rate, shortest / rate, noise)
+        for late in range(TRIES if begin is not None else 0):
+            at = int((begin + LATER + late * COARSE) * rate)
+            part = record.values[:, at : min(high, at + int(LONGEST * rate))]
+            if part.shape[1] < shortest:
+                break
+            taken = take_apart(part, rate, noise, band)
+            if taken.rings and _explained(part - taken.fit, part, noise, rate):
+                when = record.begin + np.array([first, at, at + part.shape[1]]) / rate
+                return Decay(motion, *when.tolist(), taken), ""
+    if len(whole) < 1 or record.broken[first:end].any():
+        return None, "samples are clipped or missing"
+    return None, "no few modes explain what follows: it is no free vibration"
+
+
+def _begin(quick: Record, low: float, high: float, shortest: float, noise: Array) -> float | None:
+    """Since when, reckoned back from its end, a stretch is free [s from the record's begin]."""
+
+    def free(begin: float) -> bool:
+        part = quick.values[:, int(begin * quick.rate) : int(high * quick.rate)]
+        part = part[:, : int(LONGEST * quick.rate)]
+        return _explained(_left(part, quick.rate, noise), part, noise, quick.rate)
+
+    begin = high - shortest
+    good: float | None = None
+    missed = 0
+    bad = low
+    while begin > low and missed < 2:
+        if free(begin):
+            good, missed = begin, 0
+        else:
+            missed += 1
+            if missed == 1:
+                bad = begin
+        begin -= max(COARSE, 0.1 * (high - begin))
+    if good is None:
+        return None
+    if missed == 0:
+        bad = low
+    while good - bad > FINE:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if free(middle) else (good, middle)
+    return good
+
+
+def _left(part: Array, rate: float, noise: Array) -> Array:
+    """What oscillations of one small order leave of a stretch, shape as it [mm/s^2]."""
+    y = part / noise[:, np.newaxis]
+    poles = quick_poles(y, rate, QUICK_ORDER, QUICK_ROWS)
+    return part - fitted(part, rate, poles)[1]
+
+
+def _explained(left: Array, part: Array, noise: Array, rate: float) -> bool:
+    """Whether what is left of a stretch is noise or little, on the whole and at its begin."""
+    unit = noise[:, np.newaxis]
+    rest, whole = (left / unit) ** 2, (part / unit) ** 2
+    if rest.mean() > max(OVER_NOISE, EXPLAINED * whole.mean()):
+        return False
+    size = max(4, int(BLOCK * rate))
+    energy = float(whole[:, : BLOCKS * size].mean())
+    # Five standard deviations of the energy of that many samples of noise.
+    allowed = max(1.0 + 5.0 * np.sqrt(2.0 / (size * len(part))), EXPLAINED * energy)
+    blocks = [rest[:, k * size : (k + 1) * size] for k in range(BLOCKS)]
+    return all(float(block.mean()) <= allowed for block in blocks if block.shape[1] == size)

@@ -52,6 +52,8 @@ class Ring:
         From the noise. [Hz], [-]
     energy : float
         Its share of the decay's. [-]
+    cycles : float
+        That the stretch holds of it.
     orders : tuple of int
         In which it came back.
     """
@@ -62,6 +64,7 @@ class Ring:
     sd_frequency: float
     sd_damping: float
     energy: float
+    cycles: float
     orders: tuple[int, ...]
 
 
@@ -77,11 +80,14 @@ class Taken:
         Order, frequency and damping ratio of every pole that came.
     unexplained : float
         Share of the energy that the modes leave. [-]
+    fit : ndarray, shape (c, k)
+        What they make together. [mm/s^2]
     """
 
     rings: tuple[Ring, ...]
     stabilization: tuple[tuple[int, float, float], ...]
     unexplained: float
+    fit: Array
 
 
 def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, float]) -> Taken:
@@ -112,13 +118,15 @@ def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, floa
             break
         for pole in _poles(u[:, :order], pairs, rate):
             f, zeta = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)
-            if pole.imag > 0.0 and band[0] <= f <= band[1] and -0.005 <= zeta < WELL_DAMPED:
+            if pole.imag > 0.0 and -0.005 <= zeta < WELL_DAMPED:
                 seen.append((order, float(f), float(max(zeta, 0.0))))
     stable = _stable(seen)
     if not stable:
-        return Taken((), tuple(seen), 1.0)
+        return Taken((), tuple(seen), 1.0, np.zeros(values.shape))
     poles = np.array([_pole(f, zeta) for f, zeta, _ in stable])
-    amplitude, unexplained = _amplitudes(values, scale, rate, poles)
+    amplitude, fit = fitted(values, rate, poles)
+    whole = float((((values - values.mean(axis=1, keepdims=True)) / scale[:, np.newaxis]) ** 2).sum())
+    unexplained = float((((values - fit) / scale[:, np.newaxis]) ** 2).sum()) / max(whole, 1e-300)
     rings = []
     energies = _energies(amplitude / scale[:, np.newaxis], poles)
     for k, (f, zeta, orders) in enumerate(stable):
@@ -130,13 +138,44 @@ def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, floa
         root = np.sqrt(8.0 * (2.0 / rate) * s_seen**3)
         sd = float(root / max(size, 1e-300))
         ring = Ring(
-            f, zeta, amplitude[:, k], sd / (2.0 * np.pi), sd / omega, float(energies[k]), orders
-        )
+            f, zeta, amplitude[:, k], sd / (2.0 * np.pi), sd / omega, float(energies[k]),
+            f * seen_for, orders,
+        )  # fmt: skip
+        # What rings outside of the band is part of the fit, and nothing that was asked for.
+        if not band[0] <= f <= band[1]:
+            continue
         if ring.energy >= LEAST_ENERGY and size > CLEAR and ring.sd_frequency < 0.05 * f:
             rings.append(ring)
     return Taken(
-        tuple(sorted(rings, key=lambda one: one.frequency)), tuple(seen), float(unexplained)
+        tuple(sorted(rings, key=lambda one: one.frequency)), tuple(seen), unexplained, fit
     )
+
+
+def quick_poles(y: Array, rate: float, order: int, rows: int) -> Complex:
+    """Poles of one order that vibrate, from a small Hankel matrix.
+
+    Parameters
+    ----------
+    y : ndarray, shape (c, k)
+        In units of each channel's noise.
+    rate : float
+        [Hz]
+    order : int
+        Poles that are looked for.
+    rows : int
+        Of the matrix.
+
+    Returns
+    -------
+    ndarray of complex, shape (m,)
+        Those above the real axis. [1/s]
+    """
+    u, channels = _hankel(y, rows)
+    order = min(order, u.shape[1], (len(u) - channels) // 2)
+    poles = _poles(u[:, :order], channels, rate) if order >= 2 else np.zeros(0, complex)
+    # A pole that grows by noise is one that does not decay.
+    poles = poles[(poles.imag > 0.0) & (-poles.real < WELL_DAMPED * np.abs(poles))]
+    return np.minimum(poles.real, 0.0) + 1j * poles.imag
 
 
 def _pole(frequency: float, damping: float) -> complex:
@@ -144,15 +183,17 @@ def _pole(frequency: float, damping: float) -> complex:
     return complex(-damping * omega, omega * np.sqrt(1.0 - damping**2))
 
 
-def _hankel(y: Array) -> tuple[Array, int]:
+def _hankel(y: Array, most: int = MOST_ROWS) -> tuple[Array, int]:
     """Left singular vectors of the block Hankel matrix, and the channels in a block."""
     channels, count = y.shape
-    rows = min(count // 2, max(8, MOST_ROWS // channels))
-    columns = min(count - rows, 2 * MOST_ROWS)
-    index = np.arange(rows)[:, np.newaxis] + np.arange(columns)
-    blocks = y[:, index].transpose(1, 0, 2).reshape(rows * channels, columns)
+    rows = min(count // 2, max(8, most // channels))
+    # All of the decay counts, though not from every sample on.
+    begins = np.arange(0, count - rows, max(1, (count - rows) // (2 * most)))
+    index = np.arange(rows)[:, np.newaxis] + begins
+    blocks = y[:, index].transpose(1, 0, 2).reshape(rows * channels, len(begins))
     u, s, _ = np.linalg.svd(blocks, full_matrices=False)
-    return u[:, : max(ORDERS) + 1] * (s[: max(ORDERS) + 1] > 0.0), channels
+    most_orders = max(ORDERS) + 1
+    return u[:, :most_orders] * (s[:most_orders] > 0.0), channels
 
 
 def _poles(u: Array, channels: int, rate: float) -> Complex:
@@ -190,17 +231,32 @@ def _stable(seen: list[tuple[int, float, float]]) -> list[tuple[float, float, tu
     return found
 
 
-def _amplitudes(values: Array, scale: Array, rate: float, poles: Complex) -> tuple[Complex, float]:
-    """Amplitudes by least squares, shape (c, m), and the share of the energy that is left."""
+def fitted(values: Array, rate: float, poles: Complex) -> tuple[Complex, Array]:
+    """Amplitudes of poles by least squares.
+
+    Parameters
+    ----------
+    values : ndarray, shape (c, k)
+        Accelerations. [mm/s^2]
+    rate : float
+        [Hz]
+    poles : ndarray of complex, shape (m,)
+        [1/s]
+
+    Returns
+    -------
+    amplitude : ndarray of complex, shape (c, m)
+        At the first sample. [mm/s^2]
+    fit : ndarray, shape (c, k)
+        What they make together, with a constant. [mm/s^2]
+    """
     t = np.arange(values.shape[1]) / rate
     swings = np.exp(np.outer(t, poles))
     basis = np.concatenate([swings.real, -swings.imag, np.ones((len(t), 1))], axis=1)
     solved, *_ = np.linalg.lstsq(basis, values.T, rcond=None)
     m = len(poles)
-    left = (values.T - basis @ solved) / scale
-    whole = ((values.T - solved[-1]) / scale) ** 2
     amplitude: Complex = (solved[:m] + 1j * solved[m : 2 * m]).T
-    return amplitude, float((left**2).sum() / max(whole.sum(), 1e-300))
+    return amplitude, (basis @ solved).T
 
 
 def _energies(amplitude: Complex, poles: Complex) -> Array:
