@@ -28,6 +28,8 @@ ACTIVE = 5.0
 """Over the noise, from which on something happens. [-]"""
 JOINED = 0.3
 """Stretches nearer than this are one motion: its ramps, and a beat of what follows. [s]"""
+ONSET = 0.1
+"""In front of a motion, what is taken for rest. [s]"""
 SHORTEST = 0.06
 """Of a stretch that is taken apart. [s]"""
 LONGEST = 2.0
@@ -225,11 +227,23 @@ def _decay(
                 break
             taken = take_apart(part, rate, noise, band)
             if taken.rings and _explained(part - taken.fit, part, noise, rate):
-                when = record.begin + np.array([first, at, at + part.shape[1]]) / rate
+                moved = _onset(record, first, noise)
+                when = record.begin + np.array([moved, at, at + part.shape[1]]) / rate
                 return Decay(motion, *when.tolist(), taken), ""
     if len(whole) < 1 or record.broken[first:end].any():
         return None, "samples are clipped or missing"
     return None, "no few modes explain what follows: it is no free vibration"
+
+
+def _onset(record: Record, first: int, noise: Array) -> int:
+    """The sample at which a motion begins: what is taken for drift makes `first` early."""
+    early = slice(max(0, first - int(ONSET * record.rate)), max(1, first))
+    rest = np.median(record.values[:, early], axis=1, keepdims=True)
+    ahead = record.values[:, first : first + int(0.3 * record.rate)]
+    # Two samples in a row: one is noise now and then.
+    size = np.sqrt((((ahead - rest) / noise[:, np.newaxis]) ** 2).sum(axis=0) / len(rest))
+    seen = np.flatnonzero(np.minimum(size[:-1], size[1:]) > ACTIVE)
+    return first + (int(seen[0]) if len(seen) else 0)
 
 
 def _begin(quick: Record, low: float, high: float, shortest: float, noise: Array) -> float | None:
