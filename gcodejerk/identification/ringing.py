@@ -118,7 +118,9 @@ def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, floa
             break
         for pole in _poles(u[:, :order], pairs, rate):
             f, zeta = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)
-            if pole.imag > 0.0 and -0.005 <= zeta < WELL_DAMPED:
+            # What does not even swing once is drift.
+            swings = f * values.shape[1] / rate >= 1.0
+            if pole.imag > 0.0 and swings and -0.005 <= zeta < WELL_DAMPED:
                 seen.append((order, float(f), float(max(zeta, 0.0))))
     stable = _stable(seen)
     if not stable:
@@ -128,7 +130,7 @@ def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, floa
     whole = float((((values - values.mean(axis=1, keepdims=True)) / scale[:, np.newaxis]) ** 2).sum())
     unexplained = float((((values - fit) / scale[:, np.newaxis]) ** 2).sum()) / max(whole, 1e-300)
     rings = []
-    energies = _energies(amplitude / scale[:, np.newaxis], poles)
+    energies = _energies(amplitude / scale[:, np.newaxis], poles, values.shape[1] / rate)
     for k, (f, zeta, orders) in enumerate(stable):
         s, omega = zeta * 2.0 * np.pi * f, 2.0 * np.pi * f
         # All channels together, in units of their noise: one channel of that amplitude, noise 1.
@@ -259,8 +261,9 @@ def fitted(values: Array, rate: float, poles: Complex) -> tuple[Complex, Array]:
     return amplitude, (basis @ solved).T
 
 
-def _energies(amplitude: Complex, poles: Complex) -> Array:
-    decay = np.maximum(-poles.real, 1e-9)
-    energy = (np.abs(amplitude) ** 2).sum(axis=0) / decay
+def _energies(amplitude: Complex, poles: Complex, duration: float) -> Array:
+    """Share of each mode in the energy of all of them, as long as they were seen."""
+    decay = np.maximum(-poles.real, 1e-3 / duration)
+    energy = (np.abs(amplitude) ** 2).sum(axis=0) / decay * -np.expm1(-2.0 * decay * duration)
     out: Array = energy / energy.sum()
     return out
