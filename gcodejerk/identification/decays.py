@@ -1,8 +1,8 @@
 """Where a record rings freely: behind each arrival, until the next motion or until it is still.
 
 This module owns the search for such stretches. An arrival leaves no mark of its own, so it is found
-by what follows: a stretch is free where the modes that are found in it explain it down to the noise;
-of all begins the earliest is taken that does.
+by what follows: a stretch is free where few oscillations explain it down to the noise, also where
+it begins. The begin is looked for backwards from the end, in small, and the modes once it is known.
 
 Rule: a stretch with a clipped or lost sample, or in which the next motion begins, is none.
 """
@@ -220,7 +220,9 @@ def _decay(
     for low, high in reversed(whole):
         high = min(high, low + int(3.0 * LONGEST * rate))
         begin = _begin(quick, low / rate, high / rate, shortest / rate, noise)
-        for late in range(TRIES if begin is not None else 0):
+        if begin is None:
+            continue
+        for late in range(TRIES):
             at = int((begin + LATER + late * COARSE) * rate)
             part = record.values[:, at : min(high, at + int(LONGEST * rate))]
             if part.shape[1] < shortest:
@@ -228,8 +230,8 @@ def _decay(
             taken = take_apart(part, rate, noise, band)
             if taken.rings and _explained(part - taken.fit, part, noise, rate):
                 moved = _onset(record, first, noise)
-                when = record.begin + np.array([moved, at, at + part.shape[1]]) / rate
-                return Decay(motion, *when.tolist(), taken), ""
+                when = [record.begin + k / rate for k in (moved, at, at + part.shape[1])]
+                return Decay(motion, when[0], when[1], when[2], taken), ""
     if len(whole) < 1 or record.broken[first:end].any():
         return None, "samples are clipped or missing"
     return None, "no few modes explain what follows: it is no free vibration"

@@ -13,7 +13,7 @@ say. Any CSV with times and columns can be read; the formats that are known need
 | LinuxCNC halscope | `# Sampling period is N ns` | src/hal/utils/scope_files.c |
 | LinuxCNC halsampler | columns without header; --rate | man halsampler |
 | TwinCAT Scope and others | a header; --time, --column | Beckhoff TE13xx |
-| UFF 58 | `    -1`, `    58` | pyuff reads it, where it is installed |
+| UFF 58, Shake&Tune's .stdata | are refused with what to do | pyuff; Klippain Shake&Tune |
 """
 
 from __future__ import annotations
@@ -74,6 +74,11 @@ def read_file(
         data = Path(path).read_bytes()
     except OSError as error:
         raise RecordError(f"{name} cannot be read: {error.strerror}") from None
+    if data[:4] == b"\x28\xb5\x2f\xfd":
+        raise RecordError(
+            f"{name} is compressed (zstandard; Shake&Tune's .stdata is), which is not read here",
+            "record with TEST_RESONANCES AXIS=X OUTPUT=raw_data, and give the CSV file",
+        )
     text = data.decode("utf-8-sig", "replace")
     if re.match(r"\s*-1\s*\n\s*58\b", text):
         raise RecordError(
@@ -207,14 +212,12 @@ class _Table:
     def _spectrum(self, names: list[str], values: Array) -> Spectrum:
         axes = [k for k, name in enumerate(names) if re.fullmatch(r"psd_[xyz]", name.lower())]
         chosen = axes or list(range(1, values.shape[1]))
-        notes = []
-        if "calibration" in Path(self.name).name or any("shapers" in n.lower() for n in names):
-            notes.append(
-                "this is Klipper's table of a calibration: scaled, no spectrum to judge by"
-            )
+        # The scores of shapers stand beside what was scaled for them: `mzv(54.2)`.
+        shapers = any(re.fullmatch(r"\w+\([\d.]+\)", name) for name in names)
+        scaled = shapers or "calibration" in Path(self.name).name
         return Spectrum(
             self.name, values[:, 0], tuple(names[k] for k in chosen), values[:, chosen].T,
-            tuple(notes),
+            normalized=scaled,
         )  # fmt: skip
 
     def _time_column(self, names: list[str], time: str | None) -> int | None:

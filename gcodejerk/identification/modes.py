@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcodejerk.axes import AXES
+from gcodejerk.identification.commanded import Commanded
 from gcodejerk.identification.decays import Decay, Search
 from gcodejerk.identification.record import Record
 from gcodejerk.identification.ringing import Ring
@@ -29,12 +30,20 @@ MOST_SCATTER = 0.03
 """Of a frequency, beyond which the decays disagree. [-]"""
 MOST_DAMPING_SCATTER = 0.6
 """Of a damping ratio. [-]"""
-SHARE = 0.4
-"""Of the decays that have to show a mode."""
+SHARE, OFTEN = 0.4, 3
+"""Of the decays that have to show a mode; or so many, and `RARE` of them: short rapids strike what
+long ones leave alone."""
+RARE = 0.2
+HUM = 0.5
+"""Of an amplitude's logarithm, what it has to lose in a decay: else it is a fan, or the mains."""
 LEAST_BAND = 0.01
 """`design.band` at least. [-]"""
 WELL_STRUCK = 0.2
 """Participations are taken from moves that strike a mode at least by this part of the strongest."""
+
+
+MOST_EARLY = 0.005
+"""What a decay may begin before its rapid ends by the machine file. [s]"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +114,7 @@ def identify_modes(
     axis: str,
     channel: str | None,
     machine: Machine | None = None,
-    lengths: Sequence[float] = (),
+    moves: Sequence[Commanded] = (),
 ) -> Identification:
     """Judge what decays show.
 
@@ -118,8 +127,9 @@ def identify_modes(
         That feels the axis; needed for participations.
     machine : Machine, optional
         Its own rapids, for participations.
-    lengths : sequence of float
-        Of the axis's rapids in the order of the records, for participations; one for each motion.
+    moves : sequence of Commanded
+        The program's rapids, for participations: as many as each record shows motions, or all
+        records together; all of them, or those of the axis alone.
 
     Returns
     -------
@@ -127,7 +137,10 @@ def identify_modes(
     """
     notes: list[str] = []
     decays = [(n, r, d) for n, (r, s) in enumerate(searches) for d in s.decays]
-    told = _told(searches, axis, machine, lengths, notes)
+    told = _told(searches, axis, machine, moves, notes)
+    if told is not None:
+        # What another axis left is none of this one's.
+        decays = [(n, r, d) for n, r, d in decays if told[n][d.motion].axis == axis]
     groups = _groups([(k, ring) for k, (_, _, d) in enumerate(decays) for ring in d.taken.rings])
     found = []
     for group in groups:
@@ -137,6 +150,8 @@ def identify_modes(
         found.append(_judged([ring for _, ring in group], len(decays), parts))
     scatter = [m.sd_frequency / m.frequency for m in found if not m.problem and m.decays > 1]
     band = max([LEAST_BAND, *(2.0 * s for s in scatter)])
+    if not decays:
+        notes.append("no free vibration was found behind any motion")
     if len(decays) == 1:
         notes.append("one decay only: nothing says how modes scatter; record more of them")
     return Identification(axis, tuple(found), tuple(searches), float(round(band, 3)), tuple(notes))
@@ -168,17 +183,22 @@ def _judged(rings: list[Ring], of: int, parts: tuple[float, float] | None) -> Id
     sd_f = float(max(f.std(ddof=1) if n > 1 else 0.0, np.median(sure_f)))
     sd_zeta = float(max(zeta.std(ddof=1) if n > 1 else 0.0, np.median(sure_zeta)))
     problem = ""
-    if n < max(1.0, SHARE * of):
+    often = n >= SHARE * of or n >= max(OFTEN, RARE * of)
+    fading = np.array([2.0 * np.pi * ring.damping * ring.cycles for ring in rings])
+    if float(np.median(fading)) < HUM:
+        problem = "it does not fade: a fan, a pump or the mains, or too short a record"
+    elif not often:
         problem = f"in {n} of {of} decays only"
     elif sd_f > MOST_SCATTER * frequency:
         problem = f"the decays disagree: {f.min():.3g} to {f.max():.3g} Hz"
     elif sd_zeta > MOST_DAMPING_SCATTER * damping:
         problem = f"its damping is not known: {zeta.min():.2g} to {zeta.max():.2g}"
+    participation, sd = parts or (None, None)
     return Identified(
         frequency, damping, sd_f, sd_zeta, n, of,
         max(float(np.linalg.norm(ring.amplitude)) for ring in rings),
         float(np.median([ring.energy for ring in rings])),
-        *(parts or (None, None)), problem,
+        participation, sd, problem,
     )  # fmt: skip
 
 
@@ -186,27 +206,31 @@ def _told(
     searches: Sequence[tuple[Record, Search]],
     axis: str,
     machine: Machine | None,
-    lengths: Sequence[float],
+    moves: Sequence[Commanded],
     notes: list[str],
-) -> list[list[float]] | None:
-    """Length of every motion of every record; None where they do not fit together."""
-    if machine is None or not len(lengths):
+) -> list[list[Commanded]] | None:
+    """The rapid of every motion of every record; None where they do not fit together."""
+    if machine is None or not moves:
         return None
+    own = [move for move in moves if move.axis == axis]
     motions = [search.motions for _, search in searches]
-    if sum(motions) != len(lengths):
-        notes.append(
-            f"{sum(motions)} motions were seen, and axis {axis} makes {len(lengths)}: without "
-            "knowing which is which there is no participation"
-        )
-        return None
-    begins = np.concatenate([[0], np.cumsum(motions)])
-    return [list(lengths[a:b]) for a, b in pairwise(begins.tolist())]
+    for told in (list(moves), own):
+        if told and all(count == len(told) for count in motions):
+            return [told] * len(motions)
+        if told and sum(motions) == len(told):
+            begins = np.concatenate([[0], np.cumsum(motions)])
+            return [told[a:b] for a, b in pairwise(begins.tolist())]
+    notes.append(
+        f"{sum(motions)} motions were seen, and axis {axis} makes {len(own)} of the program's "
+        f"{len(moves)} rapids: without knowing which is which there is no participation"
+    )
+    return None
 
 
 def _participations(
     group: list[tuple[int, Ring]],
     decays: Sequence[tuple[int, Record, Decay]],
-    told: list[list[float]],
+    told: list[list[Commanded]],
     channel: str,
     machine: Machine,
     axis: str,
@@ -220,7 +244,9 @@ def _participations(
         number, record, decay = decays[k]
         if channel not in record.channels:
             return None
-        length = told[number][decay.motion]
+        length = told[number][decay.motion].length
+        if length is None:
+            continue
         share = np.zeros((1, len(AXES)))
         share[0, AXES.index(axis)] = abs(length)
         limits = conventional_limits(machine, share, np.ones(1, dtype=np.bool_))
@@ -229,8 +255,11 @@ def _participations(
         model = response / float(pole.imag[0]) * (2.0 * np.pi * f) ** 2
         measured = float(np.abs(ring.amplitude[record.channels.index(channel)]))
         late = decay.begin - decay.moved - float(profile.total[0])
+        if late < -MOST_EARLY:
+            # Before the rapid can have ended: this is not the rapid that the program has there.
+            return None
         rows.append((model, measured * float(np.exp(-pole.real[0] * late))))
-    strongest = max(model for model, _ in rows)
+    strongest = max((model for model, _ in rows), default=0.0)
     ratio = np.array([seen / model for model, seen in rows if model >= WELL_STRUCK * strongest])
     if not len(ratio) or strongest <= 0.0:
         return None

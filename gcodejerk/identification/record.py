@@ -69,7 +69,7 @@ class Record:
     @property
     def duration(self) -> float:
         """Its length [s]."""
-        return self.values.shape[1] / self.rate
+        return float(self.values.shape[1] / self.rate)
 
     def __repr__(self) -> str:
         return f"<Record {self.name}: {', '.join(self.channels)}, {self.duration:.3g} s>"
@@ -85,6 +85,8 @@ class Spectrum:
     values: Array
     """Shape (c, f)."""
     notes: tuple[str, ...] = field(default=())
+    normalized: bool = False
+    """Klipper's table of a calibration: scaled, no spectrum to judge by."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,18 +152,18 @@ def make_record(samples: Samples, unit: str | None = None) -> Record:
         )
     times, rate, uneven = _timing(samples)
     notes += uneven
-    broken = clipped.any(axis=0)
+    broken: NDArray[np.bool_] = np.any(clipped, axis=0)
     begin = 0.0
     if times is not None:
         begin = float(times[0])
-        even = begin + np.arange(int(round((times[-1] - begin) * rate)) + 1) / rate
+        even = begin + np.arange(round((times[-1] - begin) * rate) + 1) / rate
         gaps = np.diff(times) > GAP / rate
         for k in np.flatnonzero(gaps):
             notes.append(f"samples are missing behind {times[k]:.3f} s: what is there is not used")
         holes = np.zeros(len(even), dtype=np.bool_)
         for k in np.flatnonzero(gaps):
             holes |= (even > times[k]) & (even < times[k + 1])
-        broken = holes | (np.interp(even, times, broken.astype(float)) > 0.0)
+        broken = np.asarray(holes | (np.interp(even, times, broken.astype(float)) > 0.0), np.bool_)
         values = np.array([np.interp(even, times, row) for row in values])
     for k in samples.breaks:
         broken[max(0, k - 1) : k + 1] = True

@@ -127,8 +127,9 @@ def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, floa
         return Taken((), tuple(seen), 1.0, np.zeros(values.shape))
     poles = np.array([_pole(f, zeta) for f, zeta, _ in stable])
     amplitude, fit = fitted(values, rate, poles)
-    whole = float((((values - values.mean(axis=1, keepdims=True)) / scale[:, np.newaxis]) ** 2).sum())
-    unexplained = float((((values - fit) / scale[:, np.newaxis]) ** 2).sum()) / max(whole, 1e-300)
+    left, around = values - fit, values - values.mean(axis=1, keepdims=True)
+    whole, rest = (float(((one.T / scale) ** 2).sum()) for one in (around, left))
+    unexplained = rest / max(whole, 1e-300)
     rings = []
     energies = _energies(amplitude / scale[:, np.newaxis], poles, values.shape[1] / rate)
     for k, (f, zeta, orders) in enumerate(stable):
@@ -148,9 +149,7 @@ def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, floa
             continue
         if ring.energy >= LEAST_ENERGY and size > CLEAR and ring.sd_frequency < 0.05 * f:
             rings.append(ring)
-    return Taken(
-        tuple(sorted(rings, key=lambda one: one.frequency)), tuple(seen), unexplained, fit
-    )
+    return Taken(tuple(sorted(rings, key=lambda one: one.frequency)), tuple(seen), unexplained, fit)
 
 
 def quick_poles(y: Array, rate: float, order: int, rows: int) -> Complex:
@@ -174,10 +173,13 @@ def quick_poles(y: Array, rate: float, order: int, rows: int) -> Complex:
     """
     u, channels = _hankel(y, rows)
     order = min(order, u.shape[1], (len(u) - channels) // 2)
-    poles = _poles(u[:, :order], channels, rate) if order >= 2 else np.zeros(0, complex)
+    if order < 2:
+        return np.zeros(0, dtype=np.complex128)
+    poles = _poles(u[:, :order], channels, rate)
     # A pole that grows by noise is one that does not decay.
     poles = poles[(poles.imag > 0.0) & (-poles.real < WELL_DAMPED * np.abs(poles))]
-    return np.minimum(poles.real, 0.0) + 1j * poles.imag
+    out: Complex = np.minimum(poles.real, 0.0) + 1j * poles.imag
+    return out
 
 
 def _pole(frequency: float, damping: float) -> complex:
@@ -263,7 +265,8 @@ def fitted(values: Array, rate: float, poles: Complex) -> tuple[Complex, Array]:
 
 def _energies(amplitude: Complex, poles: Complex, duration: float) -> Array:
     """Share of each mode in the energy of all of them, as long as they were seen."""
-    decay = np.maximum(-poles.real, 1e-3 / duration)
-    energy = (np.abs(amplitude) ** 2).sum(axis=0) / decay * -np.expm1(-2.0 * decay * duration)
+    decay: Array = np.maximum(-poles.real, 1e-3 / duration)
+    faded: Array = -np.expm1(-2.0 * decay * duration) / decay
+    energy: Array = np.linalg.norm(amplitude, axis=0) ** 2 * faded
     out: Array = energy / energy.sum()
     return out
