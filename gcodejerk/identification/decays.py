@@ -228,12 +228,14 @@ def _decay(
             if part.shape[1] < shortest:
                 break
             taken = take_apart(part, rate, noise, band)
+            if not taken.rings and taken.unexplained < EXPLAINED:
+                return None, f"what rings is not from {band[0]:g} to {band[1]:g} Hz, or too faint"
             if taken.rings and _explained(part - taken.fit, part, noise, rate):
                 moved = _onset(record, first, noise)
                 when = [record.begin + k / rate for k in (moved, at, at + part.shape[1])]
                 return Decay(motion, when[0], when[1], when[2], taken), ""
     if len(whole) < 1 or record.broken[first:end].any():
-        return None, "samples are clipped or missing"
+        return None, "samples are clipped or missing, and what is left is no free vibration"
     return None, "no few modes explain what follows: it is no free vibration"
 
 

@@ -195,16 +195,17 @@ def _hankel(y: Array, most: int = MOST_ROWS) -> tuple[Array, int]:
     begins = np.arange(0, count - rows, max(1, (count - rows) // (2 * most)))
     index = np.arange(rows)[:, np.newaxis] + begins
     blocks = y[:, index].transpose(1, 0, 2).reshape(rows * channels, len(begins))
-    u, s, _ = np.linalg.svd(blocks, full_matrices=False)
-    most_orders = max(ORDERS) + 1
-    return u[:, :most_orders] * (s[:most_orders] > 0.0), channels
+    # Its left singular vectors, from the small square matrix: a tenth of the work.
+    s, u = np.linalg.eigh(blocks @ blocks.T)
+    order = np.argsort(-s)[: min(max(ORDERS) + 1, len(begins))]
+    return u[:, order] * (s[order] > 0.0), channels
 
 
 def _poles(u: Array, channels: int, rate: float) -> Complex:
     """Poles of one order, from the shift between the halves of the vectors."""
     shift, *_ = np.linalg.lstsq(u[:-channels], u[channels:], rcond=None)
     z = np.linalg.eigvals(shift).astype(np.complex128)
-    out: Complex = np.log(z[np.abs(z) > 1e-12]) * rate
+    out: Complex = np.asarray(np.log(z[np.abs(z) > 1e-12]) * rate, dtype=np.complex128)
     return out
 
 
@@ -265,8 +266,8 @@ def fitted(values: Array, rate: float, poles: Complex) -> tuple[Complex, Array]:
 
 def _energies(amplitude: Complex, poles: Complex, duration: float) -> Array:
     """Share of each mode in the energy of all of them, as long as they were seen."""
-    decay: Array = np.maximum(-poles.real, 1e-3 / duration)
-    faded: Array = -np.expm1(-2.0 * decay * duration) / decay
-    energy: Array = np.linalg.norm(amplitude, axis=0) ** 2 * faded
+    decay = np.maximum(-poles.real, 1e-3 / duration)
+    faded = -np.expm1(-2.0 * decay * duration) / decay
+    energy = np.linalg.norm(amplitude, axis=0) ** 2 * faded
     out: Array = energy / energy.sum()
     return out

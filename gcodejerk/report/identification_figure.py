@@ -6,6 +6,7 @@ This module owns what is drawn where. matplotlib is an optional extra, imported 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
@@ -47,13 +48,13 @@ def plot_identification(
     EmitError
         The format is unknown, or matplotlib is not installed.
     """
-    figure = new_figure(suffix, (7.2, 8.0), 200)
-    parts = figure.subplot_mosaic(
-        [["record", "record"], ["decay", "decay"], ["orders", "spectrum"]],
-        height_ratios=[1.0, 1.1, 1.3],
-    )
     record, search = max(found.searches, key=lambda one: len(one[1].decays))
     decay = max(search.decays, key=_shows, default=None)
+    figure = new_figure(suffix, (7.2, 3.0 if decay is None else 8.0), 200)
+    below = [] if decay is None else [["decay", "decay"], ["orders", "spectrum"]]
+    parts = figure.subplot_mosaic(
+        [["record", "record"], *below], height_ratios=[1.0, 1.1, 1.3][: 1 + len(below)]
+    )
     c = 0
     if decay is not None:
         strength = [np.abs(ring.amplitude) for ring in decay.taken.rings]
@@ -65,20 +66,13 @@ def plot_identification(
         parts["record"], f"(a) {channel}: {count} decays behind {all_of} motions", "time [s]",
         "[m/s²]",
     )  # fmt: skip
-    if decay is None:
-        for name in ("decay", "orders", "spectrum"):
-            parts[name].text(
-                0.5, 0.5, "no free decay", ha="center", va="center", fontsize=9,
-                transform=parts[name].transAxes,
-            )  # fmt: skip
-            parts[name].set_axis_off()
-    else:
+    if decay is not None:
         _decay(parts["decay"], record, c, decay)
         _orders(parts["orders"], decay, found, band)
         _spectrum(parts["spectrum"], record, c, decay, found, band)
     held = len(found.held)
     modes = f"{held or 'no'} mode{'' if held == 1 else 's'} of {found.axis} identified"
-    figure.suptitle(f"{record.name}: {modes}", fontsize=10)
+    figure.suptitle(f"{Path(record.name).name}: {modes}", fontsize=10)
     save(figure, file, suffix)
 
 
@@ -150,11 +144,11 @@ def _orders(axes: Axes, decay: Decay, found: Identification, band: tuple[float, 
         stable |= near & np.isin(poles[:, 0], ring.orders)
     axes.plot(
         poles[~stable, 1], poles[~stable, 0], linestyle="", marker="o", markersize=3.2,
-        markerfacecolor="none", markeredgecolor="0.6", label="comes and goes",
+        markerfacecolor="none", markeredgecolor="0.6", label="not taken",
     )  # fmt: skip
     axes.plot(
         poles[stable, 1], poles[stable, 0], linestyle="", marker="o", markersize=3.6,
-        color=PLANNED, label="comes back",
+        color=PLANNED, label="a mode",
     )  # fmt: skip
     _lines(axes, found)
     axes.set_xlim(*_shown(found, band))
@@ -197,7 +191,8 @@ def _spectrum(
         if low <= mode.frequency <= high:
             axes.annotate(
                 f"{mode.frequency:.1f} Hz\n{100.0 * mode.damping:.1f} %",
-                (mode.frequency, 2.0 * top), (2, 0), textcoords="offset points", fontsize=7.0, color=TODAY,
+                (mode.frequency, 2.0 * top), (2, 0), textcoords="offset points", fontsize=7.0,
+                color=TODAY,
             )  # fmt: skip
     axes.legend(frameon=False, fontsize=7.5, loc="lower left")
     _label(axes, "(d) its spectrum, and the modes identified", "frequency [Hz]", "[mm/s]")
@@ -262,7 +257,9 @@ def plot_peaks(
         axes.set_xlim(*band)
         axes.set_ylim(bottom=0.0, top=1.12 * float(one.total[inside].max()))
         axes.legend(frameon=False, fontsize=7.5)
-        _label(axes, one.spectrum.name, "frequency [Hz]", "power density")
+        axes.ticklabel_format(axis="y", style="plain")
+        axes.set_yticks([])
+        _label(axes, Path(one.spectrum.name).name, "frequency [Hz]", "power density")
     save(figure, file, suffix)
 
 
