@@ -46,10 +46,11 @@ EXPLAINED = 0.02
 """Share of the energy that the modes may leave, where noise is less."""
 OVER_NOISE = 1.6
 """Energy that they may leave, over that of the noise."""
-HIGHEST_RATE = 1200.0
-"""Records are thinned out to about this. [Hz]"""
-QUICK_RATE, QUICK_ORDER, QUICK_ROWS = 4.0, 16, 50
-"""For the search of the begin: rate over the highest frequency of the band, poles, and rows."""
+RATE = 4.0
+"""To which records are thinned out: over the highest frequency of the band. A matrix of so many
+rows then spans more of a decay, which is what the uncertainty hangs on."""
+QUICK_ORDER, QUICK_ROWS = 16, 50
+"""For the search of the begin: poles, and rows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,23 +111,22 @@ def find_decays(record: Record, band: tuple[float, float]) -> Search:
     -------
     Search
     """
-    record = thinned(record, max(HIGHEST_RATE, 5.0 * band[1]))
+    whole, record = record, thinned(record, RATE * band[1])
     strength = _strength(record)
     noise = _noise(record, strength)
     floor = float(np.sqrt((noise**2).sum()))
     stretches = _stretches(strength > ACTIVE * max(floor, 1e-12), record.rate)
-    quick = thinned(record, QUICK_RATE * band[1])
     decays, notes = [], []
     for k, (first, last) in enumerate(stretches):
         # A decay goes on below the threshold, until the next motion.
         limit = stretches[k + 1][0] if k + 1 < len(stretches) else record.values.shape[1]
         behind = min(limit - int(0.02 * record.rate), last + int(0.15 * record.rate))
-        found, why = _decay(record, quick, k, first, max(behind, last), noise, band)
+        found, why = _decay(record, k, first, max(behind, last), noise, band)
         if found is None:
             at = record.begin + first / record.rate
             notes.append(f"motion at {at:.2f} s: {why}")
         else:
-            decays.append(found)
+            decays.append(replace(found, moved=_onset(whole, found.moved, noise)))
     return Search(tuple(decays), len(stretches), noise, tuple(notes))
 
 
@@ -206,7 +206,7 @@ def _stretches(active: NDArray[np.bool_], rate: float) -> list[tuple[int, int]]:
 
 
 def _decay(
-    record: Record, quick: Record, motion: int, first: int, end: int, noise: Array,
+    record: Record, motion: int, first: int, end: int, noise: Array,
     band: tuple[float, float],
 ) -> tuple[Decay | None, str]:  # fmt: skip
     """The free stretch behind a motion, or why there is none."""
@@ -219,7 +219,7 @@ def _decay(
     whole = [(a + 1, b) for a, b in pairwise(edges) if b - a - 1 >= shortest]
     for low, high in reversed(whole):
         high = min(high, low + int(3.0 * LONGEST * rate))
-        begin = _begin(quick, low / rate, high / rate, shortest / rate, noise)
+        begin = _begin(record, low / rate, high / rate, shortest / rate, noise)
         if begin is None:
             continue
         for late in range(TRIES):
@@ -231,32 +231,32 @@ def _decay(
             if not taken.rings and taken.unexplained < EXPLAINED:
                 return None, f"what rings is not from {band[0]:g} to {band[1]:g} Hz, or too faint"
             if taken.rings and _explained(part - taken.fit, part, noise, rate):
-                moved = _onset(record, first, noise)
-                when = [record.begin + k / rate for k in (moved, at, at + part.shape[1])]
+                when = [record.begin + k / rate for k in (first, at, at + part.shape[1])]
                 return Decay(motion, when[0], when[1], when[2], taken), ""
     if len(whole) < 1 or record.broken[first:end].any():
         return None, "samples are clipped or missing, and what is left is no free vibration"
     return None, "no few modes explain what follows: it is no free vibration"
 
 
-def _onset(record: Record, first: int, noise: Array) -> int:
-    """The sample at which a motion begins: what is taken for drift makes `first` early."""
+def _onset(record: Record, about: float, noise: Array) -> float:
+    """When a motion begins [s]: what is taken for drift makes `about` early."""
+    first = max(0, int((about - record.begin) * record.rate))
     early = slice(max(0, first - int(ONSET * record.rate)), max(1, first))
     rest = np.median(record.values[:, early], axis=1, keepdims=True)
     ahead = record.values[:, first : first + int(0.3 * record.rate)]
     # Two samples in a row: one is noise now and then.
-    size = np.sqrt((((ahead - rest) / noise[:, np.newaxis]) ** 2).sum(axis=0) / len(rest))
+    size = np.sqrt((((ahead - rest) / noise[:, np.newaxis]) ** 2).mean(axis=0))
     seen = np.flatnonzero(np.minimum(size[:-1], size[1:]) > ACTIVE)
-    return first + (int(seen[0]) if len(seen) else 0)
+    return float(record.begin + (first + (int(seen[0]) if len(seen) else 0)) / record.rate)
 
 
-def _begin(quick: Record, low: float, high: float, shortest: float, noise: Array) -> float | None:
+def _begin(record: Record, low: float, high: float, shortest: float, noise: Array) -> float | None:
     """Since when, reckoned back from its end, a stretch is free [s from the record's begin]."""
 
     def free(begin: float) -> bool:
-        part = quick.values[:, int(begin * quick.rate) : int(high * quick.rate)]
-        part = part[:, : int(LONGEST * quick.rate)]
-        return _explained(_left(part, quick.rate, noise), part, noise, quick.rate)
+        part = record.values[:, int(begin * record.rate) : int(high * record.rate)]
+        part = part[:, : int(LONGEST * record.rate)]
+        return _explained(_left(part, record.rate, noise), part, noise, record.rate)
 
     begin = high - shortest
     good: float | None = None

@@ -23,7 +23,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 
 MOST_ROWS = 220
-"""Of a block column of the Hankel matrix, and its columns."""
+"""Of the Hankel matrix of one channel; of more, by the square root of their number fewer each."""
 ORDERS = tuple(range(2, 26, 2))
 SAME_F, SAME_ZETA = 0.01, 0.03
 """A pole has come back if its frequency is so near [-], and its damping ratio [-]."""
@@ -147,7 +147,9 @@ def take_apart(values: Array, rate: float, noise: Array, band: tuple[float, floa
         # What rings outside of the band is part of the fit, and nothing that was asked for.
         if not band[0] <= f <= band[1]:
             continue
-        if ring.energy >= LEAST_ENERGY and size > CLEAR and ring.sd_frequency < 0.05 * f:
+        # As many samples of it count as its decay, squared, holds.
+        clear = size * np.sqrt(rate / (4.0 * s_seen))
+        if ring.energy >= LEAST_ENERGY and clear > CLEAR and ring.sd_frequency < 0.05 * f:
             rings.append(ring)
     return Taken(tuple(sorted(rings, key=lambda one: one.frequency)), tuple(seen), unexplained, fit)
 
@@ -190,7 +192,7 @@ def _pole(frequency: float, damping: float) -> complex:
 def _hankel(y: Array, most: int = MOST_ROWS) -> tuple[Array, int]:
     """Left singular vectors of the block Hankel matrix, and the channels in a block."""
     channels, count = y.shape
-    rows = min(count // 2, max(8, most // channels))
+    rows = min(count // 2, max(8, int(most / np.sqrt(channels))))
     # All of the decay counts, though not from every sample on.
     begins = np.arange(0, count - rows, max(1, (count - rows) // (2 * most)))
     index = np.arange(rows)[:, np.newaxis] + begins

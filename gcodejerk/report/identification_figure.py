@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def plot_identification(
     record, search = max(found.searches, key=lambda one: len(one[1].decays))
     decay = max(search.decays, key=_shows, default=None)
     figure = new_figure(suffix, (7.2, 3.0 if decay is None else 8.0), 200)
-    below = [] if decay is None else [["decay", "decay"], ["orders", "spectrum"]]
+    below: list[Any] = [] if decay is None else [["decay", "decay"], ["orders", "spectrum"]]
     parts = figure.subplot_mosaic(
         [["record", "record"], *below], height_ratios=[1.0, 1.1, 1.3][: 1 + len(below)]
     )
