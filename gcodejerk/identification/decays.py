@@ -9,8 +9,10 @@ Rule: a stretch with a clipped or lost sample, or in which the next motion begin
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +113,28 @@ def find_decays(record: Record, band: tuple[float, float]) -> Search:
     -------
     Search
     """
+    with one_thread():
+        return _find(record, band)
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Numerical libraries in one thread: small matrices wait for each other longer than they take.
+
+    Returns
+    -------
+    context manager
+        Which does nothing where threadpoolctl is not installed.
+    """
+    try:
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return nullcontext()
+    limits: AbstractContextManager[Any] = threadpool_limits(limits=1)
+    return limits
+
+
+def _find(record: Record, band: tuple[float, float]) -> Search:
+    """As `find_decays`."""
     whole, record = record, thinned(record, RATE * band[1])
     strength = _strength(record)
     noise = _noise(record, strength)

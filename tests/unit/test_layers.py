@@ -99,7 +99,7 @@ FOREIGN = {
     "scipy": {"motion"},
     "clarabel": {"motion"},
     "platformdirs": {"planning"},
-    "threadpoolctl": {"planning", "motion"},
+    "threadpoolctl": {"planning", "motion", "identification"},
 }
 """Packages that only these parts may import; numpy is everyone's."""
 
