@@ -241,6 +241,7 @@ def _decay(
     # What a clipped or lost sample stands in is no stretch; the last whole one is behind arrival.
     edges = [first - 1, *(first + np.flatnonzero(record.broken[first:end])).tolist(), end]
     whole = [(a + 1, b) for a, b in pairwise(edges) if b - a - 1 >= shortest]
+    why = "no few modes explain what follows: it is no free vibration"
     for low, high in reversed(whole):
         high = min(high, low + int(3.0 * LONGEST * rate))
         begin = _begin(record, low / rate, high / rate, shortest / rate, noise)
@@ -253,13 +254,13 @@ def _decay(
                 break
             taken = take_apart(part, rate, noise, band)
             if not taken.rings and taken.unexplained < EXPLAINED:
-                return None, f"what rings is not from {band[0]:g} to {band[1]:g} Hz, or too faint"
+                why = f"what rings is not from {band[0]:g} to {band[1]:g} Hz, or too faint"
             if taken.rings and _explained(part - taken.fit, part, noise, rate):
                 when = [record.begin + k / rate for k in (first, at, at + part.shape[1])]
                 return Decay(motion, when[0], when[1], when[2], taken), ""
     if len(whole) < 1 or record.broken[first:end].any():
         return None, "samples are clipped or missing, and what is left is no free vibration"
-    return None, "no few modes explain what follows: it is no free vibration"
+    return None, why
 
 
 def _onset(record: Record, about: float, noise: Array) -> float:
