@@ -51,6 +51,8 @@ OVER_NOISE = 1.6
 RATE = 4.0
 """To which records are thinned out: over the highest frequency of the band. A matrix of so many
 rows then spans more of a decay, which is what the uncertainty hangs on."""
+ENOUGH = 4.0
+"""Energy over that of the noise, that a stretch has in its begin: less is taken for noise."""
 QUICK_ORDER, QUICK_ROWS = 16, 50
 """For the search of the begin: poles, and rows."""
 
@@ -251,6 +253,10 @@ def _decay(
             at = int((begin + LATER + late * COARSE) * rate)
             part = record.values[:, at : min(high, at + int(LONGEST * rate))]
             if part.shape[1] < shortest:
+                break
+            early = part[:, : int(BLOCK * BLOCKS * rate)].std(axis=1) / noise
+            if float((early**2).mean()) < ENOUGH:
+                why = "what follows is too faint"
                 break
             taken = take_apart(part, rate, noise, band)
             if not taken.rings and taken.unexplained < EXPLAINED:

@@ -26,7 +26,9 @@ from gcodejerk.planning.conventional import conventional_limits, todays_profiles
 
 TOGETHER = 0.05
 """Frequencies this near each other are one mode's, if they agree. [-]"""
-MOST_SCATTER = 0.03
+INSTEAD = 0.10
+"""Two frequencies this near each other, no decay of which shows both, are one that moves. [-]"""
+MOST_SCATTER = 0.02
 """Of a frequency, beyond which the decays disagree. [-]"""
 MOST_DAMPING_SCATTER = 0.6
 """Of a damping ratio. [-]"""
@@ -166,7 +168,16 @@ def _groups(rings: list[tuple[int, Ring]]) -> list[list[tuple[int, Ring]]]:
             groups[-1].append((k, ring))
         else:
             groups.append([(k, ring)])
-    return groups
+    joined: list[list[tuple[int, Ring]]] = []
+    for group in groups:
+        near = (
+            bool(joined) and group[0][1].frequency < (1.0 + INSTEAD) * joined[-1][-1][1].frequency
+        )
+        if near and not {k for k, _ in joined[-1]} & {k for k, _ in group}:
+            joined[-1] = joined[-1] + group
+        else:
+            joined.append(group)
+    return joined
 
 
 def _judged(rings: list[Ring], of: int, parts: tuple[float, float] | None) -> Identified:

@@ -1,7 +1,7 @@
 """The sample record samples/ringing.csv, and the program that it is of.
 
-`python tests/bench/ringing.py`: the machine vmc33 runs `machine test-program` and a sensor of little
-cost feels it, 25 mm/s^2 of noise, 800 times a second.
+`python tests/bench/ringing.py`: the machine vmc33 runs `machine test-program`, and a cheap sensor
+feels it, 25 mm/s^2 of noise, 800 times a second.
 """
 
 from __future__ import annotations

@@ -392,9 +392,9 @@ def test_a_unit_that_gravity_contradicts_is_said():
     ids=["empty", "header", "one", "constant", "back", "unit", "uff", "nan"],
 )  # fmt: skip
 def test_what_is_no_record_is_refused(tmp_path, text, says):
+    path = written(tmp_path, text)
     with pytest.raises(RecordError, match=says):
-        found = read_file(written(tmp_path, text))
-        make_record(found)
+        make_record(read_file(path))
 
 
 def test_bytes_are_refused(tmp_path):
