@@ -44,6 +44,9 @@ WELL_STRUCK = 0.2
 """Participations are taken from moves that strike a mode at least by this part of the strongest."""
 
 
+ONSET_UNSURE = 0.005
+"""When a rapid began is seen so late, since a servo begins gently: the decay since then counts for
+the participation. [s]"""
 MOST_EARLY = 0.005
 """What a decay may begin before its rapid ends by the machine file. [s]"""
 
@@ -275,4 +278,5 @@ def _participations(
     if not len(ratio) or strongest <= 0.0:
         return None
     scatter = float(ratio.std(ddof=1)) if len(ratio) > 1 else float(ratio[0])
-    return float(np.median(ratio)), scatter
+    value = float(np.median(ratio))
+    return value, float(np.hypot(scatter, value * -float(pole.real[0]) * ONSET_UNSURE))
