@@ -32,7 +32,7 @@ BACK = 0.6
 TIMES = 4
 """At least so often."""
 WELL_DAMPED = 0.25
-LEAST_ENERGY = 0.005
+LEAST_ENERGY = 0.001
 """Of the whole, that a mode has at least."""
 CLEAR = 4.0
 """Amplitude over its uncertainty."""
