@@ -20,6 +20,7 @@ from gcodejerk._version import __version__
 from gcodejerk.batch.signals import exit_on
 from gcodejerk.cli.controllers import controllers
 from gcodejerk.cli.hosts import filter_program, install
+from gcodejerk.cli.identification import identify
 from gcodejerk.cli.machines import (
     machine_check,
     machine_list,
@@ -54,6 +55,7 @@ app.command("map")(map_amplitudes)
 app.command("compare")(compare)
 app.command("parameters")(parameters)
 app.command("simulate")(simulate)
+app.command("identify")(identify)
 app.command("controllers")(controllers)
 app.command("filter")(filter_program)
 app.command("install")(install)

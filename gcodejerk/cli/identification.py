@@ -1,0 +1,230 @@
+"""The command `identify`: modes from a measurement."""
+
+from __future__ import annotations
+
+import math
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gcodejerk.cli.common import MachineOption, console, load_machine, say
+from gcodejerk.cli.moves import FIGURES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.console import RenderableType
+
+    from gcodejerk.identification import Commanded, Record, Spectrum
+    from gcodejerk.machine import Machine
+
+BAND = (5.0, 150.0)
+"""Where modes are looked for, as far as a record reaches. [Hz]"""
+REACH = 0.4
+"""Of the sampling rate: as far as a record reaches."""
+
+
+def identify(
+    records: Annotated[
+        list[str],
+        typer.Argument(metavar="RECORD...", help="accelerations over time, or spectra (CSV)"),
+    ],
+    axis: Annotated[str, typer.Option(metavar="AXIS", help="that moved")],
+    channel: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="the column that feels the axis; for participations"),
+    ] = None,
+    machine: MachineOption = None,
+    program: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="what ran; for participations, with --machine"),
+    ] = None,
+    time: Annotated[
+        str | None, typer.Option(metavar="NAME", help="column of times, its name or number")
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="only this column; may be given again"),
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="samples a second, without a column of times")
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option(metavar="U", help="g, m/s^2 or mm/s^2, in place of the file's")
+    ] = None,
+    band: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="LOW HIGH", help="where to look for modes [Hz], 5 150 by default"),
+    ] = None,
+    as_json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="write all figures; - is standard output"),
+    ] = None,
+    plot: Annotated[
+        str | None, typer.Option("--plot", metavar="FILE", help="draw (.png, .svg, .pdf)")
+    ] = None,
+    output: Annotated[
+        str | None,
+        typer.Option("-o", "--output", metavar="FILE", help="write the block of a machine file"),
+    ] = None,
+) -> None:
+    """Identify modes (frequency, damping, participation) from records of vibration."""
+    from gcodejerk.identification import Record, RecordError, Spectrum, make_record, read_file
+
+    name = _checked(axis, unit, rate, band, plot)
+    outputs = [one for one in (as_json, plot, output) if one is not None]
+    if len(set(outputs)) < len(outputs):
+        raise typer.BadParameter("--json, --plot and -o are files of their own")
+    described, moves = _told(machine, program, name)
+    read = [read_file(one, time=time, columns=column or (), rate=rate) for one in records]
+    found = [one if isinstance(one, Spectrum) else make_record(one, unit) for one in read]
+    spectra = [one for one in found if isinstance(one, Spectrum)]
+    taken = [one for one in found if isinstance(one, Record)]
+    if spectra and taken:
+        raise RecordError(
+            f"{spectra[0].name} is a spectrum and {taken[0].name} is not",
+            "give records over time, or spectra",
+        )
+    if spectra:
+        _show(*_spectra(spectra, name, band or BAND), as_json, plot, output)
+    else:
+        _show(*_records(taken, name, channel, described, moves, band), as_json, plot, output)
+
+
+def _checked(
+    axis: str,
+    unit: str | None,
+    rate: float | None,
+    band: tuple[float, float] | None,
+    plot: str | None,
+) -> str:
+    """The axis, where the options make sense."""
+    from gcodejerk.axes import AXES
+    from gcodejerk.identification.record import UNITS
+
+    if plot is not None and Path(plot).suffix.lower() not in FIGURES:
+        raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
+    if unit is not None and unit not in UNITS:
+        raise typer.BadParameter(f"--unit {unit}: it is one of {', '.join(UNITS)}")
+    if rate is not None and not (math.isfinite(rate) and rate > 0.0):
+        raise typer.BadParameter(f"--rate {rate:g}: it has to be above 0")
+    if band is not None and not 0.0 < band[0] < band[1] < math.inf:
+        raise typer.BadParameter(f"--band {band[0]:g} {band[1]:g}: the lower one first, above 0")
+    if axis.upper() not in AXES:
+        raise typer.BadParameter(f"--axis {axis}: it is one of {' '.join(AXES)}")
+    return axis.upper()
+
+
+def _told(
+    machine: str | None, program: str | None, axis: str
+) -> tuple[Machine | None, list[Commanded]]:
+    """The machine and the rapids that it was told, as far as the user says them."""
+    from gcodejerk.batch.files import open_input
+    from gcodejerk.identification import commanded_rapids
+
+    if program is None:
+        return None, []
+    described = load_machine(machine, [program])
+    described.axis(axis)
+    with open_input(program) as source:
+        return described, commanded_rapids(source.read(), described, program)
+
+
+_Result = tuple[
+    "RenderableType",
+    "list[str]",
+    str,
+    "Callable[[], dict[str, Any]]",
+    "Callable[[Any, str], None]",
+]
+"""Table, sentences, block, JSON, figure."""
+
+
+def _records(
+    records: list[Record],
+    axis: str,
+    channel: str | None,
+    machine: Machine | None,
+    moves: list[Commanded],
+    band: tuple[float, float] | None,
+) -> _Result:
+    from gcodejerk.identification import RecordError, find_decays, identify_modes
+    from gcodejerk.report.identification_figure import plot_identification
+    from gcodejerk.report.identification_record import identification_record, modes_block
+    from gcodejerk.report.identification_table import (
+        identification_sentences,
+        identification_table,
+    )
+
+    for record in records:
+        if channel is not None and channel not in record.channels:
+            raise RecordError(
+                f"{record.name} has no channel {channel!r}",
+                f"its channels are {', '.join(record.channels)}",
+            )
+    reach = REACH * min(record.rate for record in records)
+    low, high = band or (BAND[0], min(BAND[1], reach))
+    if high > reach or low >= high:
+        raise RecordError(
+            f"{records[0].name} reaches to {reach:.0f} Hz only, not to {high:g} Hz",
+            f"record faster, or state --band {BAND[0]:g} {reach:.0f}",
+        )
+    looked = (low, high)
+    searches = [(record, find_decays(record, looked)) for record in records]
+    found = identify_modes(searches, axis, channel, machine, moves)
+    return (
+        identification_table(found),
+        identification_sentences(found),
+        modes_block(found),
+        lambda: identification_record(found),
+        lambda file, suffix: plot_identification(found, looked, file, suffix),
+    )
+
+
+def _spectra(spectra: list[Spectrum], axis: str, band: tuple[float, float]) -> _Result:
+    from gcodejerk.identification import find_peaks
+    from gcodejerk.report.identification_figure import plot_peaks
+    from gcodejerk.report.identification_record import peaks_record, spectrum_block
+    from gcodejerk.report.identification_table import peaks_sentences, peaks_table
+
+    found = [find_peaks(one, band) for one in spectra]
+    return (
+        peaks_table(found),
+        peaks_sentences(found),
+        spectrum_block(found, axis),
+        lambda: peaks_record(found, axis),
+        lambda file, suffix: plot_peaks(found, band, file, suffix),
+    )
+
+
+def _show(
+    table: RenderableType,
+    sentences: list[str],
+    block: str,
+    record: Callable[[], dict[str, Any]],
+    draw: Callable[[Any, str], None],
+    as_json: str | None,
+    plot: str | None,
+    output: str | None,
+) -> None:
+    """Write what was asked for, and print the rest where standard output is free."""
+    from gcodejerk.batch.files import new_file
+    from gcodejerk.report.records import dump
+
+    with ExitStack() as outputs:
+        if as_json is not None:
+            outputs.enter_context(new_file(as_json)).write(dump(record()))
+        if plot is not None:
+            draw(outputs.enter_context(new_file(plot)), Path(plot).suffix)
+        if output is not None:
+            outputs.enter_context(new_file(output)).write(block.encode("utf-8", "replace"))
+    if "-" in (as_json, plot, output):
+        return
+    console().print(table)
+    for line in sentences:
+        say(line)
+    if output is None:
+        print()
+        print(block, end="")

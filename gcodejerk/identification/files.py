@@ -1,0 +1,251 @@
+"""Files of sensors and controls, read into samples or a spectrum.
+
+This module owns the formats: what is told by a header, what by a first line, what the user has to
+say. Any CSV with times and columns can be read; the formats that are known need no option.
+
+| format | known by | source |
+|---|---|---|
+| Klipper, raw | `#time,accel_x,...`, s and mm/s^2 | klippy/extras/adxl345.py |
+| Klipper, PSD | `freq,psd_x,...` | klippy/extras/shaper_calibrate.py |
+| Duet | `Sample,X,Y,Z`, last line `Rate N`, g | general knowledge |
+| phyphox | `"Time (s)","Acceleration x (m/s^2)"` | general knowledge |
+| PicoQuake | `#` lines with `data_rate`, `count,a_x,..`, g | PicoQuake docs |
+| LinuxCNC halscope | `# Sampling period is N ns` | src/hal/utils/scope_files.c |
+| LinuxCNC halsampler | columns without header; --rate | man halsampler |
+| TwinCAT Scope and others | a header; --time, --column | Beckhoff TE13xx |
+| UFF 58, Shake&Tune's .stdata | are refused with what to do | pyuff; Klippain Shake&Tune |
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gcodejerk.identification.record import RecordError, Samples, Spectrum, unit_of
+from gcodejerk.motion.profiles.profile import Array
+
+LARGEST = 1 << 30
+"""Bytes of a file."""
+HEAD_LINES = 40
+SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?$")
+_TIME = re.compile(r"^#?\W*(time|t|zeit|timestamp)\b|^#?\W*(time|t)[ _(\[]", re.IGNORECASE)
+_COUNT = re.compile(r"^\W*(sample|count|index|n|no\.?)\W*$", re.IGNORECASE)
+
+
+def read_file(
+    path: str | Path,
+    *,
+    time: str | None = None,
+    columns: Sequence[str] = (),
+    rate: float | None = None,
+) -> Samples | Spectrum:
+    """Read a file of a sensor or a control.
+
+    Parameters
+    ----------
+    path : str or Path
+    time : str, optional
+        Name, or number from 1, of the column of times.
+    columns : sequence of str, optional
+        Names, or numbers from 1, of the channels; all by default.
+    rate : float, optional
+        In place of times. [Hz]
+
+    Returns
+    -------
+    Samples or Spectrum
+
+    Raises
+    ------
+    RecordError
+        It cannot be read, or is not understood.
+    """
+    name = str(path)
+    try:
+        size = Path(path).stat().st_size
+        if size > LARGEST:
+            raise RecordError(f"{name} has {size >> 20} MB, expected at most 1024", "cut it")
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise RecordError(f"{name} cannot be read: {error.strerror}") from None
+    if data[:4] == b"\x28\xb5\x2f\xfd":
+        raise RecordError(
+            f"{name} is compressed (zstandard; Shake&Tune's .stdata is), which is not read here",
+            "record with TEST_RESONANCES AXIS=X OUTPUT=raw_data, and give the CSV file",
+        )
+    text = data.decode("utf-8-sig", "replace")
+    if re.match(r"\s*-1\s*\n\s*58\b", text):
+        raise RecordError(
+            f"{name} is a UFF 58 file, which is not read here",
+            "write its time records as CSV (pyuff does), and give that",
+        )
+    if "\x00" in text[:4096]:
+        raise RecordError(f"{name} is no text", "export the record as CSV")
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise RecordError(f"{name} is empty", "record again")
+    return _Table(name, lines).read(time, columns, rate)
+
+
+class _Table:
+    """Lines of a file, taken apart."""
+
+    def __init__(self, name: str, lines: list[str]) -> None:
+        self.name = name
+        self.period = self._stated(lines, r"Sampling period is ([\d.]+) *ns", 1e-9)
+        ends = self._stated(lines[-1:], r"Rate[ :]+([\d.]+)", 1.0)
+        rated = self._stated(lines[:HEAD_LINES], r"data_rate\W+([\d.]+)", 1.0)
+        self.rate = ends or rated or (1.0 / self.period if self.period else None)
+        self.lost = [k for k, line in enumerate(lines) if line.strip() == "overrun"]
+        body = [line for line in lines if line.strip() != "overrun"]
+        if ends:
+            body = body[:-1]
+        self.separator = self._find_separator(body)
+        first = next((k for k, line in enumerate(body) if self._is_row(line)), None)
+        if first is None:
+            raise RecordError(f"{name} has no line of numbers", "a table of samples is expected")
+        self.header = self._find_header(body[:first])
+        self.comma = self.separator != "," and any("," in line for line in body[first : first + 5])
+        self.rows = body[first:]
+        self.first = first
+
+    @staticmethod
+    def _stated(lines: list[str], pattern: str, scale: float) -> float | None:
+        for line in lines[:HEAD_LINES]:
+            if found := re.search(pattern, line, re.IGNORECASE):
+                return scale * float(found[1])
+        return None
+
+    @staticmethod
+    def _find_separator(lines: list[str]) -> str | None:
+        """What stands between columns, None: blanks."""
+        sample = lines[min(len(lines) - 1, len(lines) // 2)]
+        for mark in (";", "\t"):
+            if mark in sample:
+                return mark
+        return "," if "," in sample else None
+
+    def _cells(self, line: str) -> list[str]:
+        if self.separator is None:
+            return line.split()
+        cells = next(csv.reader([line], delimiter=self.separator))
+        return [cell.strip() for cell in (cells[:-1] if cells and not cells[-1] else cells)]
+
+    def _is_row(self, line: str) -> bool:
+        if line.lstrip().startswith("#"):
+            return False
+        cells = self._cells(line)
+        return bool(cells) and all(_NUMBER.match(cell) for cell in cells)
+
+    def _find_header(self, lines: list[str]) -> list[str]:
+        """Names of the columns: the last line above the numbers that has several."""
+        for line in reversed(lines):
+            cells = self._cells(line.lstrip("# "))
+            if len(cells) > 1 and not line.lstrip().startswith("# "):
+                return cells
+        return []
+
+    def read(
+        self, time: str | None, columns: Sequence[str], rate: float | None
+    ) -> Samples | Spectrum:
+        """What the table holds."""
+        values = self._numbers()
+        names = self.header or [f"column {k + 1}" for k in range(values.shape[1])]
+        if len(names) != values.shape[1]:
+            raise RecordError(
+                f"{self.name} has {len(names)} names above {values.shape[1]} columns",
+                "its header and its rows have to agree",
+            )
+        if names[0].lower().lstrip("#") in ("freq", "frequency", "freq (hz)", "frequency [hz]"):
+            return self._spectrum(names, values)
+        at = None if rate is not None and time is None else self._time_column(names, time)
+        chosen = self._chosen(names, columns, at)
+        times = None
+        if at is not None:
+            times = values[:, at] * self._seconds(names[at])
+        elif rate is None and self.rate is None:
+            raise RecordError(
+                f"{self.name} has no column of times: {', '.join(names)}",
+                "state --time NAME or --rate HZ",
+            )
+        units = {unit_of(names[k]) for k in chosen}
+        unit = units.pop() if len(units) == 1 else None
+        if unit is None and self._has_klipper_names(names):
+            unit = "mm/s^2"
+        if unit is None and (names[0].lower() in ("sample", "count") and self.rate):
+            unit = "g"
+        return Samples(
+            self.name, times, rate or self.rate, tuple(names[k].strip('# "') for k in chosen),
+            values[:, chosen].T, unit, tuple(self.lost),
+        )  # fmt: skip
+
+    @staticmethod
+    def _has_klipper_names(names: list[str]) -> bool:
+        return [name.lstrip("# ") for name in names[:4]] == [
+            "time", "accel_x", "accel_y", "accel_z",
+        ]  # fmt: skip
+
+    def _numbers(self) -> Array:
+        text = "\n".join(self.rows)
+        if self.comma:
+            text = text.replace(",", ".")
+        if self.separator in (";", ","):
+            text = re.sub(rf"{self.separator}\s*$", "", text, flags=re.MULTILINE)
+        try:
+            out: Array = np.loadtxt(
+                io.StringIO(text), delimiter=self.separator, ndmin=2, comments="#", quotechar='"'
+            )
+        except ValueError as error:
+            found = re.search(r"row (\d+)", str(error))
+            where = f" line {self.first + int(found[1]) + 1}" if found else ""
+            raise RecordError(
+                f"{self.name}{where}: {error}".split(";")[0], "every row is as many numbers"
+            ) from None
+        return out
+
+    def _spectrum(self, names: list[str], values: Array) -> Spectrum:
+        axes = [k for k, name in enumerate(names) if re.fullmatch(r"psd_[xyz]", name.lower())]
+        chosen = axes or list(range(1, values.shape[1]))
+        # The scores of shapers stand beside what was scaled for them: `mzv(54.2)`.
+        shapers = any(re.fullmatch(r"\w+\([\d.]+\)", name) for name in names)
+        scaled = shapers or "calibration" in Path(self.name).name
+        return Spectrum(
+            self.name, values[:, 0], tuple(names[k] for k in chosen), values[:, chosen].T,
+            normalized=scaled,
+        )  # fmt: skip
+
+    def _time_column(self, names: list[str], time: str | None) -> int | None:
+        if time is not None:
+            return self._index(names, time)
+        found = [k for k, name in enumerate(names) if _TIME.search(name.strip('"'))]
+        return found[0] if found else None
+
+    def _chosen(self, names: list[str], columns: Sequence[str], at: int | None) -> list[int]:
+        if columns:
+            return [self._index(names, column) for column in columns]
+        rest = [k for k, name in enumerate(names) if k != at and not _COUNT.match(name)]
+        felt = [k for k in rest if re.search(r"acc|^\W*a?_?[xyz]\W*$", names[k], re.IGNORECASE)]
+        chosen = felt or rest
+        # phyphox and others add the length of the vector.
+        return [k for k in chosen if not re.search(r"abs|norm|total", names[k], re.IGNORECASE)]
+
+    def _index(self, names: list[str], said: str) -> int:
+        plain = [name.strip('# "') for name in names]
+        if said in plain:
+            return plain.index(said)
+        if said.isdigit() and 1 <= int(said) <= len(names):
+            return int(said) - 1
+        raise RecordError(
+            f"{self.name} has no column {said!r}", f"its columns are {', '.join(plain)}"
+        )
+
+    @staticmethod
+    def _seconds(name: str) -> float:
+        found = re.search(r"[(\[_ ](s|sec|ms|us|µs|ns)[)\]]?\W*$", name.strip('"'), re.IGNORECASE)
+        return SECONDS[found[1].lower()] if found else 1.0
