@@ -5,7 +5,6 @@ and share no code with what takes them apart.
 """
 
 import json
-import os
 import re
 from functools import cache
 from pathlib import Path
@@ -27,16 +26,17 @@ from gcodejerk.identification import (
     make_record,
     read_file,
 )
-from gcodejerk.identification.decays import one_thread, thinned
+from gcodejerk.identification.decays import thinned
 from gcodejerk.identification.record import Record
 from gcodejerk.identification.ringing import take_apart
 from gcodejerk.machine import Machine, find_machine
+from gcodejerk.motion.threads import one_thread
 from gcodejerk.planning.move import plan_move
 from gcodejerk.simulation.single import MoveSimulation
 
 BAND = (5.0, 150.0)
 SAMPLES = Path(__file__).resolve().parents[2] / "samples"
-PUBLIC = Path(os.environ.get("GCODEJERK_PUBLIC_RECORDS", "no such folder"))
+PUBLIC = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 LENGTHS = (1.6, -1.6, 2.1, -2.1, 38.4, -38.4)
 ADXL345 = (290e-6 * 9806.65) ** 2
 """One-sided noise density of a cheap sensor. [(mm/s^2)^2/Hz]"""
@@ -519,13 +519,13 @@ def test_a_spectrum_leads_to_the_key_spectrum(command, tmp_path):
     assert "damping:" not in said
 
 
-# Public records, which stay outside of the tree: GCODEJERK_PUBLIC_RECORDS is their folder.
+# Public records, which stay outside of the tree.
 
 
 def public(pattern):
     found = sorted(PUBLIC.glob(pattern))
     if not found:
-        pytest.skip(f"no {pattern} in GCODEJERK_PUBLIC_RECORDS")
+        pytest.skip(f"no {pattern} in {PUBLIC}: the public records are not here")
     return found
 
 
