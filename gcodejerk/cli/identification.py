@@ -71,14 +71,18 @@ def identify(
     ] = None,
 ) -> None:
     """Identify modes (frequency, damping, participation) from records of vibration."""
-    from gcodejerk.identification import Record, RecordError, Spectrum, make_record, read_file
+    from gcodejerk.identification import Record, RecordError, Spectrum, make_record, read_records
 
     name = _checked(axis, unit, rate, band, plot)
     outputs = [one for one in (as_json, plot, output) if one is not None]
     if len(set(outputs)) < len(outputs):
         raise typer.BadParameter("--json, --plot and -o are files of their own")
     described, moves = _told(machine, program, name)
-    read = [read_file(one, time=time, columns=column or (), rate=rate) for one in records]
+    read = [
+        found
+        for one in records
+        for found in read_records(one, time=time, columns=column or (), rate=rate)
+    ]
     found = [one if isinstance(one, Spectrum) else make_record(one, unit) for one in read]
     spectra = [one for one in found if isinstance(one, Spectrum)]
     taken = [one for one in found if isinstance(one, Record)]

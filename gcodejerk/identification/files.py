@@ -13,7 +13,7 @@ say. Any CSV with times and columns can be read; the formats that are known need
 | LinuxCNC halscope | `# Sampling period is N ns` | src/hal/utils/scope_files.c |
 | LinuxCNC halsampler | columns without header; --rate | man halsampler |
 | TwinCAT Scope and others | a header; --time, --column | Beckhoff TE13xx |
-| UFF 58, Shake&Tune's .stdata | are refused with what to do | pyuff; Klippain Shake&Tune |
+| UFF 58, Shake&Tune's .stdata | their first bytes; `containers` | pyuff; Klippain Shake&Tune |
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gcodejerk.identification.containers import COMPRESSED, chosen, read_stdata, read_uff
 from gcodejerk.identification.record import RecordError, Samples, Spectrum, unit_of
 from gcodejerk.motion.profiles.profile import Array
 
@@ -38,6 +39,38 @@ _TIME = re.compile(r"^#?\W*(time|t|zeit|timestamp)\b|^#?\W*(time|t)[ _(\[]", re.
 _COUNT = re.compile(r"^\W*(sample|count|index|n|no\.?)\W*$", re.IGNORECASE)
 
 
+def read_records(
+    path: str | Path,
+    *,
+    time: str | None = None,
+    columns: Sequence[str] = (),
+    rate: float | None = None,
+) -> list[Samples | Spectrum]:
+    """Read all that a file holds: one table, or the records of a UFF 58 or .stdata file.
+
+    Parameters
+    ----------
+    path, time, columns, rate
+        As `read_file` has them; `time` and `rate` are of tables.
+
+    Returns
+    -------
+    list of Samples or Spectrum
+
+    Raises
+    ------
+    RecordError
+        As `read_file`.
+    """
+    name = str(path)
+    data = _content(path)
+    if data[:4] == COMPRESSED:
+        return chosen(read_stdata(name, data), columns)
+    if re.match(rb"\s*-1\s*\n\s*58\b", data):
+        return chosen(read_uff(name, path), columns)
+    return [_read_table(name, data, time, columns, rate)]
+
+
 def read_file(
     path: str | Path,
     *,
@@ -45,7 +78,7 @@ def read_file(
     columns: Sequence[str] = (),
     rate: float | None = None,
 ) -> Samples | Spectrum:
-    """Read a file of a sensor or a control.
+    """Read a file of a sensor or a control that holds one record.
 
     Parameters
     ----------
@@ -66,25 +99,28 @@ def read_file(
     RecordError
         It cannot be read, or is not understood.
     """
-    name = str(path)
+    found = read_records(path, time=time, columns=columns, rate=rate)
+    if len(found) != 1:
+        raise RecordError(f"{path} holds {len(found)} records", "give a file of one")
+    return found[0]
+
+
+def _content(path: str | Path) -> bytes:
+    """The bytes of a file, if they are not too many."""
     try:
         size = Path(path).stat().st_size
         if size > LARGEST:
-            raise RecordError(f"{name} has {size >> 20} MB, expected at most 1024", "cut it")
-        data = Path(path).read_bytes()
+            raise RecordError(f"{path} has {size >> 20} MB, expected at most 1024", "cut it")
+        return Path(path).read_bytes()
     except OSError as error:
-        raise RecordError(f"{name} cannot be read: {error.strerror}") from None
-    if data[:4] == b"\x28\xb5\x2f\xfd":
-        raise RecordError(
-            f"{name} is compressed (zstandard; Shake&Tune's .stdata is), which is not read here",
-            "record with TEST_RESONANCES AXIS=X OUTPUT=raw_data, and give the CSV file",
-        )
+        raise RecordError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def _read_table(
+    name: str, data: bytes, time: str | None, columns: Sequence[str], rate: float | None
+) -> Samples | Spectrum:
+    """A table of text."""
     text = data.decode("utf-8-sig", "replace")
-    if re.match(r"\s*-1\s*\n\s*58\b", text):
-        raise RecordError(
-            f"{name} is a UFF 58 file, which is not read here",
-            "write its time records as CSV (pyuff does), and give that",
-        )
     if "\x00" in text[:4096]:
         raise RecordError(f"{name} is no text", "export the record as CSV")
     lines = [line for line in text.splitlines() if line.strip()]

@@ -27,7 +27,7 @@ LINES = 1500
 """Points of a curve over frequency."""
 MOST_NAMES = 6
 """Peaks that are named."""
-BESIDE = 0.12
+BESIDE = 0.28
 """Two peaks nearer than this share of their frequency get one name."""
 
 
@@ -65,10 +65,12 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
     frequency = _frequencies(found)
     for way, style in STYLE.items():
         told.semilogx(frequency, found.command_spectrum(way, frequency, axis), **style)
+        thin = style | {"linewidth": 0.6, "linestyle": "-", "label": None}
+        told.semilogx(frequency, found.table_spectrum(way, frequency, axis), **thin)
         left.loglog(frequency, UM * found.tool_spectrum(way, frequency), **style)
     _machine(machine, found, frequency, axis)
     _label(command, f"(a) acceleration told to {axis}", "time [ms]", "[mm/s²]")
-    _label(told, "(b) its spectrum", "frequency [Hz]", "[mm/s]")
+    _label(told, "(b) its spectrum; thin: what the table makes of it", "frequency [Hz]", "[mm/s]")
     _label(lag, f"(c) lag of {axis}'s table", "time [ms]", "[µm]")
     _label(left, "(d) spectrum of the tool behind the move", "frequency [Hz]", "[µm s]")
     _label(tool, "(e) tool from its place, behind the move", "time [ms]", "[µm]")

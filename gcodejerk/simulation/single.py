@@ -12,7 +12,7 @@ import numpy as np
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.planning.move import Plan
-from gcodejerk.simulation.equations import equations_of
+from gcodejerk.simulation.equations import Row, equations_of
 from gcodejerk.simulation.moves import Outcome, Watch
 from gcodejerk.simulation.programs import planned_steps, today_steps, written_steps
 from gcodejerk.simulation.response import Steps
@@ -132,6 +132,12 @@ class MoveSimulation:
         spectrum: Array = np.abs(np.einsum("nj,jf,nf->f", size, orders, waves))
         return spectrum
 
+    def table_spectrum(self, way: str, frequency: Array, axis: str) -> Array:
+        """Amplitude density of the table's acceleration, motion and all, shape (f,) [mm/s^2/Hz]."""
+        gain = self._told_to(self.watch.equations.table[axis], frequency, axis)
+        spectrum: Array = np.abs(gain) * self.command_spectrum(way, frequency, axis)
+        return spectrum
+
     def tool_spectrum(self, way: str, frequency: Array) -> Array:
         """Amplitude density of the tool's motion behind the move, shape (f,) [mm/Hz].
 
@@ -172,17 +178,20 @@ class MoveSimulation:
         """
         equations = self.watch.equations
         s = 2j * np.pi * frequency
-        seen = equations.table[axis] + equations.vibration[axis]
-        eye = np.eye(len(equations.A))
-        inverse = [np.linalg.inv(one * eye - equations.A) for one in s]
-        if equations.pushed:
-            pushed = equations.pushed[axis]
-            return np.array([seen.state @ g @ pushed for g in inverse])
-        u = equations.axes.index(axis)
-        row = equations.deviation(axis)
+        if not equations.pushed:
+            return self._told_to(equations.deviation(axis), frequency, axis) / s**2
+        seen = (equations.table[axis] + equations.vibration[axis]).state
+        eye, pushed = np.eye(len(equations.A)), equations.pushed[axis]
+        return np.array([seen @ np.linalg.solve(one * eye - equations.A, pushed) for one in s])
+
+    def _told_to(self, row: Row, frequency: Array, axis: str) -> Complex:
+        """From where an axis is told to be to what a row sees, shape (f,)."""
+        equations = self.watch.equations
+        u, eye = equations.axes.index(axis), np.eye(len(equations.A))
         out = []
-        for one, g in zip(s, inverse, strict=True):
-            told = np.array([1.0, one, one * one])
-            state = g @ np.einsum("j,js->s", told, equations.B[:, :, u])
-            out.append((row.state @ state + row.command[:, u] @ told) / one**2)
+        for s in 2j * np.pi * frequency:
+            told = np.array([1.0, s, s * s])
+            forced = np.einsum("j,js->s", told, equations.B[:, :, u])
+            state = np.linalg.solve(s * eye - equations.A, forced)
+            out.append(row.state @ state + row.command[:, u] @ told)
         return np.array(out)

@@ -25,6 +25,7 @@ from gcodejerk.identification import (
     identify_modes,
     make_record,
     read_file,
+    read_records,
 )
 from gcodejerk.identification.decays import thinned
 from gcodejerk.identification.record import Record
@@ -385,7 +386,7 @@ def test_a_unit_that_gravity_contradicts_is_said():
         ("time [s],az [g]\n" + "".join(f"{k / 100},{k % 7}\n" for k in range(50)) + "0.1,3\n",
          "time goes back"),
         ("time [s],az\n" + "".join(f"{k / 100},{k % 7}\n" for k in range(99)), "unit"),
-        ("    -1\n    58\nx\n", "UFF 58"),
+        ("    -1\n    58\nx\n", "no whole UFF|neither records"),
         ("time,az\n0,1\n0.1,nan\n0.2,4\n" * 20, "row|number|NaN|nan|goes back"),
     ],
     ids=["empty", "header", "one", "constant", "back", "unit", "uff", "nan"],
@@ -401,10 +402,72 @@ def test_bytes_are_refused(tmp_path):
     (tmp_path / "r.stdata").write_bytes(b"\x28\xb5\x2f\xfd" + bytes(100))
     with pytest.raises(RecordError, match="no text"):
         read_file(tmp_path / "r.csv")
-    with pytest.raises(RecordError, match="raw_data"):
+    with pytest.raises(RecordError, match=r"stream|no measurement"):
         read_file(tmp_path / "r.stdata")
     with pytest.raises(RecordError, match="cannot be read"):
         read_file(tmp_path / "none.csv")
+
+
+def test_measurements_of_shake_and_tune_are_read_one_by_one(tmp_path):
+    zstandard = pytest.importorskip("zstandard")
+    t = np.arange(0.0, 0.2, 1 / 3200)
+    lines = [
+        {"name": f"belt_{k}", "samples": [[x, 9.0 * k, 200.0 * np.sin(9 * x), 9806.0] for x in t]}
+        for k in (1, 2)
+    ]
+    text = "".join(json.dumps(one) + "\n" for one in lines)
+    (tmp_path / "a.stdata").write_bytes(zstandard.compress(text.encode()))
+    found = read_records(tmp_path / "a.stdata")
+    assert [one.name.split()[-1] for one in found] == ["belt_1", "belt_2"]
+    record = make_record(found[1])
+    assert record.rate == pytest.approx(3200.0)
+    assert record.channels == ("accel_x", "accel_y", "accel_z")
+    assert np.ptp(record.values[1]) == pytest.approx(np.ptp(200.0 * np.sin(9 * t)))
+    (one,) = read_records(tmp_path / "a.stdata", columns=["accel_y"])[:1]
+    assert one.channels == ("accel_y",)
+    with pytest.raises(RecordError, match="holds 2 records"):
+        read_file(tmp_path / "a.stdata")
+    (tmp_path / "b.stdata").write_bytes(zstandard.compress(b'{"name": "x", "samples": [[1, 2]]}'))
+    with pytest.raises(RecordError, match="line 1 of the stream"):
+        read_records(tmp_path / "b.stdata")
+
+
+def uff_58(wave, rate, node, direction):
+    """A data set of type 58, record by record as the format has them (SDRC, Universal File)."""
+    head = (
+        f"{1:5d}{0:10d}{1:5d}{0:10d} {'NONE':<10}{node:10d}{direction:4d} {'NONE':<10}{0:10d}{0:4d}"
+    )
+    steps = f"{4:10d}{len(wave):10d}{1:10d}{0.0:13.5e}{1 / rate:13.5e}{0.0:13.5e}"
+    axes = [
+        (17, "Time", "s"),
+        (12, "Acceleration", "m/s^2"),
+        (0, "NONE", "NONE"),
+        (0, "NONE", "NONE"),
+    ]
+    labels = [f"{kind:10d}{0:5d}{0:5d}{0:5d} {name:<20} {unit:<20}" for kind, name, unit in axes]
+    rows = ["".join(f"{x:20.11e}" for x in wave[k : k + 4]) for k in range(0, len(wave), 4)]
+    return "\n".join(["    -1", "    58", *["NONE"] * 5, head, steps, *labels, *rows, "    -1", ""])
+
+
+def test_uff_58_is_read_as_it_was_written(tmp_path):
+    pytest.importorskip("pyuff")
+    t = np.arange(0.0, 2.0, 1 / 800)
+    waves = [np.sin(30 * t), np.cos(70 * t)]
+    path = tmp_path / "r.uff"
+    path.write_text("".join(uff_58(wave, 800, 7, k + 1) for k, wave in enumerate(waves)))
+    (found,) = read_records(path)
+    assert found.channels == ("7X", "7Y")
+    record = make_record(found)
+    assert record.rate == pytest.approx(800.0)
+    assert record.values[0] == pytest.approx(1e3 * (waves[0] - np.median(waves[0])), abs=1e-2)
+
+
+def test_a_real_uff_spectrum_is_one():
+    (path,) = public("identify/pyuff_sample_dataset58_psd.uff")
+    pytest.importorskip("pyuff")
+    (found,) = read_records(path)
+    assert isinstance(found, Spectrum)
+    assert found.values.shape == (1, len(found.frequency))
 
 
 @pytest.mark.parametrize("what", ["noise", "hum", "ramp", "step"])

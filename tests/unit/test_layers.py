@@ -97,6 +97,8 @@ FOREIGN = {
     "matplotlib": {"report"},
     "hypothesis": {"testing"},
     "scipy": {"motion"},
+    "pyuff": {"identification"},
+    "zstandard": {"identification"},
     "clarabel": {"motion"},
     "platformdirs": {"planning"},
     "threadpoolctl": {"planning", "motion"},

@@ -360,6 +360,27 @@ def test_friction_that_vanishes_changes_nothing_and_more_of_it_takes_energy():
     assert with_friction(300.0).outcome(THREE).lag[0] > 1.02 * without.lag[0]
 
 
+def test_nothing_is_lost_or_won_where_nothing_damps():
+    response, place = oscillator(Friction(0.0, 0.0, 1.0))
+    speed = response.equations.rubs[0].velocity
+    times = np.linspace(0.05, 3.0, 500)
+    x, v = response.watch(four_segments(0.004, 0.04, 3.0), times, [place, speed])
+    energy = 0.5 * 2.0 * v**2 + 0.5 * 8e3 * (x - 3.0) ** 2
+    assert energy[0] > 1.0
+    assert energy == pytest.approx(energy[0], rel=1e-9)
+
+
+def test_the_spectrum_of_a_table_is_that_of_its_course():
+    found = MoveSimulation(plan_move({"Z": 1.0}, VMC33))
+    t = np.arange(0.0, 3.0, 1e-4)
+    place = found.watch.record(found.steps["today"], t, [found.watch.equations.table["Z"]])[0]
+    a = np.gradient(np.gradient(place, t), t)
+    for f in (12.0, 30.0, 70.0):
+        wanted = abs((a * np.exp(-2j * np.pi * f * t)).sum() * 1e-4)
+        (mine,) = found.table_spectrum("today", np.array([f]), "Z")
+        assert mine == pytest.approx(wanted, rel=5e-3)
+
+
 # -- files and the command ---------------------------------------------------------------------
 
 
