@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-    from gcodejerk.identification import Commanded, Record, Spectrum
+    from gcodejerk.identification import Commanded, FrequencyResponse, Record, Search, Spectrum
     from gcodejerk.machine import Machine
 
 BAND = (5.0, 150.0)
@@ -71,7 +71,14 @@ def identify(
     ] = None,
 ) -> None:
     """Identify modes (frequency, damping, participation) from records of vibration."""
-    from gcodejerk.identification import Record, RecordError, Spectrum, make_record, read_records
+    from gcodejerk.identification import (
+        FrequencyResponse,
+        RecordError,
+        Samples,
+        Spectrum,
+        make_record,
+        read_records,
+    )
 
     name = _checked(axis, unit, rate, band, plot)
     outputs = [one for one in (as_json, plot, output) if one is not None]
@@ -83,16 +90,19 @@ def identify(
         for one in records
         for found in read_records(one, time=time, columns=column or (), rate=rate)
     ]
-    found = [one if isinstance(one, Spectrum) else make_record(one, unit) for one in read]
-    spectra = [one for one in found if isinstance(one, Spectrum)]
-    taken = [one for one in found if isinstance(one, Record)]
-    if spectra and taken:
+    spectra = [one for one in read if isinstance(one, Spectrum)]
+    responses = [one for one in read if isinstance(one, FrequencyResponse)]
+    taken = [make_record(one, unit) for one in read if isinstance(one, Samples)]
+    kinds = [one for one in (spectra, responses, taken) if one]
+    if len(kinds) > 1:
         raise RecordError(
-            f"{spectra[0].name} is a spectrum and {taken[0].name} is not",
-            "give records over time, or spectra",
+            f"{kinds[0][0].name} and {kinds[1][0].name} are not of one kind",
+            "give records over time, or spectra, or frequency responses",
         )
     if spectra:
         _show(*_spectra(spectra, name, band or BAND), as_json, plot, output)
+    elif responses:
+        _show(*_responses(responses, name, band or BAND), as_json, plot, output)
     else:
         _show(*_records(taken, name, channel, described, moves, band), as_json, plot, output)
 
@@ -154,13 +164,7 @@ def _records(
     moves: list[Commanded],
     band: tuple[float, float] | None,
 ) -> _Result:
-    from gcodejerk.identification import RecordError, find_decays, identify_modes
-    from gcodejerk.report.identification_figure import plot_identification
-    from gcodejerk.report.identification_record import identification_record, modes_block
-    from gcodejerk.report.identification_table import (
-        identification_sentences,
-        identification_table,
-    )
+    from gcodejerk.identification import RecordError, find_decays
 
     for record in records:
         if channel is not None and channel not in record.channels:
@@ -177,6 +181,26 @@ def _records(
         )
     looked = (low, high)
     searches = [(record, find_decays(record, looked)) for record in records]
+    return _searched(searches, axis, channel, machine, moves, looked)
+
+
+def _searched(
+    searches: list[tuple[Record, Search]],
+    axis: str,
+    channel: str | None,
+    machine: Machine | None,
+    moves: list[Commanded],
+    looked: tuple[float, float],
+) -> _Result:
+    """What decays tell."""
+    from gcodejerk.identification import identify_modes
+    from gcodejerk.report.identification_figure import plot_identification
+    from gcodejerk.report.identification_record import identification_record, modes_block
+    from gcodejerk.report.identification_table import (
+        identification_sentences,
+        identification_table,
+    )
+
     found = identify_modes(searches, axis, channel, machine, moves)
     return (
         identification_table(found),
@@ -185,6 +209,12 @@ def _records(
         lambda: identification_record(found),
         lambda file, suffix: plot_identification(found, looked, file, suffix),
     )
+
+
+def _responses(responses: list[FrequencyResponse], axis: str, band: tuple[float, float]) -> _Result:
+    from gcodejerk.identification import take_response
+
+    return _searched([take_response(one, band) for one in responses], axis, None, None, [], band)
 
 
 def _spectra(spectra: list[Spectrum], axis: str, band: tuple[float, float]) -> _Result:

@@ -13,12 +13,17 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gcodejerk.identification.record import RecordError, Samples, Spectrum, unit_of
+from gcodejerk.identification.responses import FrequencyResponse
+
+Read = Samples | Spectrum | FrequencyResponse
+"""What a file holds."""
 
 COMPRESSED = b"\x28\xb5\x2f\xfd"
 """A zstandard stream begins so."""
@@ -29,7 +34,7 @@ LARGEST = 1 << 31
 """Bytes that a stream may hold."""
 
 
-def read_stdata(name: str, data: bytes) -> list[Samples | Spectrum]:
+def read_stdata(name: str, data: bytes) -> list[Read]:
     """The measurements of Shake&Tune.
 
     Parameters
@@ -60,7 +65,7 @@ def read_stdata(name: str, data: bytes) -> list[Samples | Spectrum]:
             text = stream.read(LARGEST)
     except zstandard.ZstdError as error:
         raise RecordError(f"{name} is a broken stream: {error}", "copy the file again") from None
-    out: list[Samples | Spectrum] = []
+    out: list[Read] = []
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip():
             continue
@@ -82,8 +87,8 @@ def read_stdata(name: str, data: bytes) -> list[Samples | Spectrum]:
     return out
 
 
-def read_uff(name: str, path: str | Path) -> list[Samples | Spectrum]:
-    """The records over time, and the spectra, of a UFF 58 file; channels of one time together.
+def read_uff(name: str, path: str | Path) -> list[Read]:
+    """Records, spectra and frequency responses of a UFF 58 file; channels of one grid together.
 
     Parameters
     ----------
@@ -93,12 +98,12 @@ def read_uff(name: str, path: str | Path) -> list[Samples | Spectrum]:
 
     Returns
     -------
-    list of Samples or Spectrum
+    list of Samples, Spectrum or FrequencyResponse
 
     Raises
     ------
     RecordError
-        The library is missing, or the file holds neither.
+        The library is missing, or the file holds none of them.
     """
     try:
         import pyuff
@@ -112,30 +117,29 @@ def read_uff(name: str, path: str | Path) -> list[Samples | Spectrum]:
     except Exception as error:  # whatever a library says of a broken file
         raise RecordError(f"{name} is no whole UFF file: {error}", "export it again") from None
     sets = [one for one in (found if isinstance(found, list) else [found]) if one.get("type") == 58]
-    out: list[Samples | Spectrum] = []
+    out: list[Read] = []
     groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for one in sets:
         kind = int(one.get("func_type", 0))
-        if kind == FREQUENCY_RESPONSE:
-            raise RecordError(
-                f"{name} holds frequency responses, which are not fitted here",
-                "give the records over time",
-            )
-        if kind in (TIME_RESPONSE, AUTO_SPECTRUM, PSD):
+        if kind in (TIME_RESPONSE, AUTO_SPECTRUM, PSD, FREQUENCY_RESPONSE):
             x = np.asarray(one["x"], dtype=float)
-            key = (kind == TIME_RESPONSE, len(x), float(x[0]), float(x[-1]), _unit(one))
+            sort = PSD if kind == AUTO_SPECTRUM else kind
+            key = (sort, len(x), float(x[0]), float(x[-1]), _unit(one))
             groups.setdefault(key, []).append(one)
-    for (over_time, *_, unit), members in groups.items():
+    for (kind, *_, unit), members in groups.items():
         x = np.asarray(members[0]["x"], dtype=float)
-        values = np.array([np.real(one["data"]) for one in members], dtype=float)
+        values = np.array([one["data"] for one in members])
         channels = tuple(_channel(one, k) for k, one in enumerate(members))
-        if over_time:
-            out.append(Samples(name, x, None, channels, values, unit))
+        if kind == TIME_RESPONSE:
+            out.append(Samples(name, x, None, channels, values.real, unit))
+        elif kind == FREQUENCY_RESPONSE:
+            out.append(FrequencyResponse(name, x, channels, values.astype(np.complex128)))
         else:
-            out.append(Spectrum(name, x, channels, values))
+            out.append(Spectrum(name, x, channels, values.real))
     if not out:
         raise RecordError(
-            f"{name} holds neither records over time nor power spectra", "export them as UFF 58"
+            f"{name} holds neither records over time nor spectra nor frequency responses",
+            "export them as UFF 58",
         )
     return out
 
@@ -151,7 +155,7 @@ def _channel(one: dict[str, Any], k: int) -> str:
     return f"{node}{way}"
 
 
-def chosen(found: Sequence[Samples | Spectrum], columns: Sequence[str]) -> list[Samples | Spectrum]:
+def chosen(found: Sequence[Read], columns: Sequence[str]) -> list[Read]:
     """Only some channels of what was read.
 
     Parameters
@@ -171,7 +175,7 @@ def chosen(found: Sequence[Samples | Spectrum], columns: Sequence[str]) -> list[
     """
     if not columns:
         return list(found)
-    out: list[Samples | Spectrum] = []
+    out: list[Read] = []
     for one in found:
         missing = [name for name in columns if name not in one.channels]
         if missing:
@@ -180,10 +184,6 @@ def chosen(found: Sequence[Samples | Spectrum], columns: Sequence[str]) -> list[
                 f"its channels are {', '.join(one.channels)}",
             )
         rows = [one.channels.index(name) for name in columns]
-        if isinstance(one, Spectrum):
-            out.append(Spectrum(one.name, one.frequency, tuple(columns), one.values[rows]))
-        else:
-            out.append(
-                Samples(one.name, one.times, one.rate, tuple(columns), one.values[rows], one.unit)
-            )
+        kept: dict[str, Any] = {"channels": tuple(columns), "values": one.values[rows]}
+        out.append(replace(one, **kept))
     return out

@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gcodejerk.identification.containers import COMPRESSED, chosen, read_stdata, read_uff
+from gcodejerk.identification.containers import COMPRESSED, Read, chosen, read_stdata, read_uff
 from gcodejerk.identification.record import RecordError, Samples, Spectrum, unit_of
 from gcodejerk.motion.profiles.profile import Array
 
@@ -45,7 +45,7 @@ def read_records(
     time: str | None = None,
     columns: Sequence[str] = (),
     rate: float | None = None,
-) -> list[Samples | Spectrum]:
+) -> list[Read]:
     """Read all that a file holds: one table, or the records of a UFF 58 or .stdata file.
 
     Parameters
@@ -55,7 +55,7 @@ def read_records(
 
     Returns
     -------
-    list of Samples or Spectrum
+    list of Samples, Spectrum or FrequencyResponse
 
     Raises
     ------
@@ -77,7 +77,7 @@ def read_file(
     time: str | None = None,
     columns: Sequence[str] = (),
     rate: float | None = None,
-) -> Samples | Spectrum:
+) -> Read:
     """Read a file of a sensor or a control that holds one record.
 
     Parameters

@@ -16,6 +16,7 @@ from recording import record_of
 
 from gcodejerk.identification import (
     Commanded,
+    FrequencyResponse,
     RecordError,
     Samples,
     Spectrum,
@@ -26,6 +27,7 @@ from gcodejerk.identification import (
     make_record,
     read_file,
     read_records,
+    take_response,
 )
 from gcodejerk.identification.decays import thinned
 from gcodejerk.identification.record import Record
@@ -432,20 +434,16 @@ def test_measurements_of_shake_and_tune_are_read_one_by_one(tmp_path):
         read_records(tmp_path / "b.stdata")
 
 
-def uff_58(wave, rate, node, direction):
+def uff_58(wave, step, node, direction, kind=1):
     """A data set of type 58, record by record as the format has them (SDRC, Universal File)."""
-    head = (
-        f"{1:5d}{0:10d}{1:5d}{0:10d} {'NONE':<10}{node:10d}{direction:4d} {'NONE':<10}{0:10d}{0:4d}"
-    )
-    steps = f"{4:10d}{len(wave):10d}{1:10d}{0.0:13.5e}{1 / rate:13.5e}{0.0:13.5e}"
-    axes = [
-        (17, "Time", "s"),
-        (12, "Acceleration", "m/s^2"),
-        (0, "NONE", "NONE"),
-        (0, "NONE", "NONE"),
-    ]
-    labels = [f"{kind:10d}{0:5d}{0:5d}{0:5d} {name:<20} {unit:<20}" for kind, name, unit in axes]
-    rows = ["".join(f"{x:20.11e}" for x in wave[k : k + 4]) for k in range(0, len(wave), 4)]
+    entity = f"{'NONE':<10}"
+    head = f"{kind:5d}{0:10d}{1:5d}{0:10d} {entity}{node:10d}{direction:4d} {entity}{0:10d}{0:4d}"
+    number = 6 if kind == 4 else 4
+    steps = f"{number:10d}{len(wave):10d}{1:10d}{0.0:13.5e}{step:13.5e}{0.0:13.5e}"
+    axes = [(17, "Time", "s"), (12, "Acceleration", "m/s^2"), *[(0, "NONE", "NONE")] * 2]
+    labels = [f"{one:10d}{0:5d}{0:5d}{0:5d} {name:<20} {unit:<20}" for one, name, unit in axes]
+    flat = np.asarray(wave).view(float)
+    rows = ["".join(f"{x:20.11e}" for x in flat[k : k + 4]) for k in range(0, len(flat), 4)]
     return "\n".join(["    -1", "    58", *["NONE"] * 5, head, steps, *labels, *rows, "    -1", ""])
 
 
@@ -454,12 +452,67 @@ def test_uff_58_is_read_as_it_was_written(tmp_path):
     t = np.arange(0.0, 2.0, 1 / 800)
     waves = [np.sin(30 * t), np.cos(70 * t)]
     path = tmp_path / "r.uff"
-    path.write_text("".join(uff_58(wave, 800, 7, k + 1) for k, wave in enumerate(waves)))
+    path.write_text("".join(uff_58(wave, 1 / 800, 7, k + 1) for k, wave in enumerate(waves)))
     (found,) = read_records(path)
     assert found.channels == ("7X", "7Y")
     record = make_record(found)
     assert record.rate == pytest.approx(800.0)
     assert record.values[0] == pytest.approx(1e3 * (waves[0] - np.median(waves[0])), abs=1e-2)
+
+
+TRUE = [(30.0, 0.02), (47.5, 0.008), (92.0, 0.03)]
+
+
+def accelerance(f, amounts):
+    """Acceleration over force of modes in a row, at frequencies."""
+    s = 2j * np.pi * f
+    omega = [2 * np.pi * one for one, _ in TRUE]
+    modes = zip(amounts, omega, TRUE, strict=True)
+    return sum(a * s**2 / (s**2 + 2 * z * w * s + w**2) for a, w, (_, z) in modes)
+
+
+@pytest.mark.parametrize("step", [0.25, 1.0])
+def test_frequency_responses_are_taken_apart(command, tmp_path, step):
+    pytest.importorskip("pyuff")
+    f = np.arange(0.0, 400.0, step)
+    rng = np.random.default_rng(5)
+    text = ""
+    for k, amounts in enumerate([(1.0, 0.3, 0.8), (-0.5, 0.4, 1.0)]):
+        noise = 1e-3 * (rng.standard_normal(len(f)) + 1j * rng.standard_normal(len(f)))
+        text += uff_58(accelerance(f, amounts) + noise, step, 3, k + 1, kind=4)
+    path = tmp_path / "frf.uff"
+    path.write_text(text)
+    (response,) = read_records(path)
+    record, search = take_response(response, BAND)
+    assert record.channels == ("3X", "3Y")
+    (one,) = search.decays
+    assert len(one.taken.rings) == 3
+    for ring, (frequency, damping) in zip(one.taken.rings, TRUE, strict=True):
+        assert ring.frequency == pytest.approx(frequency, rel=2e-3)
+        assert ring.damping == pytest.approx(damping, rel=0.06)
+    status, said = command("identify", str(path), "--axis", "X")
+    assert status == 0, said
+    assert "3 modes of X identified" in said
+    assert "participation: ?" in said
+
+
+def test_a_response_that_is_cut_off_below_is_refused():
+    f = np.arange(100.0, 400.0)
+    with pytest.raises(RecordError, match="begins at 100 Hz"):
+        take_response(FrequencyResponse("r", f, ("x",), accelerance(f, (1, 1, 1))[None]), BAND)
+    uneven = np.geomspace(1.0, 400.0, 300)
+    with pytest.raises(RecordError, match="not even"):
+        take_response(FrequencyResponse("r", uneven, ("x",), np.ones((1, 300), complex)), BAND)
+
+
+def test_a_real_beam_has_the_peaks_that_were_measured():
+    files = public("identify/pyuff_meas_point_*.txt")
+    values = np.array([[complex(line) for line in path.read_text().split()] for path in files])
+    names = tuple(path.stem for path in files)
+    response = FrequencyResponse("beam", np.arange(values.shape[1]) * 1.0, names, values)
+    _, search = take_response(response, (20.0, 1000.0))
+    found = [ring.frequency for ring in search.decays[0].taken.rings]
+    assert found == pytest.approx([52.0, 142.0, 279.0, 460.0, 687.0, 959.0], abs=1.0)
 
 
 def test_a_real_uff_spectrum_is_one():
