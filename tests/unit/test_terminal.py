@@ -236,7 +236,7 @@ def test_a_map_of_a_measured_spectrum(command, tmp_path):
 
 def test_completion_can_be_had():
     for words, expected in (
-        ("gcodejerk plan --machine v", "vmc"),
+        ("gcodejerk plan --machine d", "drill"),
         ("gcodejerk process --controller linuxcnc-", "linuxcnc-hal"),
         ("gcodejerk machine test", "test-program"),
     ):
