@@ -511,8 +511,12 @@ def test_a_real_beam_has_the_peaks_that_were_measured():
     names = tuple(path.stem for path in files)
     response = FrequencyResponse("beam", np.arange(values.shape[1]) * 1.0, names, values)
     _, search = take_response(response, (20.0, 1000.0))
-    found = [ring.frequency for ring in search.decays[0].taken.rings]
-    assert found == pytest.approx([52.0, 142.0, 279.0, 460.0, 687.0, 959.0], abs=1.0)
+    rings = search.decays[0].taken.rings
+    # What sdypy-EMA 0.31 (LSCF up to order 40, nearest to the measured peaks) makes of these files.
+    other = [51.517, 142.176, 278.662, 460.395, 687.165, 958.534]
+    assert [ring.frequency for ring in rings] == pytest.approx(other, abs=0.05)
+    damping = [0.0006, 0.00037, 0.00019, 0.00019, 0.00017, 0.00015]
+    assert [ring.damping for ring in rings] == pytest.approx(damping, abs=2.5e-4)
 
 
 def test_a_real_uff_spectrum_is_one():
