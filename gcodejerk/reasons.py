@@ -179,7 +179,7 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.APART: Explanation(
         "Centroid's G0 moves Z upwards before the other axes, and downwards behind them; of some "
         "controls nobody could say",
-        "move Z in a block of its own",
+        "move Z in a block of its own; where `auto` read the program, state its control's dialect",
     ),
     Reason.OTHER_WORDS: Explanation(
         "a word of which the dialect's table does not know whether the control runs it before the "
