@@ -86,6 +86,16 @@ def save(figure: Figure, file: BinaryIO, suffix: str) -> None:
         figure.savefig(file, format=suffix.lower().removeprefix("."), dpi="figure")
 
 
+def label_part(axes: Axes, title: str, x: str, y: str) -> None:
+    """Give a part of a page its title and units, a light grid, and no box."""
+    axes.set_title(title, fontsize=8.5, loc="left")
+    axes.set_xlabel(x, fontsize=8)
+    axes.set_ylabel(y, fontsize=8)
+    axes.tick_params(labelsize=7.5)
+    axes.grid(True, color="0.92", linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
 def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
     """Draw acceleration, velocity, and the vibration of the worst mode, now and as planned.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from gcodejerk.identification import Decay, Identification, Peaks, Record
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.report.figures import PLANNED, TODAY, new_figure, save
+from gcodejerk.report.figures import PLANNED, TODAY, label_part, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def plot_identification(
     _record(parts["record"], record, c, search.decays, decay)
     channel = record.channels[c]
     count, all_of = len(search.decays), search.motions
-    _label(
+    label_part(
         parts["record"], f"(a) {channel}: {count} decays behind {all_of} motions", "time [s]",
         "[m/s²]",
     )  # fmt: skip
@@ -131,7 +131,7 @@ def _decay(axes: Axes, record: Record, c: int, decay: Decay) -> None:
         color=TODAY,
     )  # fmt: skip
     axes.legend(frameon=False, fontsize=8, loc="upper right")
-    _label(axes, f"(b) the decay at {decay.begin:.2f} s", "time from its begin [s]", "[m/s²]")
+    label_part(axes, f"(b) the decay at {decay.begin:.2f} s", "time from its begin [s]", "[m/s²]")
 
 
 def _orders(axes: Axes, decay: Decay, found: Identification, band: tuple[float, float]) -> None:
@@ -154,7 +154,7 @@ def _orders(axes: Axes, decay: Decay, found: Identification, band: tuple[float, 
     axes.set_xlim(*_shown(found, band))
     axes.set_ylim(0.0, float(poles[:, 0].max(initial=1.0)) + 6.0)
     axes.legend(frameon=False, fontsize=7.5, loc="upper right", ncols=2)
-    _label(axes, "(c) its poles, order by order", "frequency [Hz]", "order")
+    label_part(axes, "(c) its poles, order by order", "frequency [Hz]", "order")
 
 
 def _spectrum(
@@ -195,7 +195,7 @@ def _spectrum(
                 color=TODAY,
             )  # fmt: skip
     axes.legend(frameon=False, fontsize=7.5, loc="lower left")
-    _label(axes, "(d) its spectrum, and the modes identified", "frequency [Hz]", "[mm/s]")
+    label_part(axes, "(d) its spectrum, and the modes identified", "frequency [Hz]", "[mm/s]")
 
 
 def _amplitudes(values: Array, rate: float) -> tuple[Array, Array]:
@@ -259,14 +259,5 @@ def plot_peaks(
         axes.legend(frameon=False, fontsize=7.5)
         axes.ticklabel_format(axis="y", style="plain")
         axes.set_yticks([])
-        _label(axes, Path(one.spectrum.name).name, "frequency [Hz]", "power density")
+        label_part(axes, Path(one.spectrum.name).name, "frequency [Hz]", "power density")
     save(figure, file, suffix)
-
-
-def _label(axes: Axes, title: str, x: str, y: str) -> None:
-    axes.set_title(title, fontsize=8.5, loc="left")
-    axes.set_xlabel(x, fontsize=8)
-    axes.set_ylabel(y, fontsize=8)
-    axes.tick_params(labelsize=7.5)
-    axes.grid(True, color="0.92", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)

@@ -11,7 +11,7 @@ import numpy as np
 
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program
-from gcodejerk.report.figures import PLANNED, TODAY, new_figure, save
+from gcodejerk.report.figures import PLANNED, TODAY, label_part, new_figure, save
 from gcodejerk.simulation.programs import Simulation
 from gcodejerk.simulation.single import MoveSimulation
 
@@ -54,14 +54,14 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
     parts = figure.subplots(3, 2)
     command, lag, tool = parts[:, 0]
     told, left, machine = parts[:, 1]
+    off = {way: found.deviation(way, times) for way in STYLE}
+    strongest = int(np.argmax(np.abs(off["today"]).max(axis=1)))
     for way, style in STYLE.items():
         # The end is exact: the last step of the jerk may be one of the acceleration.
         command.plot(MS * times, found.command(way, times)[2][:, u], **style)
         lag.plot(MS * times, UM * found.lag(way, times)[u], **style)
-        off = found.deviation(way, times)
-        strongest = int(np.argmax(np.abs(found.deviation("today", times)).max(axis=1)))
         behind = times >= found.steps[way].end
-        tool.plot(MS * times[behind], UM * off[strongest][behind], **style)
+        tool.plot(MS * times[behind], UM * off[way][strongest][behind], **style)
     frequency = _frequencies(found)
     for way, style in STYLE.items():
         told.semilogx(frequency, found.command_spectrum(way, frequency, axis), **style)
@@ -69,11 +69,13 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
         told.semilogx(frequency, found.table_spectrum(way, frequency, axis), **thin)
         left.loglog(frequency, UM * found.tool_spectrum(way, frequency), **style)
     _machine(machine, found, frequency, axis)
-    _label(command, f"(a) acceleration told to {axis}", "time [ms]", "[mm/s²]")
-    _label(told, "(b) its spectrum; thin: what the table makes of it", "frequency [Hz]", "[mm/s]")
-    _label(lag, f"(c) lag of {axis}'s table", "time [ms]", "[µm]")
-    _label(left, "(d) spectrum of the tool behind the move", "frequency [Hz]", "[µm s]")
-    _label(tool, "(e) tool from its place, behind the move", "time [ms]", "[µm]")
+    label_part(command, f"(a) acceleration told to {axis}", "time [ms]", "[mm/s²]")
+    label_part(
+        told, "(b) its spectrum; thin: what the table makes of it", "frequency [Hz]", "[mm/s]"
+    )
+    label_part(lag, f"(c) lag of {axis}'s table", "time [ms]", "[µm]")
+    label_part(left, "(d) spectrum of the tool behind the move", "frequency [Hz]", "[µm s]")
+    label_part(tool, "(e) tool from its place, behind the move", "time [ms]", "[µm]")
     density = left.get_ylim()[1]
     left.set_ylim(1e-5 * density, density)
     tolerance = UM * found.machine.design.tolerance
@@ -117,7 +119,7 @@ def _machine(axes: Axes, found: MoveSimulation, frequency: Array, axis: str) -> 
     low, high = axes.get_ylim()
     axes.set_ylim(low, high * 2.0)
     of = f"force to tool, along {axis}" if force else f"acceleration told to {axis}, to tool"
-    _label(axes, f"(f) {of}", "frequency [Hz]", "[µm/N]" if force else "[µm/(mm/s²)]")
+    label_part(axes, f"(f) {of}", "frequency [Hz]", "[µm/N]" if force else "[µm/(mm/s²)]")
 
 
 def _stands_out(response: Array, k: int) -> bool:
@@ -128,15 +130,6 @@ def _stands_out(response: Array, k: int) -> bool:
         if valley > response[k] / 1.5:
             return False
     return True
-
-
-def _label(axes: Axes, title: str, x: str, y: str) -> None:
-    axes.set_title(title, fontsize=8.5, loc="left")
-    axes.set_xlabel(x, fontsize=8)
-    axes.set_ylabel(y, fontsize=8)
-    axes.tick_params(labelsize=7.5)
-    axes.grid(True, color="0.92", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def plot_program_simulation(
@@ -178,14 +171,14 @@ def plot_program_simulation(
             color=colour, linewidth=1.3,
         )  # fmt: skip
     upper.axhline(UM * tolerance, color="0.5", linewidth=0.8, linestyle=":")
-    _label(
+    label_part(
         upper,
         "(a) what the strongest mode keeps when a rapid has ended",
         "line of the program",
         "[µm]",
     )
-    _label(middle, "(b) waiting until the tool is in its place", "line of the program", "[ms]")
-    _label(lower, "(c) the same, the longest first", "rapids", "[ms]")
+    label_part(middle, "(b) waiting until the tool is in its place", "line of the program", "[ms]")
+    label_part(lower, "(c) the same, the longest first", "rapids", "[ms]")
     for axes in (middle, lower):
         axes.set_ylim(bottom=0.0)
     lower.set_xlim(0, len(found))

@@ -84,7 +84,8 @@ def move_sentence(found: MoveSimulation) -> str:
 def _size(found: MoveSimulation) -> str:
     states, axes = len(found.watch.equations.A), len(_driven(found))
     modelled = f"{axes} of {len(found.machine.axes)} axes with a servo"
-    friction = ", dry friction" if found.watch.equations.rubs else ""
+    friction = ", dry friction (single modes are told without it)"
+    friction = friction if found.watch.equations.rubs else ""
     return f"{found.machine.name}: {states} states, {modelled}{friction}"
 
 

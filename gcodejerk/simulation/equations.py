@@ -333,6 +333,9 @@ class _Assembly:
         if self.frame is not None:
             at_rest = -np.linalg.solve(A, B[0])
             for u, name in enumerate(self.axes):
+                out[name] = none  # an axis that moves no body: a rotary one
+                if name not in self.nut:
+                    continue
                 row = np.zeros(len(A))
                 row[: len(self.frame.mass)] = self.frame.tool[name]
                 # A table moves the workpiece: the tool goes the other way against it.

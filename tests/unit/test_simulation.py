@@ -391,21 +391,11 @@ def test_a_machine_with_a_structure_reads_back_as_itself():
 
 
 def test_matrices_of_a_file_stand_for_bodies(tmp_path):
-    from gcodejerk.simulation.bodies import frame_of, modal_damping
+    from gcodejerk.simulation.bodies import frame_of
 
     frame = frame_of(VMC33)
-    servos = {axis.name: axis.servo for axis in VMC33.axes}
-    whole, stiff = (np.zeros((33, 33)) for _ in range(2))
-    whole[:30, :30], stiff[:30, :30] = frame.mass, frame.stiffness
-    for k, (name, servo) in enumerate(servos.items()):
-        pull = np.zeros(33)
-        pull[:30], pull[30 + k] = -frame.nut[name], servo.lead * 1e-3 / (2 * np.pi)
-        whole[30 + k, 30 + k] = servo.inertia
-        stiff += 6e7 * np.outer(pull, pull)
-    # Damping between rotors and bodies is not the file's: left out of both.
-    own = modal_damping(whole, stiff, 0.0)[:30, :30]
     arrays = {f"nut_{a}": frame.nut[a] for a in "XYZ"} | {f"tool_{a}": frame.tool[a] for a in "XYZ"}
-    np.savez(tmp_path / "s.npz", M=frame.mass, K=frame.stiffness, C=own, **arrays)
+    np.savez(tmp_path / "s.npz", M=frame.mass, K=frame.stiffness, **arrays)
     text = machine_yaml(replace(VMC33, structure=None)) + "structure: {file: s.npz}\n"
     from_file = Machine.loads(text, str(tmp_path / "m.yaml"))
     undamped = replace(VMC33, structure=replace(VMC33.structure, damping=0.0))
@@ -444,6 +434,7 @@ STRUCTURES = [
     ("    - {axis: Z, moves: head,   carried_by: column, at: [0, 350, 1550]}   # made up\n", "",
      "turns no screw"),
     ("size: [350, 800, 600],", "", "needs size or inertia"),
+    ("  screws:", "  # screws:", "turns no screw"),
 ]  # fmt: skip
 
 
@@ -479,6 +470,16 @@ def test_a_file_that_is_no_npz_is_refused(tmp_path):
     text = BENCH.format(**USUAL) + "structure: {file: s.npz}\n"
     with pytest.raises(MachineFileError, match=r"no \.npz file"):
         Machine.loads(text, str(tmp_path / "m.yaml"))
+
+
+def test_an_axis_beside_the_structure_is_where_it_is_told_to_be():
+    rotary = "  A: {rapid: {velocity: 90, acceleration: 900, jerk: 9.0e+4}, wrap: none}\n"
+    text = find_machine("vmc33").read_text()
+    machine = Machine.loads(text.replace("axes:\n", "axes:\n" + rotary, 1))
+    found = MoveSimulation(plan_move({"A": 30.0, "Z": 1.0}, machine))
+    alone = MoveSimulation(plan_move({"Z": 1.0}, VMC33))
+    assert found.outcomes["today"].lag[found.watch.equations.axes.index("A")] == 0.0
+    assert len(found.watch.equations.A) == len(alone.watch.equations.A)
 
 
 def test_what_cannot_be_simulated_says_so():

@@ -116,8 +116,10 @@ def structure_of(
             if name in values:
                 _tell(checker, (*path, name), "stands beside structure.file", "keep one of them")
         matrices = _load(values["file"], folder, checker)
-        _require_servos([axis for axis, _ in matrices.nut] if matrices else [], axes, checker)
-        return None if matrices is None else Structure(matrices=matrices)
+        if matrices is None:
+            return None
+        _require_servos([axis for axis, _ in matrices.nut], axes, checker)
+        return Structure(matrices=matrices)
     missing = [name for name in ("bodies", "tool", "workpiece", "at") if not values.get(name)]
     if missing:
         _tell(checker, path, f"has no {missing[0]}", f"add {missing[0]}, or file")
@@ -178,7 +180,7 @@ def _require_servos(moved: list[str], axes: dict[str, Any], checker: Checker) ->
                 f"add axes.{axis}.servo",
             )  # fmt: skip
     for axis, values in axes.items():
-        if _stated(values.get("servo", {})) and axis not in moved and moved:
+        if _stated(values.get("servo", {})) and axis not in moved:
             _tell(
                 checker, ("axes", axis, "servo"), "turns no screw of the structure",
                 "add it to structure.screws, or leave servo out",

@@ -84,6 +84,10 @@ class Reader:
                 raise NotComputableError
             value = self.operand()
             return -value if sign == b"-" else value
+        return self.unsigned(sign)
+
+    def unsigned(self, sign: bytes) -> float:
+        """Read an operand that begins with this letter or mark."""
         if match := _NUMBER.match(self.text, self.at):
             self.at = match.end()
             return _finite(float(match[0]))
@@ -183,14 +187,8 @@ class NamedReader(Reader):
             raise NotComputableError
         return operator, binds
 
-    def operand(self) -> float:
-        """Read one operand with its sign."""
-        if (sign := self.next()) in (b"+", b"-") and sign:
-            self.at += 1
-            if self.next() in (b"+", b"-"):
-                raise NotComputableError
-            value = self.operand()
-            return -value if sign == b"-" else value
+    def unsigned(self, sign: bytes) -> float:
+        """Read an operand that begins with this letter or mark."""
         if match := _WITH_EXPONENT.match(self.text, self.at):
             self.at = match.end()
             return _finite(float(match[1] + b"E" + (match[2] or b"0")))
