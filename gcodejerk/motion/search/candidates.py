@@ -20,8 +20,6 @@ from gcodejerk.motion.search.objective import Objective
 
 Single = NDArray[np.float32]
 
-FEW_POLES = 12
-"""So many poles can be evaluated in double precision, or for many more candidates."""
 BLOCK = 1 << 14
 """Numbers in an array at a time, about: a dozen of them stay in the processor's cache."""
 
@@ -92,15 +90,42 @@ def symmetric_worst(
         real = found.spread((late - 1.0) * np.cos(phase)) * up
         imaginary = found.spread((late + 1.0) * np.sin(phase)) * up
         for t, rest, jerk in pairs:
-            phase = (rest - t) * (np.float32(0.5) * omega)
-            if not sigma.any():
-                imaginary += np.float32(2.0) * np.sin(phase) * jerk
-                continue
-            early, late = np.exp(t * -sigma), np.exp(rest * -sigma)
-            real += (late - early) * np.cos(phase) * jerk
-            imaginary += (late + early) * np.sin(phase) * jerk
+            even, odd = from_middle(t, rest, sigma, omega)
+            if even is not None:
+                real += even * jerk
+            imaginary += odd * jerk
         found.add(block, real * real + imaginary * imaginary, scale**2 * omega)
     return found.displacement()
+
+
+def from_middle(
+    t: Single, rest: Single, sigma: Single, omega: Single
+) -> tuple[Single | None, Single]:
+    """What a pair of unit steps of the jerk at t and at T - t does, seen from the middle of T.
+
+    Parameters
+    ----------
+    t, rest : ndarray of float32
+        The moment, and T less it. [s]
+    sigma, omega : ndarray of float32
+        Of the poles; shapes that broadcast with that of t. [1/s]
+
+    Returns
+    -------
+    tuple of ndarray of float32
+        Real part (None: without damping it is zero) and imaginary part, as in `symmetric_worst`.
+    """
+    phase = (rest - t) * (np.float32(0.5) * omega)
+    if not sigma.any():
+        return None, np.float32(2.0) * np.sin(phase)
+    early, late = np.exp(t * -sigma), np.exp(rest * -sigma)
+    return (late - early) * np.cos(phase), (late + early) * np.sin(phase)
+
+
+def step_weights(objective: Objective) -> Single:
+    """What turns responses to steps of the jerk into displacements, shape (p, n) [mm s^3]."""
+    weight = objective.weights / (np.abs(objective.poles) ** 2 * objective.poles.imag)
+    return np.ascontiguousarray(weight.T, dtype=np.float32)
 
 
 def cascade_worst(widths: tuple[Array, ...], objective: Objective) -> Single:

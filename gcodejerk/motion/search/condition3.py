@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.profiles.symmetric import SymmetricProfiles
 from gcodejerk.motion.residual import symmetric_response
-from gcodejerk.motion.search.candidates import FEW_POLES, symmetric_worst
+from gcodejerk.motion.search.candidates import symmetric_worst
 from gcodejerk.motion.search.objective import Objective
 from gcodejerk.motion.search.rows import ROUNDING, best_in_rows, parts, pick_in_rows
 
+FEW_POLES = 12
+"""So many poles can be evaluated in double precision, or for many more candidates."""
 MAP_COLUMNS = 257
 """Values of T1 that are looked at first."""
 ZOOMS = 8

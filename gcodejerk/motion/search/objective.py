@@ -39,11 +39,14 @@ class Objective:
         Participation times displacement. [mm]
     group : ndarray of int, shape (m,)
         As in `grouped`.
+    first_look : ndarray of bool, shape (m,), or None
+        Those that a search may begin with; None for all.
     """
 
     poles: Complex
     weights: Array
     group: NDArray[np.int64]
+    first_look: NDArray[np.bool_] | None = None
 
     @classmethod
     def of_modes(cls, poles: Complex, weights: Array) -> Objective:
@@ -55,13 +58,21 @@ class Objective:
 
     def take(self, index: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Objective:
         """Some of the moves; one may stand several times."""
-        return Objective(self.poles, self.weights[index], self.group)
+        return Objective(self.poles, self.weights[index], self.group, self.first_look)
 
     def excited(self) -> Objective:
         """The same moves, without the modes that none of them excites."""
         used = self.weights.any(axis=0)
         _, group = np.unique(self.group[used], return_inverse=True)
         return Objective(self.poles[used], self.weights[:, used], group)
+
+    def rough(self) -> Objective:
+        """The same moves, where a first look is enough."""
+        if self.first_look is None:
+            return self
+        some = self.first_look
+        _, group = np.unique(self.group[some], return_inverse=True)
+        return Objective(self.poles[some], self.weights[:, some], group)
 
     def in_band(
         self, band: float, total: float, dense: float = DENSE, fewest: int = FEWEST
@@ -84,6 +95,7 @@ class Objective:
         -------
         Objective
             Groups of several modes have no band: they are spectra, which are broad by themselves.
+            A first look is at every second frequency of a band, both ends among them.
         """
         size = np.bincount(self.group, minlength=1)[self.group]
         half = np.ceil(0.5 * band * np.abs(self.poles) * total / dense).astype(np.int64)
@@ -96,6 +108,7 @@ class Objective:
             self.poles[index] * np.concatenate([np.zeros(0), *relative]),
             self.weights[:, index],
             np.cumsum(new | (size[index] == 1)) - 1,
+            np.concatenate([np.zeros(0, dtype=bool), *(np.arange(n) % 2 == 0 for n in count)]),
         )
 
     def worst(self, displacement: Array) -> Array:

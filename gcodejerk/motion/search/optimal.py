@@ -51,7 +51,7 @@ HALVES = 128
 """Of moves of more intervals, guarded frequencies see acceleration and braking apart."""
 CRUISE_BLOCKS = 16
 """Blocks of a cruise at most, where acceleration and braking are not taken alike."""
-MOST_REFINED, MOST_GUARDED = 1000, 180
+MOST_REFINED, MOST_GUARDED = 1000, 110
 """Blocks of a refined programme at most, and of one with guarded frequencies, which are many: those
 of longer moves stay long."""
 RAMP = 2.0

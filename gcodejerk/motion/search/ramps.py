@@ -3,8 +3,9 @@ r"""Design of symmetric profiles: T1, Ta and T2 of the ramps, and the cruise tha
 This module owns the global search in the family that Condition III and its generalisation belong
 to. T_SUM is given, so three numbers are free; the limits of velocity and acceleration bound Ta by a
 closed form of the other two, so that a candidate is T1, T2 and a share of Ta's range. What a mode
-keeps has many valleys over these three: a grid finds them, the best of each stretch of T1 are
-descended at once, and those that lead go on to the bottom.
+keeps has many valleys over these three: a grid of switching times finds them, and some profiles at
+the limits, where the grid has none; the best are descended at once, and those that lead go on to
+the bottom.
 
 Rule 1: no segment is shorter than one command interval; a segment may be absent.
 Rule 2: what is compared is the objective, the largest residual displacement of the tool.
@@ -12,60 +13,43 @@ Rule 2: what is compared is the objective, the largest residual displacement of 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.profiles.symmetric import SymmetricProfiles, conventional_profiles
-from gcodejerk.motion.search.candidates import FEW_POLES, symmetric_worst
+from gcodejerk.motion.search.candidates import symmetric_worst
+from gcodejerk.motion.search.combinations import best_combinations
 from gcodejerk.motion.search.condition3 import four_segment_range
+from gcodejerk.motion.search.newton import proposed_steps, slopes
 from gcodejerk.motion.search.objective import Objective
 from gcodejerk.motion.search.rows import ROUNDING, parts
 
-LINE = 17
-"""Values of T1 of the four-segment profiles that are looked at."""
+TIMES, SPREAD = 32, 1.6
+"""Times of the grid of combinations, and the power by which they are closer where ramps are short.
+"""
+EDGES, LINE = 8, 17
+"""Values of T1 and of T2 that are looked at at both ends of Ta's range, and of T1 of the
+four-segment profiles."""
 BISECTIONS = 24
 """For the longest T1 and T2 that the limits leave."""
-
-
-class _Effort(NamedTuple):
-    """How thoroughly a search looks: fewer frequencies to look at leave time for more profiles."""
-
-    ramps: int
-    """Values of T1 and of T2 on the grid."""
-    shares: int
-    """Of Ta's range."""
-    descents: int
-    rounds: int
-    leaders: int
-    final: int
-    """Rounds of the leaders' descent."""
-
-
-EFFORTS = (_Effort(20, 6, 22, 14, 8, 40), _Effort(12, 5, 12, 8, 4, 24))
-"""For at most `FEW_POLES` frequencies, and for more."""
-SPREAD = 1.6
-"""Power by which the grid is denser at short ramps."""
-EVERY = 5
-"""Of the grid, one in so many is looked at first: it bounds the others of its stretch."""
-GROWS, SHRINKS = 1.3, 0.7
-"""What a descent's step is multiplied by where it has found something better, and where not."""
-
-
-def _directions(rounds: int) -> list[Array]:
-    """Orthogonal steps, turned from round to round.
-
-    The worst of several modes has edges, along which the same few directions would find nothing.
-    """
-    random = np.random.default_rng(2021)
-    # Rounded: the same steps whatever library has solved this.
-    turned = (np.linalg.qr(random.normal(size=(3, 3)))[0].round(6) for _ in range(rounds))
-    return [np.concatenate([matrix, -matrix]) for matrix in turned]
-
-
-DIRECTIONS = _directions(max(effort.rounds + effort.final for effort in EFFORTS))
+PROMISING = 4.0
+"""What leaves so many times the least of the grid is not evaluated to its end."""
+FEW = 8
+"""So few frequencies can be perfectly still: nulls are narrow, and worth a longer search."""
+STARTS, ROUNDS = 12, 2
+"""Profiles that are descended from, and in how many steps."""
+LEADERS, LAST = (8, 3), (16, 7)
+"""Those that go on to the bottom, and in how many steps: of `FEW` frequencies, and of more."""
+REACH = (0.3, 0.3, 0.25)
+"""The longest first step: parts of T1 and of T2, and of Ta's range."""
+GROWS, SHRINKS = 1.5, 0.3
+"""What the longest step is multiplied by after one that led downhill, and after one that did not.
+"""
+NUDGE = 1e-4
+"""Relative change of T1 and T2 by which the slope of Ta's range is found."""
+TINY = 1e-12
+"""A step that is none."""
 
 
 def design_symmetric(
@@ -95,13 +79,12 @@ def design_symmetric(
         Whether any profile within the limits was found.
     """
     n = len(total)
-    effort = EFFORTS[len(objective.poles) > FEW_POLES]
     columns, feasible = [np.ones(n) for _ in range(4)], np.zeros(n, dtype=bool)
     fastest = conventional_profiles(velocity, acceleration, jerk, interval)
-    for part in parts(n, effort.ramps**2 * effort.shares):
+    for part in parts(n, TIMES**2 // 2):
         search = _Search(
             total[part], velocity[part], acceleration[part], jerk[part], objective.take(part),
-            interval, effort,
+            interval,
         )  # fmt: skip
         starts = [profiles.take(part) for profiles in (*known, fastest)]
         profiles, feasible[part] = search.run(starts)
@@ -114,60 +97,59 @@ class _Search:
     """One batch of moves; the last axis of points is T1, T2 and the share of Ta's range."""
 
     def __init__(
-        self, total: Array, V: Array, A: Array, J: Array, objective: Objective, interval: float,
-        effort: _Effort,
-    ) -> None:  # fmt: skip
+        self, total: Array, V: Array, A: Array, J: Array, objective: Objective, interval: float
+    ) -> None:
         slack = 1.0 + ROUNDING
         self.total, self.V, self.A, self.J = total, V * slack, A * slack, J * slack
-        self.objective, self.interval, self.effort = objective, interval, effort
+        self.objective, self.interval = objective, interval
         # V = 1/(T_SUM - 2 centroid): the velocity limit is a limit of the centroid.
         self.centroid = 0.5 * (total - 1.0 / self.V)
 
     def run(self, known: list[SymmetricProfiles]) -> tuple[SymmetricProfiles, NDArray[np.bool_]]:
-        """The grid, a descent from the best of each stretch of T1, and the leaders' to the end."""
-        effort = self.effort
-        points, stretch = self._candidates(known)
-        value = self._best_of_stretches(points, stretch)
-        each = [
-            np.where(stretch == k, value, np.inf).argmin(axis=1) for k in range(stretch[-1] + 1)
-        ]
-        points, value = _picked(np.stack(each, axis=1), points, value)
-        points, value = _best(effort.descents, points, value)
-        step = np.concatenate([0.3 * points[..., :2], np.full((*value.shape, 1), 0.25)], axis=-1)
-        points, value, step = self._descend(points, value, step, DIRECTIONS[: effort.rounds])
-        points, value, step = _best(effort.leaders, points, value, step)
-        last = DIRECTIONS[effort.rounds : effort.rounds + effort.final]
-        points, value, _ = self._descend(points, value, step, last)
+        """The best of what is looked at first are descended from, and the leaders to the end."""
+        points, value = _best(STARTS, *self._first(known))
+        reach = np.ones(value.shape)
+        points, value, reach = self._descend(points, value, reach, ROUNDS)
+        many = len(self.objective.poles) > FEW
+        points, value, reach = _best(LEADERS[many], points, value, reach)
+        points, value, _ = self._descend(points, value, reach, LAST[many])
         points, value = (x[:, 0] for x in _best(1, points, value))
         return self._profiles(points)[0], np.isfinite(value)
 
-    def _best_of_stretches(self, points: Array, stretch: NDArray[np.intp]) -> Array:
-        """Values of candidates; those may be infinite that are not the best of their stretch."""
-        some = np.arange(0, len(stretch), EVERY)
-        first = self._value(points[:, some])
-        least = np.full((len(points), int(stretch[-1]) + 1), np.inf)
-        for k in range(least.shape[1]):
-            here = stretch[some] == k
-            if here.any():
-                least[:, k] = first[:, here].min(axis=1)
-        return self._value(points, least[:, stretch])
+    def _first(self, known: list[SymmetricProfiles]) -> tuple[Array, Array]:
+        """Points of the grid, one for each T1, and what is looked at besides; their values."""
+        spread = (np.linspace(0.0, 1.0, TIMES) ** SPREAD).round(12)
+        # As far as the shortest T1 and Ta leave the velocity within its limit.
+        longest = np.clip(
+            3.0 * self.centroid - self.interval, 2.0 * self.interval, 0.5 * self.total
+        )
+        times = self.interval + (longest - self.interval)[:, np.newaxis] * spread
+        T1, Ta, T2 = best_combinations(
+            times, self.total, (self.V, self.A, self.J), self.objective.rough(), self.interval
+        )
+        points = self._points(T1, Ta, T2)
+        value = self._value(points)
+        more = self._candidates(known)
+        bound = np.repeat(PROMISING * value.min(axis=1, keepdims=True), more.shape[1], axis=1)
+        return (
+            np.concatenate([points, more], axis=1),
+            np.concatenate([value, self._value(more, bound)], axis=1),
+        )
 
-    def _candidates(self, known: list[SymmetricProfiles]) -> tuple[Array, NDArray[np.intp]]:
-        """Points of the grid, of four segments and of known profiles; each one's stretch of T1."""
-        n, effort, dt = len(self.total), self.effort, self.interval
-        spread = (np.linspace(0.0, 1.0, effort.ramps) ** SPREAD).round(12)
+    def _candidates(self, known: list[SymmetricProfiles]) -> Array:
+        """Points at the ends of Ta's range, of four segments and of known profiles."""
+        n, dt = len(self.total), self.interval
+        spread = (np.linspace(0.0, 1.0, EDGES) ** SPREAD).round(12)
         T1, T2 = (dt + (self._longest(which) - dt)[:, np.newaxis] * spread for which in (0, 1))
-        share = np.linspace(0.0, 1.0, effort.shares)
-        shape = (n, effort.ramps, effort.ramps, effort.shares)
-        grid = np.stack(
+        shape = (n, EDGES, EDGES, 2)
+        edges = np.stack(
             [
                 np.broadcast_to(T1[:, :, np.newaxis, np.newaxis], shape),
                 np.broadcast_to(T2[:, np.newaxis, :, np.newaxis], shape),
-                np.broadcast_to(share, shape),
+                np.broadcast_to([0.0, 1.0], shape),
             ],
             axis=-1,
         ).reshape(n, -1, 3)
-        stretch = np.repeat(np.arange(effort.ramps), effort.ramps * effort.shares)
         low, high = four_segment_range(self.total, self.V, self.A, self.J, dt)
         low, high = np.where(low <= high, low, dt), np.where(low <= high, high, dt)
         first = low[:, np.newaxis] + (high - low)[:, np.newaxis] * np.linspace(0.0, 1.0, LINE)
@@ -175,8 +157,7 @@ class _Search:
             [first, 0.5 * self.total[:, np.newaxis] - first, np.zeros(first.shape)], axis=-1
         )
         own = np.stack([self._stretched(profiles) for profiles in known], axis=1)
-        behind = np.repeat([effort.ramps, effort.ramps + 1], [LINE, len(known)])
-        return np.concatenate([grid, line, own], axis=1), np.concatenate([stretch, behind])
+        return np.concatenate([edges, line, own], axis=1)
 
     def _longest(self, which: int) -> Array:
         """The longest T1 (0) or T2 (1) that V and A leave, with one interval for the other."""
@@ -192,19 +173,28 @@ class _Search:
     def _stretched(self, profiles: SymmetricProfiles) -> Array:
         """Profiles stretched to T_SUM, as points of the search."""
         stretch = self.total / profiles.total
-        T1 = np.maximum(profiles.T1 * stretch, self.interval)
-        T2 = np.maximum(profiles.T2 * stretch, self.interval)
+        return self._points(*(x * stretch for x in (profiles.T1, profiles.Ta, profiles.T2)))
+
+    def _points(self, T1: Array, Ta: Array, T2: Array) -> Array:
+        """Ramps as points of the search."""
+        T1, T2 = np.maximum(T1, self.interval), np.maximum(T2, self.interval)
         low, high = self._range_of_Ta(T1, T2)
         with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.clip((profiles.Ta * stretch - low) / (high - low), 0.0, 1.0)
+            share = np.clip((Ta - low) / (high - low), 0.0, 1.0)
         return np.stack([T1, T2, np.where(np.isfinite(share), share, 0.0)], axis=-1)
 
     def _descend(
-        self, points: Array, value: Array, step: Array, directions: list[Array]
+        self, points: Array, value: Array, reach: Array, rounds: int
     ) -> tuple[Array, Array, Array]:
-        """Steps downhill from k points of each move, shapes (n, k, 3), (n, k) and (n, k, 3)."""
-        for turned in directions:
-            near = points[:, :, np.newaxis] + step[:, :, np.newaxis] * turned
+        """Steps downhill from k points of each move, shape (n, k, 3), with their values.
+
+        `reach`: the longest step of each, as parts of `REACH`.
+        """
+        for _ in range(rounds):
+            step = self._steps(points)
+            longest = np.abs(step).max(axis=-1, keepdims=True)
+            step *= np.minimum(1.0, reach[..., np.newaxis, np.newaxis] / np.maximum(longest, TINY))
+            near = points[:, :, np.newaxis] + step * _unit(points)[:, :, np.newaxis]
             np.maximum(near[..., :2], self.interval, out=near[..., :2])
             np.clip(near[..., 2], 0.0, 1.0, out=near[..., 2])
             bound = np.repeat(value, near.shape[2], axis=1)
@@ -215,8 +205,40 @@ class _Search:
             there = np.take_along_axis(near, chosen[..., np.newaxis], axis=2)[:, :, 0]
             points = np.where(better[..., np.newaxis], there, points)
             value = np.where(better, least, value)
-            step = step * np.where(better, GROWS, SHRINKS)[..., np.newaxis]
-        return points, value, step
+            reach = reach * np.where(better, GROWS, SHRINKS)
+        return points, value, reach
+
+    def _steps(self, points: Array) -> Array:
+        """Proposed steps from points, in parts of `REACH`, shape (n, k, proposals, 3)."""
+        T1, T2, share = points[..., 0], points[..., 1], points[..., 2]
+        profiles, legal = self._profiles(points)
+        quarter = 0.25 * self.total[:, np.newaxis]
+        own = (profiles.T1, profiles.Ta, profiles.T2)
+        ramp = [np.where(legal, x, quarter) for x in own]
+        left, by = slopes(ramp[0], ramp[1], ramp[2], self.total, self.objective)
+        low, high = self._range_of_Ta(T1, T2)
+        slope = []
+        for which, T in enumerate((T1, T2)):
+            moved = [T1, T2]
+            moved[which] = T * (1.0 + NUDGE)
+            lower, higher = self._range_of_Ta(*moved)
+            change = (lower - low) * (1.0 - share) + (higher - high) * share
+            slope.append(np.where(np.isfinite(change), change, 0.0) / (NUDGE * T))
+        width = np.where(np.isfinite(high - low), high - low, 0.0)
+        unit = _unit(points)
+        by_T1, by_T2, by_Ta = (
+            x.ravel().astype(np.float32) for x in (slope[0], slope[1], width * unit[..., 2])
+        )
+        first, second = (unit[..., k].ravel().astype(np.float32) for k in (0, 1))
+        by = np.stack(
+            [(by[0] + by[1] * by_T1) * first, (by[2] + by[1] * by_T2) * second, by[1] * by_Ta]
+        )
+        shortest = self.interval * (1.0 + NUDGE)
+        fixed = np.zeros((2, 3, share.size), dtype=bool)
+        fixed[0] = [(shortest >= T1).ravel(), (shortest >= T2).ravel(), (share <= 0.0).ravel()]
+        fixed[1, 2] = (share >= 1.0).ravel()
+        steps = proposed_steps(left, by, self.objective, fixed)
+        return np.moveaxis(steps.reshape(len(steps), *share.shape, 3), 0, 2)
 
     def _value(self, points: Array, bound: Array | None = None) -> Array:
         """Worst residual of candidates, shape (n, k); infinite where one is not legal.
@@ -289,12 +311,15 @@ class _Search:
         return profiles, legal
 
 
+def _unit(points: Array) -> Array:
+    """The units of steps from points."""
+    return np.concatenate(
+        [REACH[:2] * points[..., :2], np.full((*points.shape[:-1], 1), REACH[2])], axis=-1
+    )
+
+
 def _best(k: int, points: Array, value: Array, *more: Array) -> tuple[Array, ...]:
     """The k best points of each row, the first among equals, and what belongs to them."""
-    return _picked(np.argsort(value, axis=1, kind="stable")[:, :k], points, value, *more)
-
-
-def _picked(index: NDArray[np.intp], *columns: Array) -> tuple[Array, ...]:
-    """Some entries of each row, of columns of shape (n, k) or (n, k, 3)."""
+    index = np.argsort(value, axis=1, kind="stable")[:, :k]
     row = np.arange(len(index))[:, np.newaxis]
-    return tuple(column[row, index] for column in columns)
+    return tuple(column[row, index] for column in (points, value, *more))

@@ -1,0 +1,173 @@
+r"""Steps downhill for the largest of many residuals: Newton's method for symmetric profiles.
+
+This module owns how what profiles leave of every mode changes with T1, Ta and T2, and the steps
+that follow from it. The largest of many residuals has edges, where its slope changes all at once;
+a sum of high powers has none, and the higher the power, the nearer it is to the largest. Residuals
+are taken to change in proportion to a step, as in the method of Gauss and Newton.
+
+Rule: this proposes. What a step leaves, and whether it keeps the limits, the search looks at.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.search.candidates import Single, step_weights
+from gcodejerk.motion.search.objective import Objective
+
+POWERS = ((2.0, False), (8.0, True), (30.0, True))
+"""Powers for which steps are proposed, and whether with what the power itself bends: without, a
+step leads to where all would be left still, and far; with it, to the edge."""
+DAMPED, SINGULAR = 1e-2, 1e-6
+"""Added to the second derivatives, times each of them and times the largest."""
+
+
+def slopes(
+    T1: Array, Ta: Array, T2: Array, total: Array, objective: Objective
+) -> tuple[Single, Single]:
+    r"""What symmetric profiles leave of each mode, and how that changes with their durations.
+
+    Parameters
+    ----------
+    T1, Ta, T2 : ndarray, shape (n, k)
+        Of the ramps of k profiles for each of n moves; T1 and T2 above zero. T_SUM stays. [s]
+    total : ndarray, shape (n,)
+        T_SUM. [s]
+    objective : Objective
+        Of the n moves, with p poles.
+
+    Returns
+    -------
+    left : ndarray of float32, shape (2, p, n k)
+        Displacement of each mode as two parts, of which squares add up. [mm]
+    slope : ndarray of float32, shape (3, 2, p, n k)
+        Of these by T1, Ta and T2. [mm/s]
+
+    Notes
+    -----
+    Pairs of steps of the jerk as in `symmetric_worst`; a pair at t changes by
+    :math:`-\lambda (q e^{j\omega_d y} + p e^{-j\omega_d y})` with t, times its step.
+    """
+    k = T1.shape[1]
+    whole = np.repeat(total, k)
+    T1, Ta, T2 = (x.ravel() for x in (T1, Ta, T2))
+    area = Ta + 0.5 * (T1 + T2)
+    moment = T1 * T1 / 3.0 + Ta * (T1 + 0.5 * Ta) + 0.5 * T2 * (T1 + Ta + T2 / 3.0)
+    acceleration = 1.0 / (area * whole - 2.0 * moment)
+    # Relative change of the acceleration.
+    relative = (
+        0.5 * whole - 4.0 * T1 / 3.0 - 2.0 * Ta - T2,
+        whole - 2.0 * (T1 + Ta) - T2,
+        0.5 * whole - T1 - Ta - 2.0 * T2 / 3.0,
+    )
+    scaling = [(-acceleration * x).astype(np.float32) for x in relative]
+    up, down, rise, fall = (
+        x.astype(np.float32) for x in (acceleration / T1, acceleration / T2, 1.0 / T1, 1.0 / T2)
+    )
+    weight = np.repeat(step_weights(objective), k, axis=1)
+    at = [
+        _moved(t.astype(np.float32), whole.astype(np.float32), objective)
+        for t in (np.zeros_like(T1), T1, T1 + Ta, T1 + Ta + T2)
+    ]
+    left = np.empty((2, *weight.shape), dtype=np.float32)
+    slope = np.empty((3, *left.shape), dtype=np.float32)
+    for part in (0, 1):
+        (begin, _), (first, by_first), (second, by_second), (third, by_third) = (
+            (value[part], by_time[part]) for value, by_time in at
+        )
+        rising, falling = up * (begin - first), down * (second - third)
+        both = rising - falling
+        by_T2 = down * by_third + fall * falling
+        by_Ta = by_T2 - down * by_second - fall * falling
+        by_T1 = by_Ta - up * by_first - rise * rising
+        left[part] = both * weight
+        for which, own in enumerate((by_T1, by_Ta, by_T2)):
+            slope[which, part] = (own + both * scaling[which]) * weight
+    return left, slope
+
+
+def _moved(
+    t: Single, whole: Single, objective: Objective
+) -> tuple[tuple[Single, Single], tuple[Single, Single]]:
+    """A pair of steps at t and at T - t, seen from the middle, and its change with t."""
+    poles = objective.poles[:, np.newaxis]
+    sigma, omega = (x.astype(np.float32) for x in (-poles.real, poles.imag))
+    phase = (np.float32(0.5) * whole - t) * omega
+    cosine, sine = np.cos(phase), np.sin(phase)
+    early, late = np.exp(-sigma * t), np.exp(-sigma * (whole - t))
+    even, odd = late + early, late - early
+    value = odd * cosine, even * sine
+    across = even * cosine, odd * sine
+    return value, (sigma * across[0] + omega * across[1], sigma * across[1] - omega * across[0])
+
+
+def proposed_steps(
+    left: Single, slope: Single, objective: Objective, fixed: NDArray[np.bool_]
+) -> Array:
+    """Steps that lower the largest residual, as far as slopes tell.
+
+    Parameters
+    ----------
+    left, slope : ndarray of float32, shapes (2, p, m) and (3, 2, p, m)
+        Of m profiles, as from `slopes`, by any three numbers.
+    objective : Objective
+        Its groups.
+    fixed : ndarray of bool, shape (2, 3, m)
+        Which of the three may not fall, and which may not rise.
+
+    Returns
+    -------
+    ndarray, shape (len(POWERS), m, 3)
+        In the units of the three numbers.
+    """
+    squares, radial = _summed(left * left), np.stack([_summed(own * left) for own in slope])
+    products = {(i, j): _summed(slope[i] * slope[j]) for i in range(3) for j in range(i, 3)}
+    starts = np.flatnonzero(np.diff(objective.group, prepend=-1))
+    if len(starts) < len(objective.group):
+        squares, radial = (np.add.reduceat(x, starts, axis=-2) for x in (squares, radial))
+        products = {k: np.add.reduceat(x, starts, axis=-2) for k, x in products.items()}
+    largest = squares.max(axis=0, initial=0.0)
+    share = squares / np.where(largest > 0.0, largest, np.float32(1.0))
+    inverse = np.float32(1.0) / np.where(squares > 0.0, squares, np.float32(1.0))
+    steps = []
+    for power, bent in POWERS:
+        weight = share ** np.float32(0.5 * power - 1.0)
+        gradient = (weight * radial).sum(axis=1, dtype=np.float64)
+        held = (fixed[0] & (gradient > 0.0)) | (fixed[1] & (gradient < 0.0))
+        second = {k: weight * own for k, own in products.items()}
+        if bent:
+            bend = weight * inverse * np.float32(power - 2.0)
+            second = {(i, j): x + bend * radial[i] * radial[j] for (i, j), x in second.items()}
+        matrix = {k: x.sum(axis=0, dtype=np.float64) for k, x in second.items()}
+        steps.append(_solved(matrix, np.where(held, 0.0, -gradient), held))
+    return np.stack(steps)
+
+
+def _summed(parts: Single) -> Single:
+    """The sum of both parts."""
+    both: Single = parts[0] + parts[1]
+    return both
+
+
+def _solved(matrix: dict[tuple[int, int], Array], right: Array, held: NDArray[np.bool_]) -> Array:
+    """Solutions of symmetric equations in three unknowns, some of which are held; shape (m, 3).
+
+    By elimination, written out: the same to the last bit wherever it runs.
+    """
+    most = np.maximum(np.maximum(matrix[0, 0], matrix[1, 1]), matrix[2, 2])
+    free = ~held
+    m = {
+        (i, j): np.where(free[i] & free[j], x, 0.0) if i != j
+        else np.where(free[i], x * (1.0 + DAMPED) + SINGULAR * most, 1.0) + (most == 0.0)
+        for (i, j), x in matrix.items()
+    }  # fmt: skip
+    a, b = m[0, 1] / m[0, 0], m[0, 2] / m[0, 0]
+    m11, m12, m22 = m[1, 1] - a * m[0, 1], m[1, 2] - a * m[0, 2], m[2, 2] - b * m[0, 2]
+    r1, r2 = right[1] - a * right[0], right[2] - b * right[0]
+    c = m12 / m11
+    z = (r2 - c * r1) / (m22 - c * m12)
+    y = (r1 - m12 * z) / m11
+    x = (right[0] - m[0, 1] * y - m[0, 2] * z) / m[0, 0]
+    return np.stack([x, y, z], axis=1)

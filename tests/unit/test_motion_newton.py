@@ -1,0 +1,141 @@
+"""Steps downhill, and combinations of switching times, against profiles one by one."""
+
+import itertools
+
+import numpy as np
+import pytest
+from test_motion_candidates import drawn_objective
+
+from gcodejerk.motion import Objective, SymmetricProfiles, mode_poles
+from gcodejerk.motion.search.combinations import best_combinations
+from gcodejerk.motion.search.newton import POWERS, proposed_steps, slopes
+
+INTERVAL = 0.001
+
+
+def drawn_ramps(rng, n, k):
+    """T1, Ta, T2 of shape (n, k) and T_SUM of shape (n,), with some cruise left."""
+    total = rng.uniform(0.05, 0.4, n)
+    parts = rng.dirichlet([2.0, 1.0, 2.0, 1.0], (n, k)) * 0.5 * total[:, np.newaxis, np.newaxis]
+    return parts[..., 0], parts[..., 1], parts[..., 2], total
+
+
+def exact(T1, Ta, T2, total, objective):
+    """Displacements of each mode in double precision, shape (n k, p)."""
+    n, k = T1.shape
+    Tv = total[:, np.newaxis] - 2 * (T1 + Ta + T2)
+    flat = SymmetricProfiles(*(x.ravel() for x in (T1, Ta, T2, Tv))).general()
+    apart = objective.take(np.repeat(np.arange(n), k))
+    each = [
+        Objective.of_modes(apart.poles[m : m + 1], apart.weights[:, m : m + 1]).of(flat)
+        for m in range(len(apart.poles))
+    ]
+    return np.stack(each, axis=1)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02, 0.1])
+def test_what_is_left_and_its_slopes_are_those_of_profiles_a_little_longer(damping):
+    rng = np.random.default_rng(5)
+    poles = mode_poles(rng.uniform(8, 60, 3), np.full(3, damping))
+    objective = Objective.of_modes(poles, rng.uniform(0.5, 2.0, (4, 3)))
+    *ramp, total = drawn_ramps(rng, 4, 5)
+    left, slope = slopes(*ramp, total, objective)
+    size = np.sqrt((left.astype(float) ** 2).sum(axis=0))
+    expected = exact(*ramp, total, objective).T
+    np.testing.assert_allclose(size, expected, rtol=1e-3, atol=1e-4 * expected.max())
+    # The square changes by twice what both parts change by.
+    rate = 2.0 * (left[np.newaxis].astype(float) * slope).sum(axis=1)
+    for which in range(3):
+        little = 1e-5 * total[:, np.newaxis]
+        squares = []
+        for sign in (1.0, -1.0):
+            moved = list(ramp)
+            moved[which] = moved[which] + sign * little
+            squares.append(exact(*moved, total, objective).T ** 2)
+        numeric = (squares[0] - squares[1]) / (2.0 * np.repeat(little[:, 0], 5))
+        scale = np.abs(numeric).max(axis=0)
+        assert (np.abs(rate[which] - numeric) <= 2e-3 * scale + 1e-3 * np.abs(numeric)).all()
+
+
+@pytest.mark.parametrize("spectrum", [False, True], ids=["band", "spectrum"])
+def test_steps_lead_downhill(spectrum):
+    rng = np.random.default_rng(6)
+    fell = []
+    for _ in range(20):
+        objective = drawn_objective(rng, 3, 0.02, spectrum)
+        objective = Objective(objective.poles, objective.weights + 0.1, objective.group)
+        T1, Ta, T2, total = drawn_ramps(rng, 3, 4)
+        left, slope = slopes(T1, Ta, T2, total, objective)
+        free = np.zeros((2, 3, T1.size), dtype=bool)
+        steps = proposed_steps(left, slope, objective, free)
+        assert steps.shape == (len(POWERS), T1.size, 3)
+
+        def power_sum(parts, power, objective=objective):
+            squares = (parts.astype(float) ** 2).sum(axis=0)
+            starts = np.flatnonzero(np.diff(objective.group, prepend=-1))
+            return (np.add.reduceat(squares, starts, axis=0) ** (power / 2)).sum(axis=0)
+
+        for (power, _), step in zip(POWERS, steps, strict=True):
+            # Residuals that change in proportion: a hundredth of the step lowers the sum of powers.
+            moved = left + 0.01 * np.einsum("mi,ixpm->xpm", step, slope)
+            fell.append(power_sum(moved, power) < power_sum(left, power))
+    assert np.mean(fell) > 0.99
+
+
+def test_what_is_fixed_does_not_move_where_it_would_go_beyond():
+    rng = np.random.default_rng(7)
+    objective = Objective.of_modes(mode_poles([20.0, 35.0], [0.02, 0.02]), np.ones((5, 2)))
+    *ramp, total = drawn_ramps(rng, 5, 6)
+    left, slope = slopes(*ramp, total, objective)
+    free = proposed_steps(left, slope, objective, np.zeros((2, 3, 30), dtype=bool))
+    squares = (left * left).sum(axis=0)
+    share = squares / squares.max(axis=0)
+    for which, up in itertools.product(range(3), (False, True)):
+        fixed = np.zeros((2, 3, 30), dtype=bool)
+        fixed[int(up), which] = True
+        held = proposed_steps(left, slope, objective, fixed)
+        for k, (power, _) in enumerate(POWERS):
+            of_each = (left * slope[which]).sum(axis=0) * share ** (power / 2 - 1)
+            downhill = -of_each.sum(axis=0)
+            outward = downhill > 0 if up else downhill < 0
+            assert 0 < outward.sum() < 30
+            assert (held[k, outward, which] == 0.0).all()
+            assert (held[k, ~outward] == free[k, ~outward]).all()
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.03])
+@pytest.mark.parametrize("spectrum", [False, True], ids=["band", "spectrum"])
+def test_combinations_are_the_best_of_all_profiles_with_these_times(damping, spectrum):
+    rng = np.random.default_rng(8)
+    for _ in range(2):
+        n, k = 2, 7
+        objective = drawn_objective(rng, n, damping, spectrum)
+        objective = Objective(objective.poles, objective.weights + 0.1, objective.group)
+        total = rng.uniform(0.05, 0.4, n)
+        times = (
+            INTERVAL
+            + np.sort(rng.uniform(0, 1, (n, k)), axis=1) * (0.5 * total - INTERVAL)[:, None]
+        )
+        times[:, -1] = 0.5 * total
+        A, J = 12.0 / total**2, 200.0 / total**3
+        found = best_combinations(times, total, (2.0 / total, A, J), objective, INTERVAL)
+        for i, first in itertools.product(range(n), range(k - 1)):
+            one = objective.take(slice(i, i + 1))
+            T = total[i]
+            best = np.inf
+            for second, third in itertools.combinations(range(k), 2):
+                if second < first:
+                    continue
+                T1, Ta, T2 = np.diff(np.append(0.0, times[i, [first, second, third]]))
+                profile = SymmetricProfiles(
+                    *(np.array([x]) for x in (T1, Ta, T2, T - 2 * times[i, third]))
+                )
+                legal = profile.velocity[0] <= 2.0 / T and profile.acceleration[0] <= A[i]
+                legal &= profile.jerk[0] <= J[i] and T2 >= INTERVAL
+                legal &= all(x == 0.0 or x >= INTERVAL for x in (Ta, profile.Tv[0]))
+                if legal:
+                    best = min(best, float(one.of(profile.general())[0]))
+            if np.isfinite(best):
+                T1, Ta, T2 = (x[i, first : first + 1] for x in found)
+                own = SymmetricProfiles(T1, Ta, T2, T - 2 * (T1 + Ta + T2)).general()
+                assert float(one.of(own)[0]) <= best * (1 + 1e-3) + 1e-4 * one.weights.max()
