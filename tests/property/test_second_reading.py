@@ -65,6 +65,18 @@ def test_the_second_reading_agrees_with_the_first(dialect, data, known):
     assert not violations
 
 
+def test_where_the_last_digit_decides_about_a_whole_turn_the_axis_is_unknown():
+    """104.84 from -615 deg is 104.84 - 720 + 360, which is not 104.84 - 360 to the last bit."""
+    assert 104.84 - 720.0 + 360.0 != 104.84 - 360.0
+    program = b"F300\nG0 X0 C-87\nC-105\nC104.84\nC104.84\nX2\nC-30\nX5\nM2"
+    start = start_of("linuxcnc")
+    rapids = read(program, "linuxcnc", start)
+    again = np.flatnonzero(rapids.line == 5)
+    assert (rapids.reason[again] != CERTAIN).all()
+    assert np.isnan(rapids.target[again, AXES.index("C")]).all()
+    assert not judge(program, "linuxcnc", start, rapids)[0]
+
+
 @pytest.mark.parametrize("wrap", ["none", "shortest", "sign"])
 def test_a_rotary_axis_that_counts_turns_does_so_in_a_run_of_feed_moves(wrap):
     run = b"Z105.9 X162.3\nY0. X199.9 Z-188.75\nA10. C-104.4 Z-49.5\n"

@@ -132,7 +132,8 @@ def way_round(stands: float, angle: float, wrap: str) -> float:
     Returns
     -------
     float
-        NaN where half a turn has no shorter way round, or the number is not an angle. [deg]
+        NaN where half a turn has no shorter way round, where the last digit decides between no
+        turn and a whole one, or where the number is not an angle. [deg]
     """
     if stands != stands:
         # Somewhere on this angle; how many turns have been counted, nobody knows.
@@ -146,6 +147,8 @@ def way_round(stands: float, angle: float, wrap: str) -> float:
         return NAN
     backwards = math.copysign(1.0, angle) < 0.0
     end = abs(angle) + math.floor(stands / 360.0) * 360.0
+    if end != stands and abs(math.remainder(end - stands, 360.0)) < 1e-6:
+        return NAN
     if backwards and end > stands:
         return end - 360.0
     return end + 360.0 if not backwards and end < stands else end

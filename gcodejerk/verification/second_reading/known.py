@@ -291,6 +291,8 @@ class Known:
         ends = [angle + 360.0 * (turns + n) for n in (-1, 0, 1, 2)]
         if wrap == "sign":
             ends = [abs(angle) + 360.0 * (math.floor(here / 360.0) + n) for n in (-1, 0, 1)]
+            if here not in ends and min(abs(end - here) for end in ends) < 1e-6:
+                return NAN
             back = math.copysign(1.0, angle) < 0.0
             return max(e for e in ends if e <= here) if back else min(e for e in ends if e >= here)
         ends.sort(key=lambda end: abs(end - here))
