@@ -166,7 +166,7 @@ def test_results_are_shown_in_one_short_line():
 
 def test_where_todays_rapid_is_lucky_at_the_file_s_frequencies_it_is_said():
     centre = Machine.load(find_machine("centre"))
-    program = b"G21 G90 G94\nG1 X0 Y0 Z50 F900\nG0 X10\nG0 Z2\nM2\n"
+    program = b"G21 G90 G94\nG1 X0 Y0 Z50 F900\nG0 X25\nG0 Z2\nM2\n"
     made = process(program, centre)
     lucky = made.rapids[0]
     assert lucky.rewritten

@@ -122,7 +122,7 @@ def test_both_have_the_same_filters(kind):
 @pytest.mark.parametrize("behind", ["", SHAPED[1], SHAPED[3]])
 @pytest.mark.parametrize("planner", LAWS)
 def test_what_is_written_for_such_a_machine_is_proven(planner, behind):
-    program = b"G90 G21\nG0 X0 Z0\nG0 X30 Z5\nG1 X31 F500\nG0 Z40\nG0 X-60\nM2\n"
+    program = b"G90 G21\nG0 X0 Z0\nG0 X30 Z5\nG1 X31 F500\nG0 Z40\nG0 X-60\nG0 Z21\nM2\n"
     for positioning in ("linear", "independent"):
         own = machine(planner, behind, positioning)
         result = process(program, own)

@@ -46,6 +46,8 @@ REACH = (0.3, 0.3, 0.25)
 GROWS, SHRINKS = 1.5, 0.3
 """What the longest step is multiplied by after one that led downhill, and after one that did not.
 """
+RETURNS = 2
+"""Times that T1 and T2 are made as long as the limit of jerk asks for."""
 NUDGE = 1e-4
 """Relative change of T1 and T2 by which the slope of Ta's range is found."""
 TINY = 1e-12
@@ -194,9 +196,7 @@ class _Search:
             step = self._steps(points)
             longest = np.abs(step).max(axis=-1, keepdims=True)
             step *= np.minimum(1.0, reach[..., np.newaxis, np.newaxis] / np.maximum(longest, TINY))
-            near = points[:, :, np.newaxis] + step * _unit(points)[:, :, np.newaxis]
-            np.maximum(near[..., :2], self.interval, out=near[..., :2])
-            np.clip(near[..., 2], 0.0, 1.0, out=near[..., 2])
+            near = self._within(points[:, :, np.newaxis] + step * _unit(points)[:, :, np.newaxis])
             bound = np.repeat(value, near.shape[2], axis=1)
             found = self._value(near.reshape(len(near), -1, 3), bound).reshape(near.shape[:3])
             chosen = found.argmin(axis=2)[..., np.newaxis]
@@ -207,6 +207,18 @@ class _Search:
             value = np.where(better, least, value)
             reach = reach * np.where(better, GROWS, SHRINKS)
         return points, value, reach
+
+    def _within(self, points: Array) -> Array:
+        """Points moved back to the limits that they are beyond; nearly, where it is the jerk's."""
+        np.clip(points[..., 2], 0.0, 1.0, out=points[..., 2])
+        np.maximum(points[..., :2], self.interval, out=points[..., :2])
+        J = self.J.reshape(-1, *(1,) * (points.ndim - 1))
+        for _ in range(RETURNS):
+            profiles = self._profiles(points)[0]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                shortest = profiles.acceleration[..., np.newaxis] / J * (1.0 + ROUNDING)
+            np.fmax(points[..., :2], np.where(shortest > 0.0, shortest, 0.0), out=points[..., :2])
+        return points
 
     def _steps(self, points: Array) -> Array:
         """Proposed steps from points, in parts of `REACH`, shape (n, k, proposals, 3)."""
