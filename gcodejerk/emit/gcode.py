@@ -53,6 +53,11 @@ class GcodeController(Controller):
 
     play = Play.HELD
 
+    @property
+    def repeats(self) -> bool:  # type: ignore[override]
+        """Unless somebody else's text says more, such as the line."""
+        return type(self).render is GcodeController.render
+
     def stride(self, interval: float) -> int:
         """About 2 ms."""
         return max(1, round(BLOCK_TIME / interval))

@@ -73,6 +73,11 @@ class LinuxcncController(LinuxcncSettings, Controller):
         Form("parameters", "documented", "MAX_JERK of 2.10, MAX_ACCELERATION of 2.9: the INI file"),
     )
 
+    @property
+    def repeats(self) -> bool:  # type: ignore[override]
+        """Unless somebody else's text says more, such as the line."""
+        return type(self).render is LinuxcncController.render
+
     def stride(self, interval: float) -> int:
         """About 2 ms, and two periods at least."""
         return max(2, round(BLOCK_TIME / interval))

@@ -30,7 +30,7 @@ from gcodejerk.verification import proof
 PHASES = {
     "read": (pipeline, "_read"),
     "plan": (pipeline, "_plan"),
-    "write": (pipeline, "_write"),
+    "write": (pipeline, "write_streams"),
     "verify": (pipeline, "_verified"),
     "(read twice)": (proof, "confirm"),
 }
