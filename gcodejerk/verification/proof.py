@@ -224,7 +224,8 @@ def _judge_program(
     reported: Reported,
 ) -> tuple[list[int], int]:
     """Compare programs; which rapids were replaced, and how many lines were kept."""
-    alignment = Alignment(Window(original), Window(processed), program, machine, found)
+    windows = Window(original), Window(processed)
+    alignment = Alignment(*windows, program, machine, found, reported)
     reader = Reader(program.rapids, machine, found, program.language)
     stride = stride_of(machine)
     alike = Alike(reported if alignment.aligned else {})
@@ -244,7 +245,7 @@ def _judge_program(
         if alignment.aligned:
             paths = in_own_steps(paths)
         check_rapids(paths, program.rapids, machine, found)
-        alike.judge(paths, judge, found)
+        alignment.judged(alike.judge(paths, judge, found))
     if alignment.guarded and alignment.aligned:
         lines = program.rapids.line[alignment.replaced].tolist()
         check_guarded(original, program.dialect, lines, found)
