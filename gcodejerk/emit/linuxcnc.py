@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
 from gcodejerk.emit.frame import Frame
-from gcodejerk.emit.gcode import line_ends_of
+from gcodejerk.emit.gcode import line_ends_of, origins
 from gcodejerk.emit.guard import guarded, in_structures
 from gcodejerk.emit.linuxcnc_settings import LinuxcncSettings
 from gcodejerk.emit.number_format import Column, format_lines
@@ -88,8 +88,7 @@ class LinuxcncController(LinuxcncSettings, Controller):
         inch = MM_PER_INCH * 10.0**-INCH_DECIMALS
         step = np.where(rapids.inch[:, np.newaxis], inch, 10.0**-DECIMALS)
         step = np.broadcast_to(step, rapids.start.shape)
-        origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
-        return NumberFormat(rapids.start, step, origin)
+        return NumberFormat(rapids.start, step, origins(rapids))
 
     def render(
         self,

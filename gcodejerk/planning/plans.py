@@ -7,7 +7,7 @@ thing here: a profile has a *share*, the displacement of every axis that it carr
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -236,7 +236,13 @@ def same_rows(*columns: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray
     >>> first.tolist(), like.tolist()
     ([0, 1, 3], [0, 1, 0, 2])
     """
-    count = len(columns[0])
+    return sorted_rows(columns, len(columns[0]))
+
+
+def sorted_rows(
+    columns: Iterable[NDArray[np.generic]], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The same of columns that are made one by one, each of `count` rows."""
     like = np.zeros(count, dtype=np.int64)
     sorts = min(count, 1)
     for column in columns if count else ():

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.batch import NumberFormat
-from gcodejerk.planning.plans import Plans, same_rows
+from gcodejerk.planning.plans import Plans, sorted_rows
 
 PLACES = ("line", "begin", "end", "start", "target", "offset", "reason")
 """Columns of rapids that the text of a stream does not depend on, or on some axes of them only."""
@@ -63,7 +63,7 @@ def same_streams(
     follows = (moves[before] == moves - 1) & (rapids.line[moves - 1] + 1 == rapids.line[moves])
     behind = np.where(follows, like[before], -1)
     blocks = np.frombuffer(b"".join(_digests(rapids, moves, source)), np.uint64).reshape(-1, 2)
-    first, like = same_rows(like, behind, blocks)
+    first, like = sorted_rows((like, behind, blocks), len(moves))
     own = np.arange(len(plans))
     own[moves] = moves[_kept(first, like, plans.counts[moves] // stride)]
     return own if (own[moves] != moves).any() else None
@@ -73,21 +73,26 @@ def _ways(
     plans: Plans, rapids: Rapids, number_format: NumberFormat, moves: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Sorts of moves that go the same way in the same modes, as `same_rows` has them."""
-    columns: list[NDArray[np.generic]] = [
-        plans.counts, plans.length, plans.conventional_time, plans.worst_in_band,
-        plans.most_in_band,
-    ]  # fmt: skip
-    columns += [getattr(rapids, f.name) for f in fields(rapids) if f.name not in PLACES]
-    used = [column[moves] for column in columns]
+    return sorted_rows(_columns(plans, rapids, number_format, moves), len(moves))
+
+
+def _columns(
+    plans: Plans, rapids: Rapids, number_format: NumberFormat, moves: NDArray[np.int64]
+) -> Iterator[NDArray[np.generic]]:
+    """What they have in common, one column at a time: all together are half a kB a move."""
+    for name in ("counts", "length", "conventional_time", "worst_in_band", "most_in_band"):
+        yield getattr(plans, name)[moves]
+    for each in fields(rapids):
+        if each.name not in PLACES:
+            yield getattr(rapids, each.name)[moves]
     for k in range(len(AXES)):
         way = plans.displacement[moves, k]
-        used.append(way)
+        yield way
         named = (rapids.words[moves] >> k & 1) != 0
         for place in (rapids.start, rapids.target):
-            used.append(np.where(named | (way != 0.0), place[moves, k], 0.0))
+            yield np.where(named | (way != 0.0), place[moves, k], 0.0)
         for numbers in (number_format.start, number_format.step, number_format.origin):
-            used.append(np.where(way != 0.0, numbers[moves, k], 0.0))
-    return same_rows(*used)
+            yield np.where(way != 0.0, numbers[moves, k], 0.0)
 
 
 def _digests(rapids: Rapids, moves: NDArray[np.int64], source: BinaryIO) -> Iterator[bytes]:
