@@ -341,14 +341,14 @@ def _checked(alignment: Alignment, reader: Reader) -> Iterator[Stream]:
             yield stream
 
 
-def _batches(streams: Iterator[Stream], most: int = BATCH_BYTES) -> Iterator[list[Stream]]:
+def _batches(streams: Iterator[Stream], most: int = 0) -> Iterator[list[Stream]]:
     """Streams in lists, each of some MB of text."""
     batch: list[Stream] = []
     size = 0
     for stream in streams:
         batch.append(stream)
         size += len(stream.text) + 64 * len(stream.rest)
-        if size > most:
+        if size > (most or BATCH_BYTES):
             yield batch
             batch, size = [], 0
     if batch:
