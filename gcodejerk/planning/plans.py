@@ -205,16 +205,28 @@ class Plans:
             *("reason", "displacement", "length", "conventional_time", "counts"),
             *("worst_in_band", "most_in_band"),
         )
+        taken = {name: getattr(self, name)[index] for name in columns}
         return replace(
             self,
-            **{name: getattr(self, name)[index] for name in columns},
+            **taken,
             move=move,
-            share=self.share[rows],
+            share=_same_or(self.share, rows, taken["displacement"], move),
             profiles=RepeatedProfiles(self.profiles, rows),
             conventional=RepeatedProfiles(self.conventional, rows),
             profile_counts=self.profile_counts[rows],
             lasting=None if self.lasting is None else self.lasting[index],
         )
+
+
+def _same_or(
+    share: Array, rows: NDArray[np.int64], displacement: Array, move: NDArray[np.int64]
+) -> Array:
+    """Some rows of the shares: a part of the displacements, where they are just that."""
+    if len(move) and move[-1] - move[0] + 1 == len(move):
+        part = displacement[move[0] : move[-1] + 1]
+        if all((share[rows, k] == part[:, k]).all() for k in range(part.shape[1])):
+            return part
+    return share[rows]
 
 
 def same_rows(*columns: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -50,8 +51,6 @@ class Records:
         self.limit = np.full(len(plans), np.nan) if limit is None else limit
         modes = plans.modes
         self.residual, self.conventional = modes.grouped(residual), modes.grouped(conventional)
-        self.acceleration = modes.accelerations(residual)
-        self.conventional_acceleration = modes.accelerations(conventional)
         interval = plans.machine.interval
         usual = whole_intervals(plans.conventional_time, interval)
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
@@ -61,11 +60,24 @@ class Records:
             self.extension = np.where(plans.planned & (more > 1e-9), more, 0.0)
         self.rest = rest
         self.oscillators = (residual, conventional)
-        self.peaks = (
-            self.profiles.peak_velocity,
-            self.profiles.peak_acceleration,
-            self.profiles.peak_jerk,
-        )
+
+    # The summary of a large program needs none of these.
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """Acceleration amplitudes of the entries of modes, shape (n, g) [mm/s^2]."""
+        return self.plans.modes.accelerations(self.oscillators[0])
+
+    @cached_property
+    def conventional_acceleration(self) -> Array:
+        """The same of the control's own rapids."""
+        return self.plans.modes.accelerations(self.oscillators[1])
+
+    @cached_property
+    def peaks(self) -> tuple[Array, Array, Array]:
+        """Peaks of velocity, acceleration and jerk of the unit profiles."""
+        own = self.profiles
+        return own.peak_velocity, own.peak_acceleration, own.peak_jerk
 
     def summary(self) -> Record:
         """The counts and totals of all moves."""

@@ -27,6 +27,8 @@ PLACES = ("line", "begin", "end", "start", "target", "offset", "reason")
 """Columns of rapids that the text of a stream does not depend on, or on some axes of them only."""
 KEPT_BYTES = 1 << 24
 """Text that is kept for the streams that are still to come, about."""
+AT_ONCE = 8192
+"""Blocks that are read at a time."""
 POINT_BYTES = 40
 """Of a point, about."""
 
@@ -62,7 +64,7 @@ def same_streams(
     before = np.searchsorted(moves, moves - 1)
     follows = (moves[before] == moves - 1) & (rapids.line[moves - 1] + 1 == rapids.line[moves])
     behind = np.where(follows, like[before], -1)
-    blocks = np.frombuffer(b"".join(_digests(rapids, moves, source)), np.uint64).reshape(-1, 2)
+    blocks = _digests(rapids, moves, source)
     first, like = sorted_rows((like, behind, blocks), len(moves))
     own = np.arange(len(plans))
     own[moves] = moves[_kept(first, like, plans.counts[moves] // stride)]
@@ -95,12 +97,17 @@ def _columns(
             yield np.where(way != 0.0, numbers[moves, k], 0.0)
 
 
-def _digests(rapids: Rapids, moves: NDArray[np.int64], source: BinaryIO) -> Iterator[bytes]:
-    """A digest of the block of each move."""
-    begin, end = rapids.begin[moves].tolist(), rapids.end[moves].tolist()
-    for at, behind in zip(begin, end, strict=True):
-        source.seek(at)
-        yield hashlib.blake2b(source.read(behind - at), digest_size=16).digest()
+def _digests(rapids: Rapids, moves: NDArray[np.int64], source: BinaryIO) -> NDArray[np.uint64]:
+    """A digest of the block of each move, shape (n, 2)."""
+    out = np.empty((len(moves), 2), dtype=np.uint64)
+    for k in range(0, len(moves), AT_ONCE):
+        part = moves[k : k + AT_ONCE]
+        digests = []
+        for at, behind in zip(rapids.begin[part].tolist(), rapids.end[part].tolist(), strict=True):
+            source.seek(at)
+            digests.append(hashlib.blake2b(source.read(behind - at), digest_size=16).digest())
+        out[k : k + AT_ONCE] = np.frombuffer(b"".join(digests), np.uint64).reshape(-1, 2)
+    return out
 
 
 def _kept(

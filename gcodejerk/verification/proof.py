@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
+
+import numpy as np
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
@@ -202,6 +204,7 @@ def verify_files(
         windows = Window(original), Window(processed)
         kept, places = check_settings(*windows, program, machine, control, found)
         return Verification(len(program.rapids), 0, kept, found.sorted(), names, places=places)
+    replaced: Sequence[int]
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
     elif machine.controller == CONTROLLER:
@@ -222,7 +225,7 @@ def _judge_program(
     machine: Machine,
     found: Findings,
     reported: Reported,
-) -> tuple[list[int], int]:
+) -> tuple[Sequence[int], int]:
     """Compare programs; which rapids were replaced, and how many lines were kept."""
     windows = Window(original), Window(processed)
     alignment = Alignment(*windows, program, machine, found, reported)
@@ -247,7 +250,7 @@ def _judge_program(
         check_rapids(paths, program.rapids, machine, found)
         alignment.judged(alike.judge(paths, judge, found))
     if alignment.guarded and alignment.aligned:
-        lines = program.rapids.line[alignment.replaced].tolist()
+        lines = program.rapids.line[np.array(alignment.replaced)].tolist()
         check_guarded(original, program.dialect, lines, found)
     alignment.check_sum()
     return alignment.replaced, alignment.kept
@@ -260,7 +263,7 @@ def _judge_pair(
     program: Program,
     machine: Machine,
     found: Findings,
-) -> tuple[list[int], int]:
+) -> tuple[Sequence[int], int]:
     """Compare a program and its file of samples; which rapids were replaced, and lines kept."""
     if beside is None:
         found.add(

@@ -7,6 +7,7 @@ the case, the walk ends with a violation, since everything behind would be guess
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator
 
 import numpy as np
@@ -53,7 +54,7 @@ class Alignment:
         self.at = 0
         """Place in the original, in bytes."""
         self.kept = 0
-        self.replaced: list[int] = []
+        self.replaced = array("q")
         """Indices of the rapids that have a stream."""
         self.block = b""
         """Text of the block whose stream was found last."""

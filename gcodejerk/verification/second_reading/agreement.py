@@ -10,6 +10,7 @@ it says so by a number and nothing is refused: `nc` follows more than it does.
 from __future__ import annotations
 
 import math
+from array import array
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -65,14 +66,14 @@ def confirm(
     int
         How many of them the second reading confirms.
     """
-    index = list(rewritten)
-    if not index:
+    index = np.fromiter(rewritten, dtype=np.int64)
+    if not len(index):
         return 0
     confirmed = 0
-    lines = rapids.line[index].tolist()
-    plain = _Plain(rapids, np.array(index, dtype=np.int64))
+    lines = array("q", rapids.line[index].tobytes())
+    plain = _Plain(rapids, index)
     for k, seen in observations(original, find_dialect(dialect), start, lines, plain):
-        i = index[k]
+        i = int(index[k])
         problem = _disagreement(seen, rapids, i)
         if problem:
             advice = "leave this rapid alone, and report the program: one of two readings is wrong"
@@ -201,7 +202,7 @@ def observations(
     original: BinaryIO,
     dialect: Dialect,
     start: Start,
-    lines: list[int],
+    lines: Sequence[int],
     plain: _Plain | None = None,
 ) -> Iterator[tuple[int, Observation]]:
     """What the second reading sees in these lines.
@@ -210,7 +211,7 @@ def observations(
     ----------
     original, dialect, start
         As for `confirm`.
-    lines : list of int
+    lines : sequence of int
         Ascending, counted from 1.
     plain : optional
         Compares those that stand among plain lines by itself; where it agrees to all of them,
