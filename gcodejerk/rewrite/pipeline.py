@@ -241,7 +241,7 @@ def _process(
     if target is not None and settings.verify:
         report("verifying", 0, 1)
         verification = _verified(
-            source, target, machine, settings, program, plans, emitter, lines, beside
+            source, target, machine, settings, program, plans, emitter, lines, beside, report
         )
         report("verifying", 1, 1)
     what_if = entry_notes(source, program, machine.program_start())
@@ -296,7 +296,10 @@ def _set(
     result = set_control(source, target, program, machine, emitter, sheets, chosen)
     if target is None or not settings.verify:
         return result
-    found = _verified(source, target, machine, settings, program, result.plans, emitter, None, None)
+    plans = result.plans
+    found = _verified(
+        source, target, machine, settings, program, plans, emitter, None, None, report
+    )
     return replace(result, verification=found)
 
 
@@ -381,6 +384,7 @@ def _verified(
     emitter: Controller,
     lines: LineMap | None,
     beside: BinaryIO | None,
+    report: Progress,
 ) -> Verification:
     """Read an output back; whatever is wrong with it is raised, in lines of the original."""
     source.seek(0)
@@ -397,6 +401,7 @@ def _verified(
             reported=ReportedProfiles(program, plans) if emitter.play is Play.ALIGNED else None,
             beside=beside if emitter.beside else None,
             program=program,
+            progress=lambda done, total: report("verifying", done, total),
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):

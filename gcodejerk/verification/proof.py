@@ -19,7 +19,7 @@ import numpy as np
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, read_program
-from gcodejerk.verification.bytes.alignment import Alignment
+from gcodejerk.verification.bytes.alignment import Alignment, Progress
 from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.bytes.guarded_form import check_guarded
 from gcodejerk.verification.bytes.hal import CONTROLLER, Beside, HalAlignment
@@ -155,6 +155,7 @@ def verify_files(
     reported: Reported | None = None,
     beside: BinaryIO | None = None,
     program: Program | None = None,
+    progress: Progress | None = None,
 ) -> Verification:
     """Compare open files; see `verify`.
 
@@ -183,6 +184,8 @@ def verify_files(
     program : Program, optional
         The original as `nc` reads it with the same dialect, start and machine, for who has just
         read it; taken if the file still has its digest, and read anew if not.
+    progress : callable, optional
+        Called with how many rapids were looked at, and how many there are, of streams in place.
 
     Returns
     -------
@@ -208,10 +211,10 @@ def verify_files(
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
     elif machine.controller == CONTROLLER:
-        replaced, kept = _judge_pair(original, processed, beside, program, machine, found)
+        replaced, kept = _judge_pair(original, processed, beside, program, machine, found, progress)
     else:
         files = (original, processed)
-        replaced, kept = _judge_program(*files, program, machine, found, reported or {})
+        replaced, kept = _judge_program(*files, program, machine, found, reported or {}, progress)
     original.seek(begin)
     confirmed = confirm(original, program.dialect, start, program.rapids, replaced, found)
     rapids = len(program.rapids)
@@ -225,10 +228,12 @@ def _judge_program(
     machine: Machine,
     found: Findings,
     reported: Reported,
+    progress: Progress | None,
 ) -> tuple[Sequence[int], int]:
     """Compare programs; which rapids were replaced, and how many lines were kept."""
     windows = Window(original), Window(processed)
     alignment = Alignment(*windows, program, machine, found, reported)
+    alignment.progress = progress
     reader = Reader(program.rapids, machine, found, program.language)
     stride = stride_of(machine)
     alike = Alike(reported if alignment.aligned else {})
@@ -263,6 +268,7 @@ def _judge_pair(
     program: Program,
     machine: Machine,
     found: Findings,
+    progress: Progress | None,
 ) -> tuple[Sequence[int], int]:
     """Compare a program and its file of samples; which rapids were replaced, and lines kept."""
     if beside is None:
@@ -278,6 +284,7 @@ def _judge_pair(
         return [], 0
     alignment = HalAlignment(Window(original), Window(processed), program, machine, found)
     alignment.beside = about
+    alignment.progress = progress
     reader = Reader(program.rapids, machine, found, program.language)
     samples = SampleReader(beside, about, program.rapids, machine, found)
     for streams in _batches(_checked(alignment, reader), HAL_BYTES):

@@ -8,7 +8,7 @@ the case, the walk ends with a violation, since everything behind would be guess
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -30,6 +30,8 @@ _TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400", b"M6")
 """How a stream may begin."""
 AT_ONCE = 4096
 """Rapids of which plain lists are made."""
+Progress = Callable[[int, int], None]
+"""Called with the number of rapids that were passed, and of all that may be replaced."""
 ALIGNED = ("linuxcnc",)
 """Controllers whose streams have blocks that end on servo periods."""
 
@@ -69,6 +71,7 @@ class Alignment:
             self.recognised = Recognised(processed, program.rapids, self.dialect, states)
             held_to = (reported or {}) if self.aligned else {}
             self.proven = Proven(processed, program.rapids, states, held_to)
+        self.progress: Progress | None = None
         self._key = b""
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
@@ -106,6 +109,8 @@ class Alignment:
         rapids = self.program.rapids
         certain = np.flatnonzero(rapids.reason == CERTAIN)
         for k in range(0, len(certain), AT_ONCE):
+            if self.progress is not None:
+                self.progress(k, len(certain))
             rows = certain[k : k + AT_ONCE]
             columns = (rows, rapids.begin[rows], rapids.end[rows], rapids.terminator[rows])
             yield from zip(*(column.tolist() for column in columns), strict=True)
