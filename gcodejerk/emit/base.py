@@ -90,6 +90,8 @@ class Controller(ABC):
     """What is added to the output's name for a file of samples that belongs to it; empty: none."""
     longest: int | None = None
     """Samples of the longest move that it can write."""
+    repeats: bool = False
+    """Where blocks, modes, ways and places of two streams are the same, their texts are."""
     between: bytes = b""
     """What stands between two moves of a file of its own."""
 

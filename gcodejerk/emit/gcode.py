@@ -53,6 +53,11 @@ class GcodeController(Controller):
 
     play = Play.HELD
 
+    @property
+    def repeats(self) -> bool:  # type: ignore[override]
+        """Unless somebody else's text says more, such as the line."""
+        return type(self).render is GcodeController.render
+
     def stride(self, interval: float) -> int:
         """About 2 ms."""
         return max(1, round(BLOCK_TIME / interval))
@@ -61,9 +66,10 @@ class GcodeController(Controller):
         """Steps in the program's own unit; increments are counted from the start."""
         doubles = writing_of(dialect).doubles
         mm, inch = (step_sizes(machine, unit, doubles) for unit in (False, True))
-        step = np.where(rapids.inch[:, np.newaxis], inch, mm)
-        origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
-        return NumberFormat(rapids.start, step, origin, finer=doubles)
+        step = np.broadcast_to(mm, rapids.start.shape)
+        if rapids.inch.any():
+            step = np.where(rapids.inch[:, np.newaxis], inch, mm)
+        return NumberFormat(rapids.start, step, origins(rapids), finer=doubles)
 
     def feeds(self, batch: Batch, rapids: Rapids) -> Feeds:
         """F of every block of a batch."""
@@ -138,6 +144,13 @@ class GcodeController(Controller):
             for row, points in zip(rows, made, strict=True):
                 out[row] = points
         return out
+
+
+def origins(rapids: Rapids) -> NDArray[np.float64]:
+    """Where points are counted from: 0, or where increments begin, shape (n, 9) [mm] or [deg]."""
+    if not rapids.incremental.any():
+        return np.broadcast_to(0.0, rapids.start.shape)
+    return np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
 
 
 def line_ends_of(

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
 from gcodejerk.emit.frame import Frame
-from gcodejerk.emit.gcode import line_ends_of
+from gcodejerk.emit.gcode import line_ends_of, origins
 from gcodejerk.emit.guard import guarded, in_structures
 from gcodejerk.emit.linuxcnc_settings import LinuxcncSettings
 from gcodejerk.emit.number_format import Column, format_lines
@@ -73,6 +73,11 @@ class LinuxcncController(LinuxcncSettings, Controller):
         Form("parameters", "documented", "MAX_JERK of 2.10, MAX_ACCELERATION of 2.9: the INI file"),
     )
 
+    @property
+    def repeats(self) -> bool:  # type: ignore[override]
+        """Unless somebody else's text says more, such as the line."""
+        return type(self).render is LinuxcncController.render
+
     def stride(self, interval: float) -> int:
         """About 2 ms, and two periods at least."""
         return max(2, round(BLOCK_TIME / interval))
@@ -83,8 +88,7 @@ class LinuxcncController(LinuxcncSettings, Controller):
         inch = MM_PER_INCH * 10.0**-INCH_DECIMALS
         step = np.where(rapids.inch[:, np.newaxis], inch, 10.0**-DECIMALS)
         step = np.broadcast_to(step, rapids.start.shape)
-        origin = np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
-        return NumberFormat(rapids.start, step, origin)
+        return NumberFormat(rapids.start, step, origins(rapids))
 
     def render(
         self,

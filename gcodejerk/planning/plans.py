@@ -7,7 +7,9 @@ thing here: a profile has a *share*, the displacement of every axis that it carr
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, Mode
 from gcodejerk.motion import Profiles, grouped, mode_poles
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.motion.residual import Complex
 from gcodejerk.reasons import CERTAIN
 
@@ -202,16 +205,28 @@ class Plans:
             *("reason", "displacement", "length", "conventional_time", "counts"),
             *("worst_in_band", "most_in_band"),
         )
+        taken = {name: getattr(self, name)[index] for name in columns}
         return replace(
             self,
-            **{name: getattr(self, name)[index] for name in columns},
+            **taken,
             move=move,
-            share=self.share[rows],
-            profiles=self.profiles.take(rows),
-            conventional=self.conventional.take(rows),
+            share=_same_or(self.share, rows, taken["displacement"], move),
+            profiles=RepeatedProfiles(self.profiles, rows),
+            conventional=RepeatedProfiles(self.conventional, rows),
             profile_counts=self.profile_counts[rows],
             lasting=None if self.lasting is None else self.lasting[index],
         )
+
+
+def _same_or(
+    share: Array, rows: NDArray[np.int64], displacement: Array, move: NDArray[np.int64]
+) -> Array:
+    """Some rows of the shares: a part of the displacements, where they are just that."""
+    if len(move) and move[-1] - move[0] + 1 == len(move):
+        part = displacement[move[0] : move[-1] + 1]
+        if all((share[rows, k] == part[:, k]).all() for k in range(part.shape[1])):
+            return part
+    return share[rows]
 
 
 def same_rows(*columns: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -233,20 +248,37 @@ def same_rows(*columns: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray
     >>> first.tolist(), like.tolist()
     ([0, 1, 3], [0, 1, 0, 2])
     """
-    count = len(columns[0])
-    flat = [np.ascontiguousarray(column).reshape(count, -1) for column in columns if count]
-    parts = [column.view(np.uint8).reshape(count, -1) for column in flat]
-    rows = np.concatenate(parts, axis=1) if parts else np.zeros((0, 1), dtype=np.uint8)
-    text, width = memoryview(rows.tobytes()), rows.shape[1]
-    sorts: dict[bytes, int] = {}
-    like = np.empty(count, dtype=np.int64)
-    first: list[int] = []
-    for k in range(count):
-        sort = sorts.setdefault(bytes(text[k * width : (k + 1) * width]), len(sorts))
-        like[k] = sort
-        if sort == len(first):
-            first.append(k)
-    return np.array(first, dtype=np.int64), like
+    return sorted_rows(columns, len(columns[0]))
+
+
+def sorted_rows(
+    columns: Iterable[NDArray[np.generic]], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The same of columns that are made one by one, each of `count` rows."""
+    like = np.zeros(count, dtype=np.int64)
+    sorts = min(count, 1)
+    for column in columns if count else ():
+        for values in _words(column):
+            if (values == values[0]).all():
+                continue
+            found, own = np.unique(values, return_inverse=True)
+            # Two counts below 2^31 each: their product is exact.
+            found, like = np.unique(like * len(found) + own.reshape(-1), return_inverse=True)
+            like, sorts = like.reshape(-1), len(found)
+    first = np.empty(sorts, dtype=np.int64)
+    first[like[::-1]] = np.arange(count)[::-1]
+    order = np.argsort(first)
+    rank = np.empty(sorts, dtype=np.int64)
+    rank[order] = np.arange(sorts)
+    return first[order], rank[like]
+
+
+def _words(column: NDArray[np.generic]) -> Iterator[NDArray[np.unsignedinteger[Any]]]:
+    """The bits of rows, as whole numbers of up to 64 of them, one column at a time."""
+    flat = column.reshape(len(column), -1)
+    kind = np.dtype(f"u{flat.dtype.itemsize}")
+    for k in range(flat.shape[1]):
+        yield np.ascontiguousarray(flat[:, k]).view(kind)
 
 
 def path_length(displacement: Array, machine: Machine) -> Array:

@@ -21,7 +21,7 @@ from gcodejerk.motion import Profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.arrival import arrival_response
-from gcodejerk.planning.plans import STANDSTILL, Modes, Plans
+from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, same_rows
 from gcodejerk.planning.task import Task
 from gcodejerk.reasons import REASONS, Reason
 
@@ -73,15 +73,20 @@ def left_alone(rapids: Rapids, plans: Plans) -> Left:
     Left
     """
     modes = plans.modes
-    residual = np.full((len(plans), len(modes.poles)), np.nan)
+    residual: Array = np.broadcast_to(np.nan, (len(plans), len(modes.poles)))
     time = np.zeros(len(plans))
-    moved = known_moves(rapids, plans)
+    others = np.flatnonzero(~plans.planned)
+    moved = _known(rapids, plans, others)
     certain = np.isfinite(moved).all(axis=1)
-    rows = np.flatnonzero(certain & ~plans.planned)
+    rows, moved = others[certain], moved[certain]
     if len(rows):
-        residual[rows], time[rows] = _today(plans, moved[rows], rapids.lone[rows])
-    still = np.isin(plans.reason, NOTHING)
-    return Left(residual, time, ~plans.planned & ~still & ~certain)
+        residual = residual.copy()
+        first, like = same_rows(moved, rapids.lone[rows])
+        left, lasts = _today(plans, moved[first], rapids.lone[rows[first]])
+        residual[rows], time[rows] = left[like], lasts[like]
+    unknown = np.zeros(len(plans), dtype=np.bool_)
+    unknown[others] = ~np.isin(plans.reason[others], NOTHING) & ~certain
+    return Left(residual, time, unknown)
 
 
 def known_moves(rapids: Rapids, plans: Plans) -> Array:
@@ -99,13 +104,18 @@ def known_moves(rapids: Rapids, plans: Plans) -> Array:
     ndarray, shape (n, 9)
         NaN in every column of a rapid of which not all is known, or that does not move. [mm], [deg]
     """
-    moved = rapids.target - rapids.start
-    named = (rapids.words[:, np.newaxis] >> np.arange(len(AXES)) & 1).astype(bool)
+    return _known(rapids, plans, np.arange(len(plans)))
+
+
+def _known(rapids: Rapids, plans: Plans, rows: NDArray[np.int64]) -> Array:
+    """The same of some of them."""
+    moved = rapids.target[rows] - rapids.start[rows]
+    named = (rapids.words[rows, np.newaxis] >> np.arange(len(AXES)) & 1).astype(bool)
     has = np.array([axis in plans.machine.axis_names for axis in AXES])
     moved = np.where(named, moved, 0.0)
     moved = np.where(np.abs(moved) > STANDSTILL, moved, 0.0 * moved)
     certain = np.isfinite(moved).all(axis=1) & ~(named & ~has).any(axis=1)
-    certain &= np.isin(plans.reason, KNOWN) & (moved != 0.0).any(axis=1)
+    certain &= np.isin(plans.reason[rows], KNOWN) & (moved != 0.0).any(axis=1)
     out: Array = np.where(certain[:, np.newaxis], moved, np.nan)
     return out
 

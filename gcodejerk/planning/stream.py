@@ -45,7 +45,11 @@ NO_LENGTH = 1e-5
 
 
 def make_streams(
-    plans: Plans, number_format: NumberFormat, stride: int, play: Play = Play.TABLE
+    plans: Plans,
+    number_format: NumberFormat,
+    stride: int,
+    play: Play = Play.TABLE,
+    like: NDArray[np.int64] | None = None,
 ) -> Iterator[list[Batch]]:
     """Streams of all planned moves, window by window.
 
@@ -59,6 +63,9 @@ def make_streams(
         Intervals from one written point to the next.
     play : Play
         What the control makes of the points.
+    like : ndarray of int, shape (n,), optional
+        The first move that has the very stream of each. The streams of the others are not made,
+        and what is found of it is noted for all of them.
 
     Yields
     ------
@@ -68,6 +75,8 @@ def make_streams(
         whose stream is not better than today's rapid are in none, and `plans.reason` says so.
     """
     planned = np.nonzero(plans.planned)[0]
+    if like is not None:
+        planned = planned[like[planned] == planned]
     samples = np.cumsum(plans.counts[planned])
     begin = 0
     while begin < len(planned):
@@ -77,7 +86,7 @@ def make_streams(
         # Of like duration: within a factor of two.
         octave = np.frexp(plans.counts[window].astype(float))[1]
         made = (
-            _make_batch(plans, moves, number_format, stride, play)
+            _make_batch(plans, moves, number_format, stride, play, like)
             for moves in (window[octave == k] for k in np.unique(octave))
         )
         if batches := [batch for batch in made if len(batch)]:
@@ -91,6 +100,7 @@ def _make_batch(
     number_format: NumberFormat,
     stride: int,
     play: Play = Play.TABLE,
+    like: NDArray[np.int64] | None = None,
 ) -> Batch:
     """One batch, without moves that would be worse or played otherwise; these are ruled out."""
     sampler = Sampler(plans, moves, number_format.take(moves))
@@ -100,8 +110,10 @@ def _make_batch(
         batch = _Maker(sampler, stride, play).batch()
         batch = without_pauses(batch) if play is Play.INCREMENTS else batch
     worse = batch.worst_in_band > plans.most_in_band[moves]
-    plans.reason[moves[worse]] = REASONS.index(Reason.NOT_BETTER)
-    plans.reason[moves[batch.unplayable]] = REASONS.index(Reason.NOT_PLAYED)
+    for which, why in ((worse, Reason.NOT_BETTER), (batch.unplayable, Reason.NOT_PLAYED)):
+        if which.any():
+            same = moves[which] if like is None else np.isin(like, moves[which])
+            plans.reason[same] = REASONS.index(why)
     out = worse | batch.unplayable
     return batch.take(np.flatnonzero(~out)) if out.any() else batch
 
@@ -223,3 +235,8 @@ class Residuals:
         """Note one batch."""
         self.residual[batch.moves] = batch.residual
         self.conventional[batch.moves] = batch.conventional_residual
+
+    def repeat(self, like: NDArray[np.int64]) -> None:
+        """Note of all moves what was found of those that have the very streams."""
+        self.residual = self.residual[like]
+        self.conventional = self.conventional[like]

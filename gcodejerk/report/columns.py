@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.machine import Machine
-from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.profiles.profile import Array, Profiles
+from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.planning.plans import Plans
 from gcodejerk.report.records import Record, Records, place_record, process_head
 from gcodejerk.rewrite.result import Result
@@ -121,7 +122,8 @@ def _keys(plans: Plans, records: Records) -> list[bytes]:
     numbers = memoryview(np.ascontiguousarray(matrix).tobytes())
     width = 8 * matrix.shape[1]
     parts = [np.column_stack([plans.share, plans.profile_times])]
-    profiles = plans.profiles, plans.conventional
+    # Equal indices are equal profiles: all of these are rows of the same plans.
+    profiles = np.column_stack([_index(plans.profiles), _index(plans.conventional)])
     bounds = np.searchsorted(plans.move, np.arange(len(plans) + 1)).tolist()
     out = []
     for row in range(len(plans)):
@@ -129,11 +131,15 @@ def _keys(plans: Plans, records: Records) -> list[bytes]:
         begin, end = bounds[row], bounds[row + 1]
         if end > begin:
             key.append(parts[0][begin:end].tobytes())
-            for each in profiles:
-                segments = slice(int(each.first[begin]), int(each.first[end]))
-                key += [each.duration[segments].tobytes(), each.jerk[segments].tobytes()]
+            key.append(profiles[begin:end].tobytes())
         out.append(b"".join(key))
     return out
+
+
+def _index(profiles: Profiles) -> NDArray[np.int64]:
+    """Which of the different profiles each is."""
+    assert isinstance(profiles, RepeatedProfiles)
+    return profiles.like
 
 
 def _text(record: Record) -> bytes:

@@ -9,9 +9,11 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
@@ -29,6 +31,8 @@ from gcodejerk.rewrite.control_settings import ControlSettings
 from gcodejerk.rewrite.result import Result
 
 Record = dict[str, Any]
+AT_ONCE = 1 << 16
+"""Rapids whose amplitudes are looked at together."""
 DIGITS = 10
 """Significant digits of a number in a report."""
 
@@ -50,8 +54,6 @@ class Records:
         self.limit = np.full(len(plans), np.nan) if limit is None else limit
         modes = plans.modes
         self.residual, self.conventional = modes.grouped(residual), modes.grouped(conventional)
-        self.acceleration = modes.accelerations(residual)
-        self.conventional_acceleration = modes.accelerations(conventional)
         interval = plans.machine.interval
         usual = whole_intervals(plans.conventional_time, interval)
         extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
@@ -61,11 +63,24 @@ class Records:
             self.extension = np.where(plans.planned & (more > 1e-9), more, 0.0)
         self.rest = rest
         self.oscillators = (residual, conventional)
-        self.peaks = (
-            self.profiles.peak_velocity,
-            self.profiles.peak_acceleration,
-            self.profiles.peak_jerk,
-        )
+
+    # The summary of a large program needs none of these.
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """Acceleration amplitudes of the entries of modes, shape (n, g) [mm/s^2]."""
+        return self.plans.modes.accelerations(self.oscillators[0])
+
+    @cached_property
+    def conventional_acceleration(self) -> Array:
+        """The same of the control's own rapids."""
+        return self.plans.modes.accelerations(self.oscillators[1])
+
+    @cached_property
+    def peaks(self) -> tuple[Array, Array, Array]:
+        """Peaks of velocity, acceleration and jerk of the unit profiles."""
+        own = self.profiles
+        return own.peak_velocity, own.peak_acceleration, own.peak_jerk
 
     def summary(self) -> Record:
         """The counts and totals of all moves."""
@@ -80,34 +95,34 @@ class Records:
             "rapid_time": number(_sum(plans)),
             "conventional_time": number(float(plans.conventional_time[planned].sum())),
             "extended": int(np.count_nonzero(self.extension)),
-            "worst_residual": _largest(self.residual[planned]),
-            "worst_conventional_residual": _largest(self.conventional[planned]),
+            "worst_residual": _largest(self.residual, planned),
+            "worst_conventional_residual": _largest(self.conventional, planned),
             **self._everything(),
         }
 
     def _everything(self) -> Record:
         """What the whole program leaves and lasts, rapids left alone included; today beside it."""
         plans, planned, rest = self.plans, self.plans.planned, self.rest
-        unknown = 0 if rest is None else int(np.count_nonzero(rest.unknown))
-        left = np.full_like(self.oscillators[0], np.nan) if rest is None else rest.residual
         same = 0.0 if rest is None else float(rest.time.sum())
-        now, then = (
-            np.where(planned[:, np.newaxis], amplitude, left) for amplitude in self.oscillators
-        )
         modes, tolerance = plans.modes, plans.machine.design.tolerance
-        motion = _sum(plans)
-        today = float(plans.conventional_time[planned].sum())
+        motion, today = _sum(plans), float(plans.conventional_time[planned].sum())
         out: Record = {
-            "worst_residual_share": _share(self.residual[planned], self.conventional[planned]),
-            "worst_residual_all": _largest(modes.grouped(now)),
-            "worst_conventional_residual_all": _largest(modes.grouped(then)),
-            "left_unknown": unknown,
+            "worst_residual_share": _share(self.residual, self.conventional, planned),
+            **dict.fromkeys(("worst_residual_all", "worst_conventional_residual_all")),
+            "left_unknown": 0 if rest is None else int(np.count_nonzero(rest.unknown)),
             "rapid_time_all": number(motion + same),
             "conventional_time_all": number(today + same),
         }
-        for name, amplitude in (("settling_time", now), ("conventional_settling_time", then)):
-            waiting = settling_times(amplitude, modes, tolerance)
-            out[name] = number(float(np.nansum(waiting)))
+        for amplitude, name in zip(self.oscillators, ("", "conventional_"), strict=True):
+            waiting, worst = np.zeros(len(plans)), [np.nan]
+            for begin in range(0, len(plans), AT_ONCE):
+                part = slice(begin, begin + AT_ONCE)
+                left = np.nan if rest is None else rest.residual[part]
+                each = np.where(planned[part, np.newaxis], amplitude[part], left)
+                worst.append(float(np.fmax.reduce(modes.grouped(each), axis=None, initial=np.nan)))
+                waiting[part] = settling_times(each, modes, tolerance)
+            out[f"worst_{name}residual_all"] = _largest(np.array([worst]), np.ones(1, dtype=bool))
+            out[f"{name}settling_time"] = number(float(np.nansum(waiting)))
         return out | {"tolerance": number(tolerance)}
 
     def motion(self, row: int) -> Record:
@@ -421,12 +436,15 @@ def _sum(plans: Plans) -> float:
     return float(plans.counts.sum()) * plans.machine.interval
 
 
-def _largest(residual: Array) -> float | None:
-    """The largest residual of all rapids and modes, as far as they are known [mm]."""
-    return None if np.isnan(residual).all() else number(float(np.nanmax(residual)))
+def _largest(residual: Array, where: NDArray[np.bool_]) -> float | None:
+    """The largest residual of some rapids and all modes, as far as they are known [mm]."""
+    found = float(np.fmax.reduce(residual, axis=None, where=where[:, np.newaxis], initial=np.nan))
+    return None if np.isnan(found) else number(found)
 
 
-def _share(planned: Array, today: Array) -> float | None:
-    """The worst residual as a share of the worst today [-]."""
-    largest = float(today.max(initial=0.0))
-    return number(float(planned.max(initial=0.0)) / largest) if largest else None
+def _share(planned: Array, today: Array, where: NDArray[np.bool_]) -> float | None:
+    """The worst residual of some rapids as a share of the worst today [-]."""
+    now, then = (
+        float(np.max(each, where=where[:, np.newaxis], initial=0.0)) for each in (planned, today)
+    )
+    return number(now / then) if then else None

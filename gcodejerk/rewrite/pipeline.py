@@ -10,7 +10,7 @@ Rule 2: nothing is given back that `verify` has not accepted (unless the user sw
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import BinaryIO
 
@@ -23,17 +23,13 @@ from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program, read_program
-from gcodejerk.planning.batch import Batch
-from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
+from gcodejerk.planning.independent_axes import dogleg_notes
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.pvt import Rows, make_rows
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.settling import left_alone
-from gcodejerk.planning.stream import Residuals, make_streams
-from gcodejerk.planning.told import RowFormat, in_steps, told_in
+from gcodejerk.planning.told import in_steps, told_in
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.control_settings import PARAMETERS
 from gcodejerk.rewrite.expanded import (
@@ -51,6 +47,7 @@ from gcodejerk.rewrite.rewriter import Rewriter, changed_error, digest_of
 from gcodejerk.rewrite.set_control import set_control
 from gcodejerk.rewrite.stamp import ProcessedError, stamp_text
 from gcodejerk.rewrite.what_if import entry_notes
+from gcodejerk.rewrite.writing import write_streams
 from gcodejerk.verification import Verification, require, verify_files
 
 Progress = Callable[[str, int, int], None]
@@ -239,12 +236,12 @@ def _process(
     )  # fmt: skip
     design = replace(machine.design, profile=settings.profile or machine.design.profile)
     designed = replace(machine, design=design)
-    collected, deviation = _write(writer, plans, designed, report, form, peaks)
+    collected, deviation = write_streams(writer, plans, designed, report, form, peaks)
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
         verification = _verified(
-            source, target, machine, settings, program, plans, emitter, lines, beside
+            source, target, machine, settings, program, plans, emitter, lines, beside, report
         )
         report("verifying", 1, 1)
     what_if = entry_notes(source, program, machine.program_start())
@@ -299,7 +296,10 @@ def _set(
     result = set_control(source, target, program, machine, emitter, sheets, chosen)
     if target is None or not settings.verify:
         return result
-    found = _verified(source, target, machine, settings, program, result.plans, emitter, None, None)
+    plans = result.plans
+    found = _verified(
+        source, target, machine, settings, program, plans, emitter, None, None, report
+    )
     return replace(result, verification=found)
 
 
@@ -374,43 +374,6 @@ def _chosen(machine: Machine, settings: Settings, name: str, form: str) -> list[
     return chosen + ([f"dialect {settings.dialect}"] if settings.dialect is not None else [])
 
 
-def _write(
-    writer: Rewriter,
-    plans: Plans,
-    machine: Machine,
-    report: Progress,
-    form: RowFormat | None,
-    peaks: Array,
-) -> tuple[Residuals, Array]:
-    """Write all streams; what they leave, and how far each path is from the control's own [mm]."""
-    emitter, dialect = writer.emitter, writer.options.dialect
-    collected = Residuals(plans)
-    deviation = np.zeros(len(plans))
-    writer.write_header(machine)
-    done = 0
-    windows: Iterator[list[Batch]] | Iterator[list[Rows]]
-    if form is not None:
-        windows = make_rows(plans, writer.program.rapids, form, peaks)
-    else:
-        windows = make_streams(
-            plans,
-            emitter.number_format(writer.program.rapids, machine, dialect),
-            emitter.stride(machine.interval),
-            emitter.play,
-        )
-    for window in windows:
-        for batch in window:
-            collected.add(batch)
-            deviation[batch.moves] = (
-                batch.deviation() if isinstance(batch, Rows) else path_deviation(batch)
-            )
-        writer.write(window)
-        done += sum(map(len, window))
-        report("writing", done, int(np.count_nonzero(plans.planned)))
-    writer.finish()
-    return collected, deviation
-
-
 def _verified(
     source: BinaryIO,
     target: BinaryIO,
@@ -421,6 +384,7 @@ def _verified(
     emitter: Controller,
     lines: LineMap | None,
     beside: BinaryIO | None,
+    report: Progress,
 ) -> Verification:
     """Read an output back; whatever is wrong with it is raised, in lines of the original."""
     source.seek(0)
@@ -437,6 +401,7 @@ def _verified(
             reported=ReportedProfiles(program, plans) if emitter.play is Play.ALIGNED else None,
             beside=beside if emitter.beside else None,
             program=program,
+            progress=lambda done, total: report("verifying", done, total),
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.nc import Program
 from gcodejerk.planning.batch import SIDES
 from gcodejerk.planning.plans import Plans
@@ -18,6 +19,9 @@ from gcodejerk.planning.settling import Left
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.control_settings import ControlSettings
 from gcodejerk.verification import Verification
+
+REMEMBERED = 2000
+"""Reported profiles that are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,15 +97,22 @@ def rapid_results(
 class ReportedProfiles(Mapping[int, Array]):
     """The profiles as reports say them: durations and jerks along the path, by line.
 
-    Each is made when it is asked for: of a hundred thousand moves no copy is kept.
+    Each is made when it is asked for: of a hundred thousand moves no copies are kept but a few.
     """
 
     def __init__(self, program: Program, plans: Plans) -> None:
         planned = np.flatnonzero(plans.planned)
         begin, end = (np.searchsorted(plans.move, planned, side=side) for side in SIDES)
         single = end - begin == 1
-        self.plans, self.moves, self.rows = plans, planned[single], begin[single]
+        self.moves = planned[single]
         self.lines = program.rapids.line[self.moves]
+        # Moves of one length along one profile have one array.
+        own = plans.profiles
+        like = own.like if isinstance(own, RepeatedProfiles) else np.arange(len(own))
+        self.profiles = own.distinct if isinstance(own, RepeatedProfiles) else own
+        self.length = plans.length[self.moves]
+        self.row = like[begin[single]]
+        self.made: dict[tuple[int, float], Array] = {}
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -113,10 +124,17 @@ class ReportedProfiles(Mapping[int, Array]):
         at = int(np.searchsorted(self.lines, line, side="right")) - 1
         if at < 0 or self.lines[at] != line:
             raise KeyError(line)
-        profiles, row = self.plans.profiles, int(self.rows[at])
-        segments = slice(int(profiles.first[row]), int(profiles.first[row + 1]))
-        jerk = profiles.jerk[segments] * self.plans.length[self.moves[at]]
-        return np.stack([profiles.duration[segments], jerk], axis=1)
+        key = int(self.row[at]), float(self.length[at])
+        made = self.made.get(key)
+        if made is None:
+            profiles, (row, length) = self.profiles, key
+            segments = slice(int(profiles.first[row]), int(profiles.first[row + 1]))
+            jerk = profiles.jerk[segments] * length
+            made = np.stack([profiles.duration[segments], jerk], axis=1)
+            if len(self.made) >= REMEMBERED:
+                self.made.clear()
+            self.made[key] = made
+        return made
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,9 @@ from array import array
 from collections.abc import Sequence
 from typing import BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gcodejerk.advice import stamp_note
 from gcodejerk.emit import Controller, Options
 from gcodejerk.errors import EmitError
@@ -24,6 +27,8 @@ from gcodejerk.rewrite.expanded import TERMINATOR_LENGTH
 from gcodejerk.rewrite.stamp import SUM_DIGITS, SUM_MARK, SUM_UNKNOWN, SUM_WITHIN
 
 COPY_SIZE = 1 << 20
+AT_ONCE = 8192
+"""Rapids of which plain lists are made."""
 
 
 def digest_of(source: BinaryIO) -> bytes:
@@ -94,7 +99,25 @@ class Rewriter:
         self.at = 0
         self.between = b""
         self.edits = array("q")
+        self.size = 0
+        """Of the output so far."""
+        self.pieces: list[bytes] = []
+        self.waiting = 0
+        """Bytes that are still to be written."""
+        self.like: NDArray[np.int64] | None = None
+        self.copies: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.kept: dict[int, bytes] = {}
+        """Texts of moves that stand in other places, too."""
+        self.uses: dict[int, int] = {}
+        """In how many they still stand."""
         source.seek(0)
+
+    def repeat(self, like: NDArray[np.int64]) -> None:
+        """Write streams that are the same again, where they come (`same_streams`)."""
+        self.like = like
+        self.copies = np.flatnonzero(like != np.arange(len(like)))
+        firsts, counts = np.unique(like[self.copies], return_counts=True)
+        self.uses = dict(zip(firsts.tolist(), counts.tolist(), strict=True))
 
     def write_header(self, machine: Machine) -> None:
         """Write the first lines of a file of its own."""
@@ -106,6 +129,7 @@ class Rewriter:
         """Write the streams of a window; windows come in the order of the file."""
         if self.target is None:
             return
+        self.source.seek(self.at)
         if self.emitter.in_place and not self.edits:
             self._copy(self.program.insert_at)
             self._put_stamp()
@@ -122,13 +146,43 @@ class Rewriter:
             if self.beside is not None and isinstance(batch, Batch):
                 samples = self.emitter.render_beside(batch, rapids)
                 aside.update(zip(batch.moves.tolist(), samples, strict=True))
+        if texts:
+            self._write_texts(texts, aside, max(texts))
+
+    def _write_texts(self, texts: dict[int, bytes], aside: dict[int, bytes], last: int) -> None:
+        """Write texts, and those that were written before and come in front of the last."""
+        moves = np.array(sorted(texts), dtype=np.int64)
+        if self.like is not None:
+            self.kept.update((move, text) for move, text in texts.items() if move in self.uses)
+            count = int(np.searchsorted(self.copies, last))
+            between, self.copies = self.copies[:count], self.copies[count:]
+            moves = np.sort(np.concatenate([moves, between]))
+        rapids = self.program.rapids
         self.source.seek(self.at)
-        for move in sorted(texts):
-            self._copy(int(rapids.begin[move]))
-            self._read(int(rapids.end[move] + TERMINATOR_LENGTH[rapids.terminator[move]]))
-            self._put(self.between + texts[move], move)
-            self.between = self.emitter.between
-            self._put_beside(aside.get(move, b""))
+        for begin in range(0, len(moves), AT_ONCE):
+            rows = moves[begin : begin + AT_ONCE]
+            firsts = rows if self.like is None else self.like[rows]
+            ends = rapids.end[rows] + TERMINATOR_LENGTH[rapids.terminator[rows]]
+            columns = (rows, firsts, rapids.begin[rows], ends)
+            for move, first, at, end in zip(*(c.tolist() for c in columns), strict=True):
+                text = texts.get(move) or self._text_again(first)
+                if text is None:
+                    continue
+                self._copy(at)
+                self._read(end)
+                self._put(self.between + text, move)
+                self.between = self.emitter.between
+                if aside:
+                    self._put_beside(aside[move])
+
+    def _text_again(self, first: int) -> bytes | None:
+        """The text of a move once more; it is forgotten when it comes no more."""
+        text = self.kept.get(first)
+        if text is not None:
+            self.uses[first] -= 1
+            if not self.uses[first]:
+                del self.kept[first]
+        return text
 
     def _put_beside(self, text: bytes) -> None:
         """Write to the file beside the output."""
@@ -144,23 +198,30 @@ class Rewriter:
 
     def _put(self, text: bytes, move: int) -> None:
         """Write what is not the source's, and note where."""
-        assert self.target is not None
-        begin = self.target.tell()
-        self.target.write(text)
-        self.written.update(text)
         if self.emitter.in_place:
-            self.edits.extend((begin, begin + len(text), move))
+            self.edits.extend((self.size, self.size + len(text), move))
+        self._sign(text)
 
     def _sign(self, text: bytes) -> None:
-        """Write the head of a file of its own; in place there is none."""
+        """Write, many pieces at a time, and sum up."""
+        self.pieces.append(text)
+        self.size += len(text)
+        self.waiting += len(text)
+        if self.waiting > COPY_SIZE:
+            self._flush()
+
+    def _flush(self) -> None:
+        """Write what waits."""
         assert self.target is not None
+        text = b"".join(self.pieces)
+        self.pieces, self.waiting = [], 0
         self.target.write(text)
         self.written.update(text)
 
     def _put_stamp(self) -> None:
         """Write the stamp, its sum to be filled in at the end."""
         assert self.target is not None
-        at = self.target.tell()
+        at = self.size
         if at < SUM_WITHIN:
             found = self.stamp.find(SUM_UNKNOWN)
             self.sum_at = None if found < 0 else at + found + len(SUM_MARK)
@@ -172,7 +233,11 @@ class Rewriter:
         """Copy what follows the last stream, and see that the source is still what was planned."""
         if self.target is None:
             return
+        if len(self.copies):
+            self._write_texts({}, {}, len(self.program.rapids))
+        self.source.seek(self.at)
         self._copy(self.program.size)
+        self._flush()
         self.target.write(self.emitter.footer(self.written.hexdigest()))
         if self.source.read(1) or self.digest.digest() != self.program.digest:
             raise changed_error(self.program.name)
@@ -210,5 +275,4 @@ class Rewriter:
         while self.at < end:
             data = self._read(min(end, self.at + COPY_SIZE))
             if self.target is not None and self.emitter.in_place:
-                self.target.write(data)
-                self.written.update(data)
+                self._sign(data)

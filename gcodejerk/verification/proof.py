@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
+
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, read_program
-from gcodejerk.verification.bytes.alignment import Alignment
+from gcodejerk.verification.bytes.alignment import Alignment, Progress
 from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.bytes.guarded_form import check_guarded
 from gcodejerk.verification.bytes.hal import CONTROLLER, Beside, HalAlignment
@@ -153,6 +155,7 @@ def verify_files(
     reported: Reported | None = None,
     beside: BinaryIO | None = None,
     program: Program | None = None,
+    progress: Progress | None = None,
 ) -> Verification:
     """Compare open files; see `verify`.
 
@@ -181,6 +184,8 @@ def verify_files(
     program : Program, optional
         The original as `nc` reads it with the same dialect, start and machine, for who has just
         read it; taken if the file still has its digest, and read anew if not.
+    progress : callable, optional
+        Called with how many rapids were looked at, and how many there are, of streams in place.
 
     Returns
     -------
@@ -202,13 +207,14 @@ def verify_files(
         windows = Window(original), Window(processed)
         kept, places = check_settings(*windows, program, machine, control, found)
         return Verification(len(program.rapids), 0, kept, found.sorted(), names, places=places)
+    replaced: Sequence[int]
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
     elif machine.controller == CONTROLLER:
-        replaced, kept = _judge_pair(original, processed, beside, program, machine, found)
+        replaced, kept = _judge_pair(original, processed, beside, program, machine, found, progress)
     else:
         files = (original, processed)
-        replaced, kept = _judge_program(*files, program, machine, found, reported or {})
+        replaced, kept = _judge_program(*files, program, machine, found, reported or {}, progress)
     original.seek(begin)
     confirmed = confirm(original, program.dialect, start, program.rapids, replaced, found)
     rapids = len(program.rapids)
@@ -222,9 +228,12 @@ def _judge_program(
     machine: Machine,
     found: Findings,
     reported: Reported,
-) -> tuple[list[int], int]:
+    progress: Progress | None,
+) -> tuple[Sequence[int], int]:
     """Compare programs; which rapids were replaced, and how many lines were kept."""
-    alignment = Alignment(Window(original), Window(processed), program, machine, found)
+    windows = Window(original), Window(processed)
+    alignment = Alignment(*windows, program, machine, found, reported)
+    alignment.progress = progress
     reader = Reader(program.rapids, machine, found, program.language)
     stride = stride_of(machine)
     alike = Alike(reported if alignment.aligned else {})
@@ -244,9 +253,9 @@ def _judge_program(
         if alignment.aligned:
             paths = in_own_steps(paths)
         check_rapids(paths, program.rapids, machine, found)
-        alike.judge(paths, judge, found)
+        alignment.judged(alike.judge(paths, judge, found))
     if alignment.guarded and alignment.aligned:
-        lines = program.rapids.line[alignment.replaced].tolist()
+        lines = program.rapids.line[np.array(alignment.replaced)].tolist()
         check_guarded(original, program.dialect, lines, found)
     alignment.check_sum()
     return alignment.replaced, alignment.kept
@@ -259,7 +268,8 @@ def _judge_pair(
     program: Program,
     machine: Machine,
     found: Findings,
-) -> tuple[list[int], int]:
+    progress: Progress | None,
+) -> tuple[Sequence[int], int]:
     """Compare a program and its file of samples; which rapids were replaced, and lines kept."""
     if beside is None:
         found.add(
@@ -274,6 +284,7 @@ def _judge_pair(
         return [], 0
     alignment = HalAlignment(Window(original), Window(processed), program, machine, found)
     alignment.beside = about
+    alignment.progress = progress
     reader = Reader(program.rapids, machine, found, program.language)
     samples = SampleReader(beside, about, program.rapids, machine, found)
     for streams in _batches(_checked(alignment, reader), HAL_BYTES):
@@ -340,14 +351,14 @@ def _checked(alignment: Alignment, reader: Reader) -> Iterator[Stream]:
             yield stream
 
 
-def _batches(streams: Iterator[Stream], most: int = BATCH_BYTES) -> Iterator[list[Stream]]:
+def _batches(streams: Iterator[Stream], most: int = 0) -> Iterator[list[Stream]]:
     """Streams in lists, each of some MB of text."""
     batch: list[Stream] = []
     size = 0
     for stream in streams:
         batch.append(stream)
         size += len(stream.text) + 64 * len(stream.rest)
-        if size > most:
+        if size > (most or BATCH_BYTES):
             yield batch
             batch, size = [], 0
     if batch:

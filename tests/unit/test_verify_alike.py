@@ -1,14 +1,19 @@
 """Thousands of streams that are alike: what is judged once must not hide the one that is not."""
 
+import io
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from gcodejerk import Machine, find_machine, process, verify
+from gcodejerk.nc import Rapids, read_program
 from gcodejerk.verification import proof
 from gcodejerk.verification.bytes.alignment import Alignment
+from gcodejerk.verification.bytes.proven import Proven
+from gcodejerk.verification.bytes.source import Window
+from gcodejerk.verification.bytes.states import States
 from gcodejerk.verification.physics.alike import Alike
 
 VMC = Machine.load(find_machine("vmc"))
@@ -94,7 +99,11 @@ def _insert(out, b, line):
 
 @pytest.mark.parametrize("incremental", [False, True])
 @pytest.mark.parametrize("controller", ["linuxcnc", "haas"])
-def test_one_damaged_stream_among_hundreds_alike_is_found(controller, incremental, one_by_one):
+def test_one_damaged_stream_among_hundreds_alike_is_found(
+    controller, incremental, one_by_one, monkeypatch
+):
+    # Most batches come behind those from which something was learned.
+    monkeypatch.setattr(proof, "BATCH_BYTES", 1 << 16)
     program = drilling(incremental)
     machine, output = processed(controller, program)
     begins = [m.start() for m in re.finditer(rb"\(gcodejerk: ", output)]
@@ -152,3 +161,75 @@ def test_whatever_enters_the_judgement_is_in_the_key(column):
     values[at] = ~values[at] if column == "lone" else values[at] + 2e-9 if of_rows else 7.0
     after = Alike({}).keys(replace(paths, **{column: values}))
     assert [k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b] == [7]
+
+
+def keys_of(rapids, reported=None, follows=False, block=b"G0 Z5\n"):
+    proven = Proven(Window(io.BytesIO()), rapids, States(rapids), reported or {})
+    return [proven.key(i, block, follows) for i in range(len(rapids))]
+
+
+@pytest.fixture(scope="module")
+def rapids():
+    found = read_program(io.BytesIO(drilling()), name="x.nc", dialect="linuxcnc").rapids
+    return replace(found, **{f.name: getattr(found, f.name).copy() for f in fields(found)})
+
+
+COLUMNS = sorted({f.name for f in fields(Rapids)} - {"line", "begin", "end"})
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_what_was_proven_of_another_rapid_proves_nothing_of_this_one(rapids, column):
+    values = getattr(rapids, column).copy()
+    named = int(rapids.words[20]).bit_length() - 1
+    at = (20, named) if values.ndim == 2 else 20
+    values[at] = ~values[at] if values.dtype == bool else 77
+    before, after = keys_of(rapids), keys_of(replace(rapids, **{column: values}))
+    assert [k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a != b] == [20]
+
+
+def test_where_an_axis_stands_that_a_block_does_not_move_proves_as_much(rapids):
+    keys = keys_of(rapids)
+    # Holes at many places; the way out of each is the same.
+    assert rapids.start[21, 0] != rapids.start[23, 0]
+    assert keys[21] == keys[23] or keys[20] == keys[22]
+    assert keys_of(rapids, follows=True)[20] != keys[20]
+    assert keys_of(rapids, block=b"G0 Z5.\n")[20] != keys[20]
+    profile = np.array([[0.01, 5.0], [0.02, -5.0]])
+    told = keys_of(rapids, {int(rapids.line[20]): profile})
+    other = keys_of(rapids, {int(rapids.line[20]): profile + 1e-12})
+    assert len({told[20], other[20], keys[20]}) == 3
+
+
+def test_nothing_is_proven_before_it_was_judged_or_once_anything_was_wrong(rapids):
+    window = Window(io.BytesIO(b"G1 Z1\nG1 Z1\n"))
+    proven = Proven(window, rapids, States(rapids), {})
+    proven.read(b"key", b"G1 Z1\n")
+    assert not proven.passes(b"key")
+    proven.judged(False)
+    assert not proven.passes(b"key")
+    proven.read(b"key", b"G1 Z1\n")
+    proven.judged(True)
+    assert not proven.passes(b"another")
+    assert proven.passes(b"key")
+    assert window.line == 2
+    proven.known[b"key"] = b"G1 Z2\n"
+    assert not proven.passes(b"key")
+    assert window.peek(6) == b"G1 Z1\n"
+
+
+def test_what_is_the_same_to_the_byte_is_read_once(monkeypatch):
+    program = drilling()
+    machine, output = processed("linuxcnc", program)
+    judged = []
+    monkeypatch.setattr(Proven, "read", lambda self, key, text: judged.append(key))
+    assert verify(program, output, machine).ok
+    every = len(judged)
+    monkeypatch.undo()
+    read = Proven.read
+    judged.clear()
+    monkeypatch.setattr(
+        Proven, "read", lambda self, key, text: (judged.append(key), read(self, key, text))[1]
+    )
+    monkeypatch.setattr(proof, "BATCH_BYTES", 1 << 14)
+    assert verify(program, output, machine).ok
+    assert len(judged) < 0.6 * every

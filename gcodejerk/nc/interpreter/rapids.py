@@ -87,6 +87,8 @@ class Rapids:
             getattr(self, column.name).flags.writeable = False
 
 
+DIFFER = frozenset(("line", "begin", "end", "start", "target", "reason"))
+"""Columns of which no two rows need be the same."""
 _TYPES: dict[str, tuple[type, int]] = {
     **{name: (np.int64, 0) for name in ("line", "begin", "end")},
     **{name: (np.uint8, 0) for name in ("terminator", "reason", "feed_mode", "path")},
@@ -106,6 +108,14 @@ _TYPES: dict[str, tuple[type, int]] = {
 def _column(rows: list[Row], name: str, dtype: type) -> NDArray[Any]:
     """Collect one column of rows."""
     return np.array([getattr(row, name) for row in rows], dtype=dtype)
+
+
+def _once(column: NDArray[Any]) -> NDArray[Any]:
+    """A column whose rows are the same to the bit: the row, and no memory for the others."""
+    if len(column) < 2:
+        return column
+    bits = column.view(f"u{column.itemsize}")
+    return np.broadcast_to(column[0].copy(), column.shape) if (bits == bits[0]).all() else column
 
 
 class RapidLog:
@@ -221,5 +231,7 @@ class RapidLog:
         if self.dark:
             burns = columns["beam"] | (self.dark == "always")
             reason[(reason == CERTAIN) & burns] = _INDEX[Reason.BEAM]
+        for name in columns.keys() - DIFFER:
+            columns[name] = _once(columns[name])
         assert set(columns) == {f.name for f in fields(Rapids)}
         return Rapids(**columns)

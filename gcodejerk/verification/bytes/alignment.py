@@ -7,7 +7,8 @@ the case, the walk ends with a violation, since everything behind would be guess
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from array import array
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -18,13 +19,19 @@ from gcodejerk.verification.bytes.aligned_form import AlignedReader
 from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
 from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.bytes.guarded_form import GuardedReader
+from gcodejerk.verification.bytes.proven import Proven, Reported
 from gcodejerk.verification.bytes.recognised import Recognised
 from gcodejerk.verification.bytes.source import Window, skip_common
+from gcodejerk.verification.bytes.states import States
 from gcodejerk.verification.findings import Findings, Kind
 
 _STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
 _TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400", b"M6")
 """How a stream may begin."""
+AT_ONCE = 4096
+"""Rapids of which plain lists are made."""
+Progress = Callable[[int, int], None]
+"""Called with the number of rapids that were passed, and of all that may be replaced."""
 ALIGNED = ("linuxcnc",)
 """Controllers whose streams have blocks that end on servo periods."""
 
@@ -33,7 +40,7 @@ class Alignment:
     """One walk through an original and what was made of it."""
 
     remembers = True
-    """Forms of replacements are read once."""
+    """Forms of replacements are read once, and replacements that are the same to the byte."""
 
     def __init__(
         self,
@@ -42,13 +49,14 @@ class Alignment:
         program: Program,
         machine: Machine,
         found: Findings,
+        reported: Reported | None = None,
     ) -> None:
         self.original, self.processed = original, processed
         self.program, self.found = program, found
         self.at = 0
         """Place in the original, in bytes."""
         self.kept = 0
-        self.replaced: list[int] = []
+        self.replaced = array("q")
         """Indices of the rapids that have a stream."""
         self.block = b""
         """Text of the block whose stream was found last."""
@@ -57,8 +65,14 @@ class Alignment:
         self.aligned = machine.controller in ALIGNED
         self.guarded = machine.controller_options.override_guard
         self.recognised: Recognised | None = None
+        self.proven: Proven | None = None
         if self.remembers and not (self.aligned and self.guarded):
-            self.recognised = Recognised(processed, program.rapids, self.dialect)
+            states = States(program.rapids)
+            self.recognised = Recognised(processed, program.rapids, self.dialect, states)
+            held_to = (reported or {}) if self.aligned else {}
+            self.proven = Proven(processed, program.rapids, states, held_to)
+        self.progress: Progress | None = None
+        self._key = b""
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 
@@ -69,17 +83,15 @@ class Alignment:
 
     def streams(self) -> Iterator[Stream]:
         """Find the streams, in the order of the file."""
-        rapids = self.program.rapids
-        for i in np.flatnonzero(rapids.reason == CERTAIN).tolist():
-            begin, end = int(rapids.begin[i]), int(rapids.end[i])
+        for i, begin, end, terminator in self._certain():
             if self.found.full or not self._same(begin - self.at):
                 return
-            line_end = LINE_ENDS[int(rapids.terminator[i])]
+            line_end = LINE_ENDS[terminator]
             block = self.original.peek(end - begin + len(line_end))
             if self.processed.peek(len(block)) == block and not self._goes_on(block):
                 self.processed.skip(len(block))
                 self.kept += 1
-            else:
+            elif not self._proven(i, block):
                 text = block[: end - begin]
                 stream = self._read(i, block, text)
                 if stream is None:
@@ -92,24 +104,55 @@ class Alignment:
         if self._same(None):
             self._end()
 
+    def _certain(self) -> Iterator[tuple[int, int, int, int]]:
+        """Index, begin, end and terminator of each rapid that may be replaced."""
+        rapids = self.program.rapids
+        certain = np.flatnonzero(rapids.reason == CERTAIN)
+        for k in range(0, len(certain), AT_ONCE):
+            if self.progress is not None:
+                self.progress(k, len(certain))
+            rows = certain[k : k + AT_ONCE]
+            columns = (rows, rapids.begin[rows], rapids.end[rows], rapids.terminator[rows])
+            yield from zip(*(column.tolist() for column in columns), strict=True)
+
+    def _proven(self, i: int, block: bytes) -> bool:
+        """Pass a replacement that was proven before; whether one stands here."""
+        if self.proven is None or not block.endswith(b"\n"):
+            return False
+        self._key = self.proven.key(i, block, self._follows(i))
+        if not self.proven.passes(self._key):
+            return False
+        self.replaced.append(i)
+        return True
+
+    def judged(self, without_fault: bool) -> None:
+        """All streams so far have been judged."""
+        if self.proven is not None:
+            self.proven.judged(without_fault and not self.found.violations)
+
     def _read(self, i: int, block: bytes, text: bytes) -> Stream | None:
         """Read what stands in the place of a rapid; None where the walk ends."""
         plain = self.recognised.plain(i, text) if self.recognised is not None else None
         follows = self._follows(i)
+        before = len(self.found.violations)
+        passed: list[bytes] | None = [] if self.proven is not None else None
+        self.processed.passed = passed
+        stream = None
         if plain is not None and self.recognised is not None:
             stream = self.recognised.read(i, plain, follows)
-            if stream is not None:
-                return stream
-        reader = self._reader(i, text)
-        if not self._is_stream(reader, block, i):
-            return None
-        before = len(self.found.violations)
-        self.processed.passed = [] if plain is not None else None
-        stream = reader.read()
-        passed, self.processed.passed = self.processed.passed, None
-        fine = stream is not None and passed is not None and len(self.found.violations) == before
-        if fine and self.recognised is not None and stream and plain and passed:
-            self.recognised.learn(reader, stream, plain, follows, b"".join(passed))
+        known = stream is not None
+        if stream is None:
+            reader = self._reader(i, text)
+            if self._is_stream(reader, block, i):
+                stream = reader.read()
+        self.processed.passed = None
+        if stream is None or not passed or len(self.found.violations) > before:
+            return stream
+        new = b"".join(passed)
+        if self.recognised is not None and plain and not known:
+            self.recognised.learn(reader, stream, plain, follows, new)
+        if self.proven is not None and block.endswith(b"\n"):
+            self.proven.read(self._key, new)
         return stream
 
     def _reader(self, i: int, text: bytes) -> StreamReader:

@@ -14,20 +14,15 @@ complained of is never learned.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from decimal import Decimal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids
-from gcodejerk.verification.bytes.allowed import STANDSTILL
 from gcodejerk.verification.bytes.form import COMMENT_LENGTH, LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.bytes.source import Window
+from gcodejerk.verification.bytes.states import States
 
-PLACES = ("line", "begin", "end", "start", "target", "offset")
-"""Columns that say where, and nothing else that the form of a stream depends on."""
 MOST = 500
 """Forms that are remembered."""
 LONGEST_BLOCK = 60
@@ -109,17 +104,17 @@ class _Form:
 class Recognised:
     """What was read before, and what is like it."""
 
-    def __init__(self, window: Window, rapids: Rapids, dialect: Dialect) -> None:
+    def __init__(self, window: Window, rapids: Rapids, dialect: Dialect, states: States) -> None:
         self.window, self.rapids, self.dialect = window, rapids, dialect
         self.forms: dict[tuple[bytes, bytes, bool], _Form] = {}
-        self.states = _states(rapids)
+        self.states = states
         writing = dialect.writing
         self.comment = (b"", b"") if writing is None else writing.comment
         self.usable = writing is not None
 
     def _key(self, i: int, plain: Plain, follows: bool) -> tuple[bytes, bytes, bool]:
         """What the form of a replacement depends on, but for its own text."""
-        return self.states[i].tobytes(), plain.key, follows
+        return self.states.state(i), plain.key, follows
 
     def plain(self, i: int, text: bytes) -> Plain | None:
         """The block of a rapid, if it is one that this module knows about."""
@@ -272,17 +267,3 @@ class Recognised:
     def _points_needed(self) -> bool:
         """Whether every number has to have its decimal point."""
         return self.dialect.whole_numbers == "machine"
-
-
-def _states(rapids: Rapids) -> NDArray[np.uint8]:
-    """All that the columns say of each rapid but for its places, shape (n, bytes)."""
-    count = len(rapids)
-    step = np.abs(rapids.target - rapids.start)
-    columns = [np.packbits(step > STANDSTILL, axis=1), np.isnan(step).any(axis=1)]
-    for one in fields(rapids):
-        if one.name not in PLACES:
-            columns.append(getattr(rapids, one.name))
-    if not count:
-        return np.zeros((0, 0), dtype=np.uint8)
-    parts = [np.ascontiguousarray(c).view(np.uint8).reshape(count, -1) for c in columns]
-    return np.ascontiguousarray(np.concatenate(parts, axis=1))

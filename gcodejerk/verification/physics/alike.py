@@ -38,7 +38,7 @@ class Alike:
         self.reported = reported
         self.known: set[bytes] = set()
 
-    def judge(self, paths: Paths, judge: Judge, found: Findings) -> None:
+    def judge(self, paths: Paths, judge: Judge, found: Findings) -> bool:
         """Judge streams, of those that are alike the first.
 
         Parameters
@@ -49,6 +49,11 @@ class Alike:
             Judges streams, each by itself.
         found : Findings
             Takes what is wrong.
+
+        Returns
+        -------
+        bool
+            Whether everything was looked at, and nothing was wrong.
         """
         keys = self.keys(paths)
         fresh: dict[bytes, int] = {}
@@ -56,7 +61,7 @@ class Alike:
             if key not in self.known:
                 fresh.setdefault(key, k)
         if not fresh:
-            return
+            return True
         first = Findings(1)
         whole = len(fresh) == len(keys)
         one_each = paths if whole else paths.take(np.array(list(fresh.values()), dtype=np.int64))
@@ -64,10 +69,12 @@ class Alike:
         if first.violations:
             open_ = [k for k, key in enumerate(keys) if key not in self.known]
             judge(paths.take(np.array(open_, dtype=np.int64)), found)
-        elif complete:
+            return False
+        if complete:
             if len(self.known) > MOST:
                 self.known.clear()
             self.known.update(fresh)
+        return complete
 
     def keys(self, paths: Paths) -> list[bytes]:
         """What the judgement of each stream depends on, as a hash."""

@@ -10,17 +10,23 @@ it says so by a number and nothing is refused: `nc` follows more than it does.
 from __future__ import annotations
 
 import math
+from array import array
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
-from gcodejerk.units import MM_PER_INCH
+from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
 from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
 from gcodejerk.verification.second_reading.routes import LostError, calls, flows
+from gcodejerk.verification.second_reading.straight import Column, PlainLines, Straight, follow
 from gcodejerk.verification.second_reading.tracking import Tracker
 from gcodejerk.verification.second_reading.walking import Stepper, Walker
 
@@ -60,20 +66,75 @@ def confirm(
     int
         How many of them the second reading confirms.
     """
-    index = list(rewritten)
-    if not index:
+    index = np.fromiter(rewritten, dtype=np.int64)
+    if not len(index):
         return 0
     confirmed = 0
-    lines = rapids.line[index].tolist()
-    for k, seen in observations(original, find_dialect(dialect), start, lines):
-        i = index[k]
+    lines = array("q", rapids.line[index].tobytes())
+    plain = _Plain(rapids, index)
+    for k, seen in observations(original, find_dialect(dialect), start, lines, plain):
+        i = int(index[k])
         problem = _disagreement(seen, rapids, i)
         if problem:
             advice = "leave this rapid alone, and report the program: one of two readings is wrong"
             _differ(found, int(rapids.line[i]), problem, advice)
         else:
             confirmed += _is_known(seen, rapids, i)
-    return confirmed
+    return confirmed + plain.confirmed
+
+
+class _Plain:
+    """Compares rapids in plain lines, many at once."""
+
+    def __init__(self, rapids: Rapids, index: NDArray[np.int64]) -> None:
+        self.rapids, self.index = rapids, index
+        self.line = rapids.line[index]
+        self.confirmed = 0
+
+    def agrees(self, run: Straight, number: int, tracker: Tracker) -> bool:
+        """Compare those of some lines; whether the two readings agree in every one of them.
+
+        Parameters
+        ----------
+        run : Straight
+            The lines.
+        number : int
+            Of the first of them in the file, from 1.
+        tracker : Tracker
+            What is in force in them.
+        """
+        first, last = np.searchsorted(self.line, [number, number + len(run)])
+        i, at = self.index[first:last], self.line[first:last] - number
+        rapids, axes = self.rapids, run.axes[at]
+        good = run.rapid[at] & (axes == rapids.words[i])
+        known = np.ones(len(i), dtype=np.bool_)
+        for mine, theirs in ((run.start[at], rapids.start), (run.end[at], rapids.target)):
+            for k in range(mine.shape[1]):
+                used, place = axes >> k & 1 != 0, mine[:, k]
+                off = np.abs(place - theirs[i, k])
+                good &= ~(used & (off > NEAR * np.maximum(1.0, np.abs(place) / 1e3)))
+                known &= ~used | ~np.isnan(place)
+        force = tracker.in_force() | {
+            "F": run.feed[at],
+            "speed": run.feed[at] * (tracker.unit or math.nan) / SECONDS_PER_MINUTE,
+            "F without a point": np.where(np.isnan(run.feed[at]), np.nan, run.whole[at]),
+            "motion": 0,
+        }
+        for name, told in _told_columns(rapids, i).items():
+            value = force[name]
+            a = np.broadcast_to(np.nan if value is None else np.asarray(value, float), told.shape)
+            same = np.abs(a - told) <= 1e-12 * np.maximum(np.abs(a), np.abs(told))
+            good &= same | np.isnan(a) | np.isnan(told)
+            known &= np.isnan(told) | ~np.isnan(a)
+        if tracker.path is not None:
+            for own, column in ((tracker.p, rapids.path_p), (tracker.q, rapids.path_q)):
+                told = column[i]
+                none = np.isnan(told) & (own != own)
+                good &= (told == own) | none | (rapids.path[i] == 0)
+        if not good.all():
+            return False
+        self.confirmed += int(np.count_nonzero(known))
+        return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +199,11 @@ def _differ(found: Findings, line: int, problem: str, advice: str) -> None:
 
 
 def observations(
-    original: BinaryIO, dialect: Dialect, start: Start, lines: list[int]
+    original: BinaryIO,
+    dialect: Dialect,
+    start: Start,
+    lines: Sequence[int],
+    plain: _Plain | None = None,
 ) -> Iterator[tuple[int, Observation]]:
     """What the second reading sees in these lines.
 
@@ -146,8 +211,11 @@ def observations(
     ----------
     original, dialect, start
         As for `confirm`.
-    lines : list of int
+    lines : sequence of int
         Ascending, counted from 1.
+    plain : optional
+        Compares those that stand among plain lines by itself; where it agrees to all of them,
+        they are not among those that are yielded.
 
     Yields
     ------
@@ -177,11 +245,22 @@ def observations(
     if dialect.dark_rapids and start.spindle == "mill" and lines:
         tracker.dark = _behaves_like_a_laser(original, dialect, start)
         original.seek(begin)
-    number, wanted, following = 1, iter([*lines, math.inf]), 0
-    line: float = next(wanted)
+    plain_lines = PlainLines(dialect, decimals)
+    number, following, behind = 1, 0, -1
+    line = lines[0] if lines else math.inf
     for data in pieces(original):
-        at, size = 0, len(data)
+        at, size, behind = 0, len(data), -1
         while at < size:
+            taken = None
+            if plain is not None and at >= behind and plain_lines.ready(tracker):
+                taken = plain_lines.take(data, at, tracker)
+            if taken is not None and plain is not None and plain.agrees(taken[0], number, tracker):
+                follow(tracker, taken[0])
+                number, at = number + len(taken[0]), taken[1]
+                following = bisect_left(lines, number, following)
+                line = lines[following] if following < len(lines) else math.inf
+                continue
+            behind = behind if taken is None else taken[1]
             run = None
             if tracker.may_run:
                 run = text.take_run(data, at, stated=not tracker.feeding)
@@ -190,7 +269,8 @@ def observations(
                 number, at = number + run[0].lines, run[1]
                 while line < number:
                     yield following, Observation(against="it moves with feed")
-                    line, following = next(wanted), following + 1
+                    following += 1
+                    line = lines[following] if following < len(lines) else math.inf
                 continue
             end = data.find(b"\n", at)
             end = size if end < 0 else end
@@ -199,7 +279,8 @@ def observations(
             found = stepper.step(tracker, bare)
             if number == line:
                 yield following, found
-                line, following = next(wanted), following + 1
+                following += 1
+                line = lines[following] if following < len(lines) else math.inf
             number, at = number + 1, end + 1
 
 
@@ -271,6 +352,22 @@ def _disagreement(seen: Observation, rapids: Rapids, i: int) -> str:
         if known and not math.isclose(mine, told, rel_tol=1e-12):
             return f"{name} is {mine:g}, not {told:g}"
     return _tolerances(seen, rapids, i)
+
+
+def _told_columns(rapids: Rapids, i: NDArray[np.int64]) -> dict[str, Column]:
+    """The same of many rapids; NaN where it does not know."""
+    feed, words = rapids.feed[i], rapids.words[i]
+    return {
+        "unit": np.where(rapids.inch[i], MM_PER_INCH, 1.0),
+        "incremental": rapids.incremental[i].astype(np.float64),
+        "diameter": np.where(words & 1 != 0, rapids.diameter[i], np.nan),
+        "feed mode": np.where(rapids.feed_mode[i] == 0, np.nan, rapids.feed_mode[i]),
+        "F": feed,
+        "F without a point": np.where(np.isnan(feed), np.nan, rapids.feed_whole[i]),
+        "path": np.where(rapids.path[i] == 0, np.nan, rapids.path[i]),
+        "speed": rapids.speed[i],
+        "motion": rapids.fed[i].astype(np.float64),
+    }
 
 
 def _tolerances(seen: Observation, rapids: Rapids, i: int) -> str:

@@ -144,7 +144,7 @@ class Tracker(Drilling):
             return Observation()
         if line.understood and self.is_statement(line):
             return self.statement(line)
-        here, modes = list(self.at), self._in_force()
+        here, modes = list(self.at), self.in_force()
         if self.drill_by_name(line):
             return Observation("it calls a cycle", start=here, modes=modes)
         if not line.understood or any(effect not in _READ for effect in line.effects):
@@ -227,7 +227,7 @@ class Tracker(Drilling):
             self.effect(effect, code, block.values)
         self._use_axes(block, kinds, seen)
         seen.end = list(self.at)
-        seen.modes = self._in_force()
+        seen.modes = self.in_force()
         burns = self.beam(block, burnt)
         seen.sure = seen.sure and burns is False
         if burns:
@@ -289,7 +289,8 @@ class Tracker(Drilling):
         resume = self.facts.resume
         return resume == "same" or (resume is None and self.dialect.same_after_stop)
 
-    def _in_force(self) -> dict[str, Any]:
+    def in_force(self) -> dict[str, Any]:
+        """What is in force, by the names of `Observation.modes`."""
         distance = self.g.get("distance")
         return {
             "unit": self.unit,

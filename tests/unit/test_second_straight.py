@@ -1,0 +1,158 @@
+"""Plain lines that the second reader takes at once: as it takes them one by one, and no others."""
+
+import io
+import random
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from gcodejerk.nc import DIALECTS, Start, read_program
+from gcodejerk.verification.findings import Findings
+from gcodejerk.verification.second_reading import agreement
+from gcodejerk.verification.second_reading.reading import Text
+from gcodejerk.verification.second_reading.straight import PlainLines, Straight, follow
+from gcodejerk.verification.second_reading.walking import Stepper
+
+PLAIN = [
+    *("G0 X%.3f Y%.3f", "G0 Z%.2f", "G1 Z-%.1f F%d.5", "X%.1f", "G00 Y.5 Z%.4f"),
+    "G01X%.2fY-%.2fF%d",
+    *("N12 G0 X%.3f Y%.3f Z%.3f", "N13 G1 X%.2f", "G0X%.1f F%d.", "G1 X%.2f Y%.2f Z-%.2f F%d"),
+]  # fmt: skip
+ODD = [
+    *("G91", "G90", "(text)", "G20", "G21", "M3 S100", "M5", "G54", "G55", "G0", "F%d", ""),
+    "G4 P1",
+    *("G81 X%.1f Z-2. R1. F50", "G80", "/G0 X%.1f", "G41 D1", "G40", "G92 X%.1f", "G68 X0 Y0 R9"),
+    *("G69", "M6 T1", "G2 X%.1f Y1 I1 J0", "G0 X%.1f X1", "G0 X1..2", "g0 x%.1f", "G53 G0 Z0"),
+    *("G94", "G95", "G0 A%.1f", "#1=%d", "G0 X#1", "M98 P1", "G64", "G0 X%.1f Y1 (a)", "G17"),
+]  # fmt: skip
+
+
+def filled(form, rng):
+    return form % tuple(rng.uniform(1, 90) for _ in range(form.count("%")))
+
+
+def drawn(rng, odd):
+    lines = ["G90 G94 G17 G40 G49", "G21", "G0 X0. Y0. Z5.", "F100."]
+    for _ in range(60):
+        form = rng.choice(ODD) if rng.random() < odd else rng.choice(PLAIN)
+        lines += [filled(form, rng)]
+        lines += [filled(rng.choice(PLAIN), rng) for _ in range(rng.choice((0, 10)))]
+    return "\n".join([*lines, ""]).encode()
+
+
+def readers(name):
+    dialect = DIALECTS[name].set_up(Start())
+    decimals = dialect.whole_numbers == "machine"
+    text = Text(dialect, decimals)
+    tracker = agreement._begin(text, dialect, Start())
+    return Stepper(text, dialect), PlainLines(dialect, decimals), tracker
+
+
+def same(a, b):
+    return repr(a) == repr(b)
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "grbl", "fanuc", "haas", "mach"])
+def test_lines_taken_at_once_do_what_they_do_one_by_one(name):
+    rng, taken = random.Random(name), 0
+    for odd in (0.0, 0.1, 0.4):
+        data = drawn(rng, odd)
+        stepper, plain, tracker = readers(name)
+        at = 0
+        while at < len(data):
+            run = plain.take(data, at, tracker) if plain.ready(tracker) else None
+            ends = run[1] if run else data.index(b"\n", at) + 1
+            lines = data[at:ends].decode().splitlines()
+            ahead = tracker.copy()
+            if run:
+                follow(ahead, run[0])
+                taken += len(run[0])
+            for k, line in enumerate(lines):
+                seen = stepper.step(tracker, line.encode())
+                if run:
+                    assert same(seen.start[:3], run[0].start[k].tolist()), line
+                    assert same(seen.end[:3], run[0].end[k].tolist()), line
+                    assert seen.axes == run[0].axes[k]
+                    assert (seen.against is None) == run[0].rapid[k] == seen.sure
+                    assert same(seen.modes["F"], float(run[0].feed[k]))
+            if run:
+                assert {k: repr(v) for k, v in vars(ahead).items()} == {
+                    k: repr(v) for k, v in vars(tracker).items()
+                }
+            at = ends
+    assert taken > 100
+
+
+PROGRAM = b"G21 G90 G94 G17 G40 G64\nG0 X0 Y0 Z5\nF100\n" + b"".join(
+    b"G0 X%d.5 Y%d\nG1 Z-3\nG0 Z5\n" % (k, k % 3) for k in range(40)
+)
+
+
+def compared(rapids, found=None):
+    found = Findings(100) if found is None else found
+    index = np.flatnonzero(rapids.reason == 255)
+    count = agreement.confirm(io.BytesIO(PROGRAM), "linuxcnc", Start(), rapids, index, found)
+    return count, found.violations
+
+
+@pytest.fixture
+def rapids():
+    return read_program(io.BytesIO(PROGRAM), name="x.nc", dialect="linuxcnc").rapids
+
+
+def test_what_is_taken_at_once_is_confirmed_as_one_by_one(rapids, monkeypatch):
+    count, violations = compared(rapids)
+    assert count > 70
+    assert not violations
+    seen = []
+    monkeypatch.setattr(agreement, "_disagreement", lambda *a: seen.append(a) or "")
+    compared(rapids)
+    assert len(seen) < 3
+    monkeypatch.setattr(PlainLines, "ready", lambda *a: False)
+    assert compared(rapids)[0] == count
+    assert len(seen) > 70
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        "start",
+        "target",
+        "words",
+        "inch",
+        "incremental",
+        "feed_mode",
+        "feed",
+        "path",
+        "path_p",
+        "speed",
+        "fed",
+    ],
+)
+def test_what_differs_in_one_rapid_is_found_among_plain_lines(rapids, column, monkeypatch):
+    assert column in {f.name for f in fields(rapids)}
+    values = np.array(getattr(rapids, column))
+    k = 50
+    at = (k, 2) if values.ndim == 2 else k
+    if values.dtype == bool:
+        values[at] = not values[at]
+    else:
+        values[at] = {"words": 1, "feed_mode": 93, "path": 61}.get(column, 7.25)
+    wrong = replace(rapids, **{column: values})
+    count, violations = compared(wrong)
+    assert [v.original_line for v in violations] == [int(rapids.line[k])]
+    monkeypatch.setattr(PlainLines, "ready", lambda *a: False)
+    assert compared(wrong) == (count, violations)
+
+
+def test_columns_of_a_run_are_as_long_as_its_lines(rapids):
+    stepper, plain, tracker = readers("linuxcnc")
+    at = 0
+    for _ in range(3):
+        ends = PROGRAM.index(b"\n", at)
+        stepper.step(tracker, PROGRAM[at:ends])
+        at = ends + 1
+    run, end = plain.take(PROGRAM, at, tracker)
+    assert end == len(PROGRAM)
+    assert all(len(getattr(run, f.name)) == 120 for f in fields(Straight) if f.name != "feeds")
