@@ -268,7 +268,7 @@ FANUC_LATHE_A = replace(
     },
     feed_modes={980: 94, 990: 95},
     increments={"U": "X", "V": "Y", "W": "Z", "H": "C"},
-    redrawn=frozenset({320, 340, 900, 920, 940}),
+    redrawn=frozenset({900, 920, 940}),
     harmless=frozenset(
         {0, 180, 200, 210, 400, 610, 640, 960, 970, 980, 990, 131, 1130, 670, 220, 230, 250, 260}
     ),
@@ -295,7 +295,7 @@ FANUC_LATHE_B = replace(
     defaults={"plane": 180, "compensation": 400, "system": 540, "path": 640},
     feed_modes={940: 94, 950: 95},
     letters="FSTXYZCDEHIJKLPQR",
-    redrawn=frozenset({330, 340, 770, 780, 790}),
+    redrawn=frozenset({770, 780, 790}),
     harmless=frozenset(
         {0, 180, 200, 210, 400, 610, 640, 900, 910, 940, 950, 960, 970, 980, 990}
         | {131, 1130, 670, 220, 230, 250, 260}
