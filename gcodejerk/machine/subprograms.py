@@ -31,34 +31,31 @@ class Subprograms:
     digest: str = ""
     """Sum of all names and bytes."""
 
-    @property
-    def text(self) -> str:
-        """As the settings of an output say it."""
-        return f"subprograms {self.digest}"
-
 
 def sum_of(text: bytes) -> str:
     """Sum of one file, as reports name it."""
     return hashlib.blake2b(text, digest_size=8).hexdigest()
 
 
-def load_subprograms(folder: str | Path) -> Subprograms:
+def load_subprograms(folder: str, within: Path | None = None) -> Subprograms:
     """Read a folder of subprograms.
 
     Parameters
     ----------
-    folder : str or Path
-        Where they are; hidden files are left out.
+    folder : str
+        Where they are; hidden files, and those of more than `MOST_BYTES`, are left out.
+    within : Path, optional
+        Where a relative name begins.
 
     Raises
     ------
     MachineError
         It is no folder, cannot be read, or holds more than subprograms can be.
     """
-    root, place = Path(folder), Place(str(folder))
+    root, place = (within or Path()) / folder, Place(folder)
     if not root.is_dir():
         raise MachineError(
-            f"subprograms are to be in {str(folder)!r}, which is no folder",
+            f"subprograms are to be in {folder!r}, which is no folder",
             "name the folder that holds the control's subprograms",
             place,
         )
@@ -76,15 +73,15 @@ def load_subprograms(folder: str | Path) -> Subprograms:
             together.update(b"%d %d " % (len(name), len(data)) + name.encode() + data)
             if len(files) > MOST_FILES or size > MOST_TOGETHER:
                 raise MachineError(
-                    f"folder {str(folder)!r} of subprograms holds more than {MOST_FILES} files or "
+                    f"folder {folder!r} of subprograms holds more than {MOST_FILES} files or "
                     f"{MOST_TOGETHER // 1_000_000} MB",
                     "name a folder that holds nothing but subprograms",
                     place,
                 )
     except OSError as error:
         raise MachineError(
-            f"subprograms in {str(folder)!r} cannot be read: {error.strerror}",
+            f"subprograms in {folder!r} cannot be read: {error.strerror}",
             "see whether it is the right folder, and may be read",
             place,
         ) from error
-    return Subprograms(str(folder), files, together.hexdigest())
+    return Subprograms(folder, files, together.hexdigest())

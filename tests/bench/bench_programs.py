@@ -1,6 +1,7 @@
 r"""A folder of real programs: how many of their rapids are certain, and what keeps the others.
 
-    python tests/bench/bench_programs.py FOLDER [--dialect NAME] [--machine M.yaml] [--lines REASON] [--auto]
+    python tests/bench/bench_programs.py FOLDER [--dialect NAME] [--machine M.yaml] [--lines REASON]
+        [--subprograms] [--auto]
 
 FOLDER holds a folder for each dialect, by its name (``haas-lathe`` and the like count by what stands
 in `READ_AS`), or the programs of the one that `--dialect` names. Each is read from a start as a
@@ -16,12 +17,14 @@ import io
 import sys
 from collections import Counter, defaultdict
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from gcodejerk import Machine
 from gcodejerk.errors import GcodejerkError
+from gcodejerk.machine.subprograms import load_subprograms
 from gcodejerk.nc import Start, read_program
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.detect import detect_dialect
@@ -91,15 +94,30 @@ def programs(folder, dialect):
     }
 
 
+@cache
+def files_in(folder):
+    """All files of a collection."""
+    return load_subprograms(str(folder)).files
+
+
+def folder_of(path, given):
+    """What the collection that a program belongs to holds: the first folder below its dialect's."""
+    parts = path.relative_to(given.folder).parts
+    above = given.folder if given.dialect else given.folder / parts[0]
+    inner = parts if given.dialect else parts[1:]
+    return files_in(above / inner[0]) if len(inner) > 1 else {}
+
+
 def read(path, name, start, given):
     """One program: how its rapids stand, and what the second reading says."""
     data = path.read_bytes()
     start = lathe_start(start, data, name)
-    more = given.more(path)
-    rapids = read_program(io.BytesIO(data), dialect=name, start=start, **more).rapids
+    if given.subprograms:
+        start = replace(start, subprograms=folder_of(path, given))
+    rapids = read_program(io.BytesIO(data), dialect=name, start=start).rapids
     certain = np.flatnonzero(rapids.reason == CERTAIN)
     found = Findings(9)
-    confirmed = confirm(io.BytesIO(data), name, start, rapids, certain, found, **more)
+    confirmed = confirm(io.BytesIO(data), name, start, rapids, certain, found)
     if found.violations:
         print(f"CONTRADICTED {path}: {found.violations[0]}", file=sys.stderr)
     return data, rapids, len(certain), confirmed, len(found.violations)
@@ -179,11 +197,13 @@ def main():
     parser.add_argument("--most", type=int, default=6, help="reasons in a row")
     parser.add_argument("--worst", type=int, default=0, help="files for each reason")
     parser.add_argument("--lines", help="print the blocks of reasons that hold this text")
+    parser.add_argument("--subprograms", action="store_true", help="of each collection")
     parser.add_argument("--auto", action="store_true")
     parser.add_argument("-v", "--verbose", action="store_true")
     given = parser.parse_args()
-    given.more = lambda path: {}
-    print("| dialect | files | refused | rapids | that move | certain | of these | confirmed | contradicted | reasons |")
+    print(
+        "| dialect | files | refused | rapids | that move | certain | of these | confirmed | contradicted | reasons |"
+    )
     print("|---|---|---|---|---|---|---|---|---|---|")
     for folder, files in programs(given.folder, given.dialect).items():
         try:

@@ -216,9 +216,7 @@ class Runner:
             place = Place(name, number, column, line.text[:200].decode("latin-1"))
             there = "" if name == self.name else f"line {number} of {name}: "
             self.syntax_problems.append(
-                Finding(
-                    None if there else number, f"{there}block not understood: {problem}", place
-                )
+                Finding(None if there else number, f"{there}block not understood: {problem}", place)
             )
 
     def _place(self, number: int) -> tuple[str, int]:
