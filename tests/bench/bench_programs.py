@@ -3,12 +3,13 @@ r"""A folder of real programs: how many of their rapids are certain, and what ke
     python tests/bench/bench_programs.py FOLDER [--dialect NAME] [--machine M.yaml] [--lines REASON]
         [--subprograms] [--auto]
 
-FOLDER holds a folder for each dialect, by its name (``haas-lathe`` and the like count by what stands
-in `READ_AS`), or the programs of the one that `--dialect` names. Each is read from a start as a
-shop would state it in its machine file: work offsets, tool lengths, home, the place of tool changes,
-when M codes run, what the control starts with. Printed is a row for each dialect: files, rapids,
-those that are certain, those that the second reading confirms or contradicts, and the main reasons of
-the rest. `--lines` prints the blocks that one reason keeps. `--auto` prints how many files `auto`
+FOLDER holds a folder for each dialect, by its name (``haas-lathe`` and the like count by what
+stands in `READ_AS`), or the programs of the one that `--dialect` names. Each is read from a start
+as a shop would state it in its machine file: work offsets, tool lengths, home, the place of tool
+changes, when M codes run, what the control starts with. Printed is a row for each dialect: files,
+rapids, those that are certain, those that the second reading confirms or contradicts, and the main
+reasons of the rest. `--lines` prints the blocks that one reason keeps, `--subprograms` follows
+calls into the other files of a collection, `--auto` prints how many of the files with rapids `auto`
 reads as their dialect, or as what their dialect reads alike.
 """
 
@@ -48,6 +49,10 @@ STARTUP = {
 }
 WORK = {f"G{k}": {"X": -300.0, "Y": -200.0, "Z": -350.0} for k in range(54, 60)}
 LENGTHS = {f"H{k}": 100.0 for k in range(1, 100)}
+HEADS = (
+    *("dialect", "files", "refused", "rapids", "that move", "certain", "of these"),
+    *("confirmed", "contradicted", "reasons"),
+)
 NOTHING_MOVES = Reason.NO_MOTION, Reason.AFTER_END
 """Reasons that are no loss."""
 
@@ -140,25 +145,24 @@ def row(folder, files, given):
         reasons = [REASONS[r] for r in rapids.reason if r != CERTAIN]
         total.update(
             files=1, rapids=len(rapids.reason), certain=certain, confirmed=confirmed,
-            contradicted=contradicted, moving=sum(r not in NOTHING_MOVES for r in reasons) + certain,
+            moving=sum(r not in NOTHING_MOVES for r in reasons) + certain,
+            contradicted=contradicted,
         )  # fmt: skip
         left.update(str(reason) for reason in reasons)
         for reason in reasons:
             worst[str(reason)][str(path)] += 1
         if given.lines:
             show(path, data, rapids, given.lines)
-        if given.auto:
+        if given.auto and reasons + [None] * certain:
             detected[judge(data, path.name, name, start.diameter)] += 1
             if given.verbose:
                 print(judge(data, path.name, name, start.diameter), path, file=sys.stderr)
     share = 100.0 * total["certain"] / max(1, total["moving"])
-    print(
-        f"| {folder} | {total['files']} | {total['refused']} | {total['rapids']} | {total['moving']} | "
-        f"{total['certain']} | {share:.0f} % | {total['confirmed']} | {total['contradicted']} | "
-        + ", ".join(f"{reason} {count}" for reason, count in left.most_common(given.most))
-        + " |",
-        flush=True,
-    )
+    names = ("files", "refused", "rapids", "moving", "certain")
+    main = ", ".join(f"{reason} {count}" for reason, count in left.most_common(given.most))
+    cells = [*(str(total[n]) for n in names), f"{share:.0f} %"]
+    cells += [str(total["confirmed"]), str(total["contradicted"]), main]
+    print(f"| {folder} | {' | '.join(cells)} |", flush=True)
     if given.worst:
         for reason, count in left.most_common(given.most):
             print(f"    {reason}: {count}")
@@ -201,10 +205,8 @@ def main():
     parser.add_argument("--auto", action="store_true")
     parser.add_argument("-v", "--verbose", action="store_true")
     given = parser.parse_args()
-    print(
-        "| dialect | files | refused | rapids | that move | certain | of these | confirmed | contradicted | reasons |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    print(f"| {' | '.join(HEADS)} |")
+    print("|---" * len(HEADS) + "|")
     for folder, files in programs(given.folder, given.dialect).items():
         try:
             find_dialect(READ_AS.get(folder, folder))
