@@ -218,10 +218,9 @@ class Tracker(Drilling):
         kinds = set(effects.values())
         burnt = self.spindle != 5
         sure = self.sure_of_systems(effects, block.values)
-        # Behind a line that only the other reader understands, it may know systems that we lost.
-        doubted = not sure and self.strayed
-        banned = kinds - SELECTIONS if sure or doubted else kinds
-        seen = Observation(self._ban(banned), axes=block.axes)
+        doubted = not sure and self.strayed  # the other reader may know what was lost here
+        certain = SELECTIONS if sure or doubted else frozenset[Effect]()
+        seen = Observation(self._ban(kinds - certain), axes=block.axes)
         self._set_feed(block, kinds)
         ends = self.machine_codes(block)
         self._set_tool(block, seen)
