@@ -104,10 +104,9 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.FRAME_CHANGE: Explanation(
         "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
-        "state `program.offsets` and `program.home`: G54.. may then stand beside a rapid, and what "
-        "follows the others is certain; where the block itself has to be rewritten, retract with a "
-        "plain G0 instead of G28, G30 and G53, and on LinuxCNC and Mach give G43 a block of its "
-        "own (elsewhere it may move the machine by itself: leave it)",
+        "with `program.offsets` and `program.home`, G54.. may stand beside a rapid, and what "
+        "follows the others is certain; retract with a plain G0 instead of G28, G30 and G53; give "
+        "G43 a block of its own on LinuxCNC and Mach (elsewhere it may move the machine: leave it)",
     ),
     Reason.NOT_FOLLOWED: Explanation(
         "what runs there may have changed every mode, and since then nobody has said G40; or it is "
@@ -167,10 +166,9 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.START_UNKNOWN: Explanation(
         "no absolute word has yet said where an axis stands, or something may have moved it: tool "
         "change, offset, homing, probing, somebody who jogs at M0 or M1",
-        "usual for the first move of each axis, and behind T0101 of a lathe, where nothing helps; "
-        "`program.start` says where the axes stand, "
-        "`program.offsets` what work offsets and tool lengths are, `program.home` where G28 leads, "
-        "`program.tool_change` where M6 does, `program.resume_after_stop` what happens at M0",
+        "usual for the first move of each axis, and behind T0101 of a lathe; `program.start` says "
+        "where the axes stand, `program.offsets` work offsets and tool lengths, `program.home` "
+        "where G28 leads, `program.tool_change` M6, `program.resume_after_stop` what happens at M0",
     ),
     Reason.ROTARY_WAY: Explanation(
         "an absolute rapid of A, B or C, which may go the short way round, or by the sign of its "
