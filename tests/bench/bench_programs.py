@@ -1,7 +1,7 @@
 r"""A folder of real programs: how many of their rapids are certain, and what keeps the others.
 
     python tests/bench/bench_programs.py FOLDER [--dialect NAME] [--machine M.yaml] [--lines REASON]
-        [--subprograms] [--auto]
+        [--subprograms] [--start] [--auto]
 
 FOLDER holds a folder for each dialect, by its name (``haas-lathe`` and the like count by what
 stands in `READ_AS`), or the programs of the one that `--dialect` names. Each is read from a start
@@ -9,7 +9,8 @@ as a shop would state it in its machine file: work offsets, tool lengths, home, 
 changes, when M codes run, what the control starts with. Printed is a row for each dialect: files,
 rapids, those that are certain, those that the second reading confirms or contradicts, and the main
 reasons of the rest. `--lines` prints the blocks that one reason keeps, `--subprograms` follows
-calls into the other files of a collection, `--auto` prints how many of the files with rapids `auto`
+calls into the other files of a collection, `--start` states where the axes stand (which few shops
+can), `--auto` prints how many of the files with rapids `auto`
 reads as their dialect, or as what their dialect reads alike.
 """
 
@@ -24,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from gcodejerk import Machine
+from gcodejerk.axes import AXES
 from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine.subprograms import load_subprograms
 from gcodejerk.nc import Start, read_program
@@ -132,6 +134,7 @@ def row(folder, files, given):
     """Read all programs of a dialect."""
     name = READ_AS.get(folder, folder)
     start = start_of(given.machine, name) if given.machine else start_for(name)
+    start = replace(start, positions=dict.fromkeys(AXES, 0.0)) if given.start else start
     total = Counter()
     left, worst, detected = Counter(), defaultdict(Counter), Counter()
     for path in files:
@@ -202,6 +205,7 @@ def main():
     parser.add_argument("--worst", type=int, default=0, help="files for each reason")
     parser.add_argument("--lines", help="print the blocks of reasons that hold this text")
     parser.add_argument("--subprograms", action="store_true", help="of each collection")
+    parser.add_argument("--start", action="store_true", help="the axes stand at zero at first")
     parser.add_argument("--auto", action="store_true")
     parser.add_argument("-v", "--verbose", action="store_true")
     given = parser.parse_args()
