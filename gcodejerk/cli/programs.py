@@ -332,8 +332,9 @@ def verify(
         stamp = read_stamp(other, described)
         if stamp is not None and not stamp.known:
             print(
-                f"{processed}: note: stamped for another machine file or with options that are "
-                f"not known here; verified as {described.source} and the options say",
+                f"{processed}: note: stamped for another machine file, with other subprograms or "
+                f"with options that are not known here; verified as {described.source} and the "
+                "options say",
                 file=sys.stderr,
             )
         elif stamp is not None:
