@@ -364,3 +364,25 @@ def test_a_thread_ends_where_it_says(dialect, thread):
     rapids.start[behind, 0] += 0.1
     confirm(io.BytesIO(data), dialect, start, rapids, [behind], found)
     assert found.violations
+
+
+# --- the spindle of a word, in LinuxCNC ---
+
+
+@pytest.mark.parametrize("words", [b"M3 $0 S100", b"m5$-1", b"S7 M4 $ 1.", b"$0 M3 S1"])
+def test_a_spindle_is_a_word_of_linuxcnc(words):
+    text = b"F9 G0 X1 Z1\n" + words + b"\nG0 X2\nM2\n"
+    assert read(text, "linuxcnc")[0] == [None, None]
+    # other controls refuse it, and who refuses may be led on by hand
+    assert read(text, "mach")[0] != [None, None]
+
+
+@pytest.mark.parametrize("words", [b"M3 $#5", b"M3 $1 2", b"$ M3"])
+def test_what_is_no_number_of_a_spindle_is_not_understood(words):
+    reasons, notes = read(b"F9 G0 X1\n" + words + b"\nG0 Z2\nM2\n", "linuxcnc")
+    assert reasons[1] is not None or any("not understood" in note for note in notes)
+
+
+def test_beside_a_spindle_a_rapid_stays_as_it_is():
+    reasons, _ = read(b"F9 G0 X1\nG0 X2 M3 $0\nG0 X3\nM2\n", "linuxcnc")
+    assert reasons == [None, "other words of the block cannot keep their order", None]

@@ -9,6 +9,8 @@ Parameters by number without a page, the order of M codes and the check of the p
 are general knowledge that was not looked up: they are used to leave rapids alone, and to stop.
 What stands between the first % and the end of its line is skipped (B-63524EN/01 p. 649; leader
 section, B-64014EN/03 p. 21).
+A thread (G32, G33) ends at its words and stays there: Haas lathes, G32 ("no automatic position
+return is performed at the end"); ADT-CNC4620 programming manual p. 27 (X, Z: end of the thread).
 A machine builder adds M codes of his own, which may be macros that move. FreeCAD's post writes the
 name of the file as the first line.
 """
