@@ -80,7 +80,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.SUBPROGRAM: Explanation(
         "it is not the same rapid on every pass, never runs, or not every pass could be followed",
         "post the moves in full, without subprograms, loops and branches; or begin every pass at "
-        "the same place",
+        "the same place; where a call of another file is in the way, give its text "
+        "(`--subprograms`)",
     ),
     Reason.NOT_UNDERSTOOD: Explanation(
         "the control would refuse it, or it holds a code that the dialect's table does not know; "
@@ -90,7 +91,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.EXPRESSION: Explanation(
         "an axis word is a variable or an expression; where it ends is known if every variable is",
-        "let the program set its variables, to whole increments; LinuxCNC: write the numbers",
+        "let the program set its variables, to whole increments (LinuxCNC: to numbers of at most "
+        "six decimals, which a third is not)",
     ),
     Reason.DECIMAL_POINT: Explanation(
         "X100 is 100 mm or 0.1 mm, as a parameter of the control decides",
@@ -102,14 +104,16 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.FRAME_CHANGE: Explanation(
         "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
-        "give G43 and its kin a block of its own and state `program.offsets`, with which G54.. may "
-        "stand beside a rapid; retract with a plain G0 instead of G28, G30 and G53",
+        "with `program.offsets` and `program.home`, G54.. may stand beside a rapid, and what "
+        "follows the others is certain; retract with a plain G0 instead of G28, G30 and G53; give "
+        "G43 a block of its own on LinuxCNC and Mach (elsewhere it may move the machine: leave it)",
     ),
     Reason.NOT_FOLLOWED: Explanation(
         "what runs there may have changed every mode, and since then nobody has said G40; or it is "
         "a synchronized action of Siemens, which may act at any time",
-        "the notes name the line: state G40 and the other modes (G90, G21, the work system) behind "
-        "it; take synchronized actions out",
+        "the notes name the line: give the text of what is called (`--subprograms DIR`), or state "
+        "G40 and the other modes (G90, G21, the work system) behind it; take synchronized actions "
+        "out",
     ),
     Reason.CUTTER_COMPENSATION: Explanation(
         "G41 or G42 is, or may be, in force: the real path differs from the programmed one",
@@ -162,9 +166,9 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.START_UNKNOWN: Explanation(
         "no absolute word has yet said where an axis stands, or something may have moved it: tool "
         "change, offset, homing, probing, somebody who jogs at M0 or M1",
-        "usual for the first move of each axis; `program.start` says where the axes stand, "
-        "`program.offsets` what work offsets and tool lengths are, `program.home` where G28 leads, "
-        "`program.tool_change` where M6 does, `program.resume_after_stop` what happens at M0",
+        "usual for the first move of each axis, and behind T0101 of a lathe; `program.start` says "
+        "where the axes stand, `program.offsets` work offsets and tool lengths, `program.home` "
+        "where G28 leads, `program.tool_change` M6, `program.resume_after_stop` what happens at M0",
     ),
     Reason.ROTARY_WAY: Explanation(
         "an absolute rapid of A, B or C, which may go the short way round, or by the sign of its "

@@ -22,6 +22,7 @@ from gcodejerk.cli.common import (
     say,
 )
 from gcodejerk.cli.rapid_feed import ClearanceOption, RapidFeedOption, counting
+from gcodejerk.cli.subprograms import SubprogramsOption, calling
 from gcodejerk.errors import GcodejerkError
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ def process(
     ] = False,
     rapid_feed: RapidFeedOption = None,
     rapid_clearance: ClearanceOption = None,
+    subprograms: SubprogramsOption = None,
     report: Annotated[
         str | None,
         typer.Option(
@@ -138,6 +140,7 @@ def process(
         expand_cycles=expand_cycles,
     )
     described = counting(load_machine(machine, files), rapid_feed, rapid_clearance)
+    described = calling(described, subprograms)
     mode = "check" if check else "diff" if diff else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
     aside = diff or any(job.output == "-" for job in batch)
@@ -246,6 +249,7 @@ def inspect(
     ] = False,
     rapid_feed: RapidFeedOption = None,
     rapid_clearance: ClearanceOption = None,
+    subprograms: SubprogramsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the report as JSON")] = False,
 ) -> None:
     """Show all rapids of a program: planned, or left alone and why."""
@@ -255,6 +259,7 @@ def inspect(
     from gcodejerk.rewrite.pipeline import Settings, process_file
 
     described = counting(load_machine(machine, [file]), rapid_feed, rapid_clearance)
+    described = calling(described, subprograms)
     settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
     with open_input(file) as source, progress(as_json) as show:
         result = process_file(source, None, described, settings, file, show)
@@ -287,6 +292,7 @@ def verify(
     ] = False,
     rapid_feed: RapidFeedOption = None,
     rapid_clearance: ClearanceOption = None,
+    subprograms: SubprogramsOption = None,
     report: Annotated[
         str | None,
         typer.Option(metavar="FILE.json", help="hold streams for LinuxCNC to its profiles, too"),
@@ -308,6 +314,7 @@ def verify(
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
     described = counting(load_machine(machine, [original]), rapid_feed, rapid_clearance)
+    described = calling(described, subprograms)
     if report is not None and expand_cycles:
         raise typer.BadParameter("--report: its lines are the original's, before its cycles")
     no_cycles = "--expand-cycles: a table of streams has no cycles written out"
@@ -325,8 +332,9 @@ def verify(
         stamp = read_stamp(other, described)
         if stamp is not None and not stamp.known:
             print(
-                f"{processed}: note: stamped for another machine file or with options that are "
-                f"not known here; verified as {described.source} and the options say",
+                f"{processed}: note: stamped for another machine file, with other subprograms or "
+                f"with options that are not known here; verified as {described.source} and the "
+                "options say",
                 file=sys.stderr,
             )
         elif stamp is not None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 from gcodejerk.errors import MachineError
 from gcodejerk.machine.drives import Servo, Structure
+from gcodejerk.machine.subprograms import Subprograms
 from gcodejerk.start import CycleSettings, RapidFeed
 
 OSCILLATORS = 4
@@ -328,6 +329,8 @@ class Description:
     """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
     rapid_feed: RapidFeed | None = None
     """Feed moves that count as rapids in one run; no machine file says so."""
+    subprograms: Subprograms | None = None
+    """What programs call in other files, in one run."""
     structure: Structure | None = None
     """What it is built of, for `gcodejerk.simulation`."""
     inch: bool = field(default=False, compare=False)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import BinaryIO
 
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.flow.elsewhere import Elsewhere
 from gcodejerk.nc.flow.following import Follower
 from gcodejerk.nc.flow.macro_b import NotFollowedError, macro_script
 from gcodejerk.nc.flow.named import named_script
@@ -50,15 +51,26 @@ class FollowingReader(Reader):
     """Collects the lines of a file, and runs them when it is complete."""
 
     def __init__(
-        self, name: str, dialect: Dialect, start: Start, calls: Callable[[Runner], Calls]
+        self,
+        name: str,
+        dialect: Dialect,
+        start: Start,
+        calls: Callable[[Runner], Calls],
+        elsewhere: Elsewhere,
     ) -> None:
         super().__init__(name, dialect, start)
+        self._elsewhere = elsewhere
         self._start, self._make_calls = start, calls
         self._kept: list[tuple[Line, bool]] = []
         """Lines, and whether each is the first block."""
         self._behind: list[tuple[Line, bool]] = []
         """The same behind a closing ``%``."""
         self._closed = False
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Files in which subprograms were found."""
+        return tuple(self._elsewhere.files)
 
     @property
     def collecting(self) -> bool:
@@ -81,35 +93,47 @@ class FollowingReader(Reader):
         self._run(line)
 
     def finish(self) -> None:
-        """Run everything."""
-        kept, observe = self.runner, self.runner.observe
-        said = (list(kept.syntax_problems), kept.problem_count)
-        passed: list[tuple[Line, State]] = []
-        if observe is not None:
-            # What is seen before the file is given up is not what happens on every pass.
-            kept.observe = lambda line, state: passed.append((line, state.copy()))
-        try:
-            spoiled = self._follow()
-            if observe is not None:
-                for line, state in passed:
-                    lost = any(first <= line.number <= last for first, last in spoiled)
-                    observe(line, State() if lost else state)
-        except NotFollowedError:
-            runner = self.runner = Runner(self.name, self.dialect, self._start)
-            runner.syntax_problems, runner.problem_count = said
-            runner.observe = observe
-            self.passes = Passes(runner)
-            self.refer(self._make_calls(runner))
+        """Run everything, without what stands in other files where it cannot be followed."""
+        observe = self.runner.observe
+        said = (list(self.runner.syntax_problems), self.runner.problem_count)
+        ways = [self._elsewhere, Elsewhere()] if self._elsewhere.lines else [self._elsewhere]
+        for self._elsewhere in ways:
+            self.runner.elsewhere = self._elsewhere.places
+            try:
+                self._follow_observed(observe)
+                break
+            except NotFollowedError:
+                runner = self.runner = Runner(self.name, self.dialect, self._start)
+                runner.syntax_problems, runner.problem_count = list(said[0]), said[1]
+                runner.observe = observe
+                self.passes = Passes(runner)
+        else:
+            self.refer(self._make_calls(self.runner))
             self._replay_all()
         self._finish_log()
+
+    def _follow_observed(self, observe: Callable[[Line, State], None] | None) -> None:
+        """Run the file as a script, and tell what is seen when it is certain that it could be."""
+        if observe is None:
+            self._follow()
+            return
+        # What is seen before the file is given up is not what happens on every pass.
+        passed: list[tuple[Line, State]] = []
+        self.runner.observe = lambda line, state: passed.append((line, state.copy()))
+        spoiled = self._follow()
+        for line, state in passed:
+            lost = any(first <= line.number <= last for first, last in spoiled)
+            observe(line, State() if lost else state)
 
     def _follow(self) -> list[tuple[int, int]]:
         """Run the file as a script; lines of which not every pass is known."""
         lines = [line for line, _ in self._kept]
+        more = self._elsewhere.lines
         if self.dialect.text.names:
-            script: Script = named_script(lines)
+            script: Script = named_script([*lines, *more])
         else:
-            script = macro_script([line for line in lines if not line.block.percent], self.dialect)
+            own = [line for line in lines if not line.block.percent]
+            script = macro_script([*own, *more], self.dialect)
         runner = self.runner
         follower = Follower(runner, script)
         follower.follow()

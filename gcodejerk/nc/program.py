@@ -18,9 +18,10 @@ from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
 from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.flow.elsewhere import Elsewhere, find_elsewhere
 from gcodejerk.nc.flow.outline import find_outline, may_go_back, read_body, refers, seekable
 from gcodejerk.nc.flow.subprograms import Calls
-from gcodejerk.nc.following_reader import FollowingReader, worth_following
+from gcodejerk.nc.following_reader import MOST_BYTES, FollowingReader, worth_following
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.neighbours import with_neighbours
 from gcodejerk.nc.interpreter.rapids import Rapids
@@ -64,6 +65,8 @@ class Program:
     """Byte offset where a comment line may be inserted first."""
     findings: tuple[Finding, ...]
     rapids: Rapids
+    subprograms: tuple[str, ...] = ()
+    """Files, of `Start.subprograms`, in which the program goes on."""
 
 
 def parse_block(text: bytes, dialect: str | Dialect = "linuxcnc") -> Block:
@@ -187,8 +190,12 @@ def open_reader(
         def calls(runner: Runner) -> Calls:
             return Calls(runner, outline, lambda mark: read_body(source, origin, mark, chosen))
 
-        if worth_following(source, chosen):
-            reader = FollowingReader(name, chosen, start, calls)
+        elsewhere = Elsewhere()
+        if start.subprograms and len(text := source.read(MOST_BYTES + 1)) <= MOST_BYTES:
+            elsewhere = find_elsewhere(text, start.subprograms, chosen)
+        source.seek(origin)
+        if elsewhere.lines or worth_following(source, chosen):
+            reader = FollowingReader(name, chosen, start, calls, elsewhere)
         else:
             reader = Reader(name, chosen, start)
             reader.refer(calls(reader.runner))
@@ -243,6 +250,7 @@ def follow(
         insert_at=reader.insert_at,
         findings=reader.findings(rapids),
         rapids=rapids,
+        subprograms=reader.used,
     )
 
 

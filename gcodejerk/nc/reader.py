@@ -44,7 +44,7 @@ class Reader:
         self.runner = Runner(name, dialect, start)
         self._spindle = start.spindle
         self.flow = Flow()
-        self.passes = Passes(self.runner)
+        self.passes = Passes(self.runner, start.subprograms)
         self.calls: Calls | None = None
         self.blocks = 0
         self.percent: int | None = None
@@ -60,6 +60,11 @@ class Reader:
     def state(self) -> State:
         """The state in force."""
         return self.runner.state
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Files in which subprograms were found."""
+        return tuple(self.passes.used)
 
     @property
     def log(self) -> RapidLog:

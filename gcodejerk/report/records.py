@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
+from gcodejerk.machine.subprograms import sum_of
 from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
@@ -303,8 +304,20 @@ def process_head(result: Result, machine: Machine, output: str | None) -> Record
         "dialect": result.program.dialect,
         "summary": summary_of(result),
         "notes": list(result.notes),
+        **_subprograms(result, machine),
         "verified": None if result.verification is None else result.verification.ok,
     }
+
+
+def _subprograms(result: Result, machine: Machine) -> Record:
+    """Files of others that the program goes on in, with the sums of their bytes."""
+    files = {} if machine.subprograms is None else machine.subprograms.files
+    used = [
+        {"file": name, "sum": sum_of(files[name])}
+        for name in result.program.subprograms
+        if name in files
+    ]
+    return {"subprograms": used} if used else {}
 
 
 def place_record(rapids: Rapids, row: int, block: str) -> Record:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.cycles.expansion import Expansion, expand
 from gcodejerk.cycles.line_map import LineMap
+from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
 from gcodejerk.verification import Verification, Violation, require, verify_files
@@ -69,9 +70,17 @@ def written_out(
 
     Raises
     ------
+    EmitError
+        There are subprograms in other files.
     VerifyError
         What was written is not right.
     """
+    if machine.subprograms is not None:
+        raise EmitError(
+            "--expand-cycles and subprograms of other files are not possible together: a cycle may "
+            "go on in a file that stays as it is",
+            "leave one of them out (--subprograms, or program.subprograms of the machine file)",
+        )
     with tempfile.SpooledTemporaryFile(max_size=SPOOL) as file:
         between = cast(BinaryIO, file)
         source.seek(0)

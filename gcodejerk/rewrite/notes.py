@@ -12,6 +12,9 @@ from gcodejerk.nc import Program
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Residuals
 
+_NAMED = 8
+"""Files that are named."""
+
 LONGER = 1e-6
 """A rapid that lasts so much longer is worth a word. [s]"""
 
@@ -36,10 +39,26 @@ def operator_notes(emitter: Controller, machine: Machine, plans: Plans) -> list[
     return notes
 
 
-def program_notes(program: Program, expansion: Expansion | None, emitter: Controller) -> list[str]:
+def subprogram_notes(program: Program, machine: Machine) -> list[str]:
+    """That rapids rest on what stands in other files, by their names."""
+    if not program.subprograms:
+        return []
+    count = len(program.subprograms)
+    named = ", ".join(program.subprograms[:_NAMED]) + (", .." if count > _NAMED else "")
+    folder = "" if machine.subprograms is None else machine.subprograms.folder
+    return [
+        f"followed into {count} {'file' if count == 1 else 'files'} of {folder} ({named}): the "
+        "control has to have the same there; process again when one of them changes"
+    ]
+
+
+def program_notes(
+    program: Program, expansion: Expansion | None, emitter: Controller, machine: Machine
+) -> list[str]:
     """What was found in the program, and what its dialect means for the control."""
     findings = (*program.findings, *(() if expansion is None else expansion.findings))
     notes = [_finding(finding.line, finding.message) for finding in findings]
+    notes += subprogram_notes(program, machine)
     home = DIALECT_OF_CONTROLLER.get(emitter.name)
     if emitter.in_place and home is not None and not program.dialect.startswith(home):
         notes.append(

@@ -264,7 +264,7 @@ def _process(
         expansion=expansion,
         notes=(
             *operator_notes(emitter, machine, plans),
-            *program_notes(program, expansion, emitter),
+            *program_notes(program, expansion, emitter, machine),
             *what_if,
             *instead_notes(source, plans, emitter.name),
             *dogleg_notes(plans, deviation),

@@ -83,7 +83,7 @@ def set_control(
         notes=(
             *operator_notes(emitter, machine, plans),
             *inserted.settings.notes,
-            *program_notes(program, None, emitter),
+            *program_notes(program, None, emitter, machine),
         ),
         settings=inserted.settings,
     )

@@ -9,7 +9,8 @@ import io
 import math
 import operator
 import random
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -413,16 +414,34 @@ class Control:
         self.passes.append((self.places[id(statement)], before, tuple(self.at), rapid))
 
 
-def judge(programs, writer, dialect, hidden):
+def cut(data):
+    """A file with its subprograms in files of their own: with their heads, and by their names."""
+    heads = list(re.finditer(rb"^(?:%_N_(SUB_S[12])_SPF|O([12]000))\n", data, re.MULTILINE))
+    ends = [*(head.start() for head in heads[1:]), len(data)]
+    files = {}
+    for k, (head, end) in enumerate(zip(heads, ends, strict=True)):
+        name, body = (head[1] or b"").decode() or f"O{head[2].decode()}", data[head.end() : end]
+        ending = "spf" if head[1] else "nc"
+        files[f"{name}.{ending}" if k else f"any/other{k}.{ending}"] = (
+            b"" if k else head[0]
+        ) + body
+    return data[: heads[0].start()], files
+
+
+def judge(programs, writer, dialect, hidden, apart=False):
     """Check both readers; rapids that ran, those that are certain, and those that are confirmed."""
     data = writer.file(programs)
     control = Control(programs, writer.places, hidden, dialect == "siemens")
     start = STARTS[dialect]
+    if apart:
+        data, files = cut(data)
+        start = replace(start, subprograms=files)
     try:
         control.body(programs[""])
     except TooLongError:
         return None
-    shown = data.decode()
+    shown, lines = data.decode(), data.count(b"\n")
+    control.passes = [each for each in control.passes if each[0] <= lines]
     after = {n: p for n, p, _ in trace(io.BytesIO(data), dialect=dialect, start=start)}
     rapids = read_program(io.BytesIO(data), dialect=dialect, start=start).rapids
     certain = {int(rapids.line[i]): i for i in range(len(rapids)) if rapids.reason[i] == CERTAIN}
@@ -476,6 +495,24 @@ def test_without_unknown_variables_everything_is_known(dialect, writer):
             certain = int((rapids.reason == CERTAIN).sum())
             assert certain == confirmed, data.decode()
             assert certain >= alike, data.decode()
+
+
+@pytest.mark.parametrize(("dialect", "writer"), WRITERS)
+def test_subprograms_in_files_of_their_own_are_followed_like_those_of_the_file(dialect, writer):
+    followed = 0
+    for seed in SEEDS[:12]:
+        drawing, hidden = Drawing(seed, hidden=seed % 2 == 1).file(), (2.0, 3.0)
+        judged = judge(drawing, writer(), dialect, hidden, apart=True)
+        if judged is None:
+            continue
+        data, rapids, _, confirmed = judged
+        lines = rapids.line[rapids.reason == CERTAIN].tolist()
+        assert confirmed == len(lines) or seed % 2, seed
+        _, rapids, *_ = judge(drawing, writer(), dialect, hidden)
+        own = rapids.line[rapids.reason == CERTAIN].tolist()
+        assert lines == [line for line in own if line <= data.count(b"\n")]
+        followed += len(lines)
+    assert followed > 8
 
 
 @pytest.mark.parametrize(("dialect", "writer"), WRITERS[:2])

@@ -54,7 +54,7 @@ ROOMS = {
  <- maps rounding | search | servo | threads
 """),
     "machine": order("""
-    drives
+    drives subprograms
  <- parts problems reading
  <- spectrum find
  <- file

@@ -64,6 +64,9 @@ def test_the_dialect_is_found(text, dialect):
     ("text", "dialect"),
     [
         (b"%\r\nO1000\r\nG90 G0 X1.\r\n", "iso-mill"),
+        # macro B is the language of both, tape or not
+        (b"O1000\nG0 X1.\nIF [#1 GT 2.] GOTO 10\nN10 M30\n", "iso-mill"),
+        (b"G0 X1.\nWHILE[#1 LT 2.]DO1\n#1=#1+1.\nEND1\n", "iso-mill"),
         (b"%\n\nO1000 (PART)\nG90 G0 X1.\n", "iso-mill"),
         (b"(Exported by a program)\nG90 G0 X1\n", "rs274"),
         (b"; roughing\nG90 G0 X1\n", "rs274"),

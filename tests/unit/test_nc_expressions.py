@@ -7,6 +7,9 @@ import pytest
 
 from gcodejerk.nc import DIALECTS, Start, read_program, trace
 from gcodejerk.nc.interpreter.expressions import evaluate
+from gcodejerk.reasons import CERTAIN
+from gcodejerk.verification.findings import Findings
+from gcodejerk.verification.second_reading.agreement import confirm
 
 HEADS = {
     "linuxcnc": b"G21 G90 G94 G17 G40 G0 X0 Y0 Z0\n",
@@ -172,3 +175,40 @@ def test_computed_feed_can_be_restored_where_it_is_short():
     for feed, known in ((b"#1", True), (b"[#1/3]", False)):
         program = read_program(io.BytesIO(head + b"F" + feed + b"\nG0 X5\nG1 X6\nM2\n"))
         assert (int(program.rapids.reason[-1]) == 255) is known
+
+
+# --- rapids of LinuxCNC to computed positions ---
+
+COMPUTED = b"""G21 G90 G17 G40 G64 F100
+#1=5 #<safe>=7.5
+#2=[#1*2-#<safe>] #<a b>=[-#1]
+G0 X0 Y0 Z0
+G0 Z#<safe>
+G0 X[#1 * 2] Y[#<Safe>/2]
+G0 X#2 Y[#<ab>+0.25]
+G0 X[1/3]
+G0 X[0.1+0.2]
+G0 X#3
+G0 Z1
+M2
+"""
+
+
+def test_a_number_of_six_decimals_is_certain_for_both_readers():
+    places = dict.fromkeys("XYZ", 1.0)
+    start = Start(positions=places)
+    rapids = read_program(io.BytesIO(COMPUTED), start=start).rapids
+    certain = [i for i, reason in enumerate(rapids.reason.tolist()) if reason == CERTAIN]
+    assert rapids.line[certain].tolist() == [4, 5, 6, 7, 11]
+    assert rapids.target[certain, :3].tolist() == [
+        [0.0, 0.0, 0.0], [0.0, 0.0, 7.5], [10.0, 3.75, 7.5], [2.5, -4.75, 7.5],
+        pytest.approx([math.nan, -4.75, 1.0], nan_ok=True),
+    ]  # fmt: skip
+    found = Findings(9)
+    confirmed = confirm(io.BytesIO(COMPUTED), "linuxcnc", start, rapids, certain, found)
+    assert (confirmed, found.violations) == (5, [])
+    # a variable that one of the readers takes for another is noticed
+    for row in certain[1:4]:
+        rapids.target[row] += 0.0001
+    confirm(io.BytesIO(COMPUTED), "linuxcnc", start, rapids, certain, found)
+    assert len(found.violations) == 3

@@ -1,6 +1,7 @@
 """Knowing again after not knowing: what a block can touch, and since when what is unknown."""
 
 import io
+import random
 
 import pytest
 
@@ -279,3 +280,109 @@ def test_a_rapid_beside_such_a_word_is_refused(dialect, block):
     confirmed, violations = judged(believed, text, dialect, 0)
     assert confirmed == 0
     assert [v.original_line for v in violations] == [2]
+
+
+def test_what_a_refused_block_leaves_unknown_is_not_called_compensation():
+    reasons, notes = read(b"F9 G0 X1\nFOO P2\nG0 X2\nG5 P9 X4\nG0 X3\nM30\n", "siemens")
+    assert reasons[:2] == [None, "behind a call, jump or loop that is not followed"]
+    assert "cutter compensation active" not in reasons
+    assert not any("refuse" in note for note in notes if "FOO" in note)
+    reasons, _ = read(b"G0 X1 F9\nG1 G41 X1. X2.\nG0 X2\nM30\n", "fanuc")
+    assert reasons == [None, "block not understood"]
+
+
+# --- a code beside G80, and a system that only one reader still knows ---
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc", "mach"])
+def test_beside_g80_the_other_code_of_its_group_counts_for_both_readers(dialect):
+    text = b"G0 X1. F9.\nG90 G80 G0 X2.\nG0 G80\nX3.\nM30\n"
+    assert read(text, dialect)[0] == [None, None, None]
+
+
+def test_two_codes_of_a_group_are_still_no_rapid():
+    reasons, _ = read(b"G0 X1. F9.\nG0 G1 X2.\nG0 X3.\nM30\n", "linuxcnc")
+    assert reasons[0] is None
+    assert reasons[1:] == ["block not understood", "start unknown"]
+
+
+# --- threads ---
+
+
+class Lathe:
+    """Runs G0, G1, G32 and G33 with X as a diameter, and U and W as increments."""
+
+    def __init__(self):
+        self.x, self.z = 0.0, 0.0
+
+    def block(self, words):
+        before = (self.x, self.z)
+        self.x += words.get("U", 0.0) / 2.0
+        self.x = words["X"] / 2.0 if "X" in words else self.x
+        self.z = words.get("Z", self.z + words.get("W", 0.0))
+        return before, (self.x, self.z)
+
+
+@pytest.mark.parametrize(("dialect", "thread"), [("fanuc-lathe-a", 32), ("fanuc-lathe-b", 33)])
+def test_a_thread_ends_where_it_says(dialect, thread):
+    """Drawn threads, each of one to three passes of G32 or G33, and the ways back."""
+    draw = random.Random(thread)
+    control, text, expected = Lathe(), ["G0 X50. Z2. F9."], {}
+    control.block({"X": 50.0, "Z": 2.0})
+    for _ in range(40):
+        code = draw.choice([0, 0, 1, thread, thread])
+        names = draw.sample(["X", "Z"], draw.randint(1, 2))
+        if dialect == "fanuc-lathe-a":
+            names = [draw.choice([n, {"X": "U", "Z": "W"}[n]]) for n in names]
+        words = {name: draw.randint(-40, 60) / 4.0 for name in names}
+        before, after = control.block(words)
+        lead = " F1.5" if code == thread else ""
+        text.append(f"G{code} " + " ".join(f"{n}{v:.2f}" for n, v in words.items()) + lead)
+        if code == 0 and before != after:
+            expected[len(text)] = before, after
+    data = "\n".join([*text, "M30", ""]).encode()
+    feed = "G99" if dialect == "fanuc-lathe-a" else "G90 G95"
+    start = Start(positions=POSITIONS, startup=f"G21 G18 G40 {feed}", diameter=True)
+    rapids = read_program(io.BytesIO(data), dialect=dialect, start=start).rapids
+    certain = [i for i, r in enumerate(rapids.reason.tolist()) if r == CERTAIN]
+    assert {int(rapids.line[i]) for i in certain} >= set(expected)
+    for i in certain:
+        if (line := int(rapids.line[i])) in expected:
+            before, after = expected[line]
+            named = [k for k in (0, 2) if rapids.words[i] >> k & 1]
+            for k in named:
+                assert rapids.start[i, k] == pytest.approx(before[k // 2])
+                assert rapids.target[i, k] == pytest.approx(after[k // 2])
+    found = Findings(99)
+    assert confirm(io.BytesIO(data), dialect, start, rapids, certain, found) == len(certain)
+    assert not found.violations
+    # a start that is wrong behind a thread is noticed
+    behind = next(
+        i for i in certain
+        if text[rapids.line[i] - 2].startswith(f"G{thread} ") and rapids.words[i] & 1
+    )  # fmt: skip
+    rapids.start[behind, 0] += 0.1
+    confirm(io.BytesIO(data), dialect, start, rapids, [behind], found)
+    assert found.violations
+
+
+# --- the spindle of a word, in LinuxCNC ---
+
+
+@pytest.mark.parametrize("words", [b"M3 $0 S100", b"m5$-1", b"S7 M4 $ 1.", b"$0 M3 S1"])
+def test_a_spindle_is_a_word_of_linuxcnc(words):
+    text = b"F9 G0 X1 Z1\n" + words + b"\nG0 X2\nM2\n"
+    assert read(text, "linuxcnc")[0] == [None, None]
+    # other controls refuse it, and who refuses may be led on by hand
+    assert read(text, "mach")[0] != [None, None]
+
+
+@pytest.mark.parametrize("words", [b"M3 $#5", b"M3 $1 2", b"$ M3"])
+def test_what_is_no_number_of_a_spindle_is_not_understood(words):
+    reasons, notes = read(b"F9 G0 X1\n" + words + b"\nG0 Z2\nM2\n", "linuxcnc")
+    assert reasons[1] is not None or any("not understood" in note for note in notes)
+
+
+def test_beside_a_spindle_a_rapid_stays_as_it_is():
+    reasons, _ = read(b"F9 G0 X1\nG0 X2 M3 $0\nG0 X3\nM2\n", "linuxcnc")
+    assert reasons == [None, "other words of the block cannot keep their order", None]

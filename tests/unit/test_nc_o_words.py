@@ -67,7 +67,7 @@ def test_line_that_is_a_rapid_on_one_pass_only_is_left_alone():
 def test_rapids_of_a_subprogram_are_certain_if_all_calls_agree():
     sub = b"o1 sub\nG0 X#1\nG0 Z5\nG1 Z-1\nG0 Z5\no1 endsub\n"
     found = reasons(sub + b"o1 call [3]\no1 call [4]\n")
-    assert found == {2: Reason.EXPRESSION, 3: Reason.SUBPROGRAM, 5: None}
+    assert found == {2: Reason.SUBPROGRAM, 3: Reason.SUBPROGRAM, 5: None}
 
 
 def test_subprogram_that_is_never_called_is_left_alone():

@@ -33,6 +33,7 @@ from gcodejerk.machine.parts import (
 )
 from gcodejerk.machine.problems import Problems, place_order
 from gcodejerk.machine.spectrum import load_spectrum
+from gcodejerk.machine.subprograms import Subprograms, load_subprograms
 from gcodejerk.start import CycleSettings
 
 JERK_OVER_RAPID = 10.0
@@ -73,8 +74,10 @@ def load_text(text: str, name: str) -> Description:
     folder = Path(name).parent
     structure = structure_of(values.get("structure", {}), values.get("axes", {}), folder, checker)
     planners = choose_planners(values, checker)
+    subprograms = _subprograms(values, folder, checker)
     problems.raise_any()
-    return replace(_machine(values, spectra, planners, name, checker), structure=structure)
+    described = _machine(values, spectra, planners, name, checker)
+    return replace(described, structure=structure, subprograms=subprograms)
 
 
 def _check_axis_types(values: dict[str, Any], checker: Checker) -> None:
@@ -223,6 +226,19 @@ def _spectra(values: dict[str, Any], folder: Path, checker: Checker) -> dict[str
                 error.remedy,
             )
     return spectra
+
+
+def _subprograms(values: dict[str, Any], folder: Path, checker: Checker) -> Subprograms | None:
+    """Read the folder of subprograms."""
+    given = values.get("program", {}).get("subprograms")
+    if given is None:
+        return None
+    try:
+        return load_subprograms(given, folder)
+    except MachineError as error:
+        path: KeyPath = ("program", "subprograms")
+        checker.problems.add(checker.place(path), f"{dotted(path)}: {error.problem}", error.remedy)
+    return None
 
 
 def _machine(

@@ -93,6 +93,11 @@ def machine_yaml(machine: Description) -> str:
                 else []
             ),
             *_cycles(program.cycles),
+            *(
+                [f"  subprograms: {quoted(machine.subprograms.folder)}"]
+                if machine.subprograms is not None
+                else []
+            ),
             "",
         ]
     )
@@ -163,11 +168,14 @@ def settings_text(machine: Description) -> str:
     Returns
     -------
     str
-        What `machine_yaml` writes, with what is in a spectrum file in place of its name.
+        What `machine_yaml` writes, with what is in a spectrum file or in a folder of subprograms in
+        place of its name.
     """
     structure = None if machine.structure is None else digest(machine.structure)
     axes = tuple(_with_lines(axis) for axis in machine.axes)
-    return machine_yaml(replace(machine, axes=axes, structure=structure))
+    files = machine.subprograms
+    files = None if files is None else replace(files, folder=files.digest)
+    return machine_yaml(replace(machine, axes=axes, structure=structure, subprograms=files))
 
 
 def _with_lines(axis: Axis) -> Axis:

@@ -83,8 +83,8 @@ CODE = (
     _code("linuxcnc", rb"(?<![A-Z_])G(5\.2|5\.3|33\.1)(?!\d)", "a LinuxCNC G code"),
     _code("fanuc", rb"(?<![A-Z_])G(5\.1\s*Q|68\.2|43\.[45]|10\.6)(?!\.)", "a Fanuc G code"),
     *(_code(name, rb"(?<![A-Z_])G54\.1(?!\d)", "G54.1", sure=False) for name in ("fanuc", "mach")),
-    _code("fanuc", rb"(?<![A-Z_])(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)",
-          "Fanuc macro flow", sure=False),
+    *(_code(name, rb"(?<![A-Z_])(IF|WHILE)\s*\[.*\]\s*(GOTO|THEN|DO)", "flow of macro B",
+            sure=False) for name in ("fanuc", "haas")),
     _code("haas", rb"(?<![A-Z_])G(187|154)\s*P", "a Haas G code"),
     # increments U and W, which system A alone has, in a block that no mill has
     _code("fanuc-lathe-a", rb"(?<![A-Z_])G28\s*U\s*[-+.\d]+\s*W", "G28 U W of lathes"),
@@ -210,6 +210,9 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
     _prefer(found, code)
     chosen = found or hints
     _refuse_mills(chosen, code, comments, lathe, name)
+    if not found and set(chosen) == {"fanuc", "haas"}:
+        why = f"{chosen['fanuc']}, which Fanuc and Haas have; which of the two, nothing tells"
+        return DIALECTS["iso-mill"], f"{why}, so as what both read alike"
     if len(chosen) == 1:
         ((dialect, why),) = chosen.items()
         return DIALECTS[dialect], why

@@ -98,8 +98,11 @@ LINUXCNC = Dialect(
         70: "diameter",
         80: "radius",
     },
-    letters="FSTXYZABCUVWDEHIJKLPQR",
+    letters="FSTXYZABCUVWDEHIJKLPQR$",  # $0: a spindle
     uses={
+        "$": code_names(
+            *("M3", "M4", "M5", "M19", "M51", "G33", "G33.1", "G76", "G95", "G96", "G97"),
+        ),
         "D": code_names("G41", "G41.1", "G42", "G42.1", "G96"),
         "E": code_names("M66", "M67", "M68", "G76"),
         "H": code_names("G43", "G43.2", "G76"),

@@ -11,12 +11,16 @@ followed: everything behind it is unknown, and the rapids in it are left alone.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from gcodejerk.nc.flow.elsewhere import find_o_word
 from gcodejerk.nc.flow.structures import Node, plain_name
 from gcodejerk.nc.interpreter.expressions import evaluate
 from gcodejerk.nc.interpreter.modal import State, agree, join
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.runner import Runner
 from gcodejerk.nc.interpreter.variables import is_local
+from gcodejerk.nc.text.block import ELSEWHERE
 
 EXACT = 50_000
 """Executed lines, over the whole program, up to which conditions are followed."""
@@ -55,8 +59,10 @@ def _add(exits: Exits, more: Exits) -> None:
 class Passes:
     """Runs structures and subprograms; keeps the subprograms of the file."""
 
-    def __init__(self, runner: Runner) -> None:
-        self.runner = runner
+    def __init__(self, runner: Runner, files: Mapping[str, bytes] | None = None) -> None:
+        self.runner, self._files = runner, files or {}
+        self.used: dict[str, None] = {}
+        """Files in which subprograms were found."""
         self._subs: dict[str, Node | None] = {}
         self._spent = self._kept = 0
         self._depth = 0
@@ -326,7 +332,7 @@ class Passes:
         """Run a subprogram with variables of its own."""
         self._count()
         name = plain_name(node.line.block.o_name)
-        sub = None if name is None else self._subs.get(name)
+        sub = None if name is None else self._sub(name)
         if sub is None:
             self.lose()
             self._uncertain()
@@ -355,6 +361,22 @@ class Passes:
                 back.forget()  # a break out of the subprogram: LinuxCNC refuses it
             exits[NEXT] = back
         return exits
+
+    def _sub(self, name: str) -> Node | None:
+        """The subprogram of a name: of this file, if it stands in front, or of one of its own."""
+        if name in self._subs or not self._files:
+            return self._subs.get(name)
+        runner = self.runner
+        first = ELSEWHERE * (1 + len(self.used))
+        found = find_o_word(name, self._files, runner.dialect, first)
+        if found is None:
+            return None
+        file, sub = found
+        self.used[file] = None
+        runner.elsewhere.append((first, file, 1))
+        self._kept += sub.last - sub.line.number
+        self._subs[name] = None if self._kept > MOST_KEPT else sub
+        return self._subs[name]
 
     def _replace_locals(self, state: State, values: dict[str, float]) -> None:
         """Give a state other variables of the subprogram's own."""

@@ -23,6 +23,10 @@ _INCREMENT = 0.001
 _GROUPED_M = frozenset({"stop", "spindle", "coolant", "tool"})
 
 
+_DECIMALS = 6
+"""Of a computed number where the control rounds none."""
+
+
 @dataclass(slots=True)
 class Codes:
     """The words of a block, sorted."""
@@ -115,6 +119,11 @@ def sort_words(
     return codes
 
 
+def _is_written_out(value: float) -> bool:
+    """Whether a number is the one that its first decimals say, to the last bit."""
+    return value == float(f"{value:.{_DECIMALS}f}")
+
+
 class _Sorter:
     """Puts the words of a block where they belong, one by one."""
 
@@ -137,7 +146,8 @@ class _Sorter:
         inch = self._inch and not _states_units(self._block, self._dialect)
         value = word_value(word, known, rules, inch)
         # A position of whole increments can be written as a number; a quotient can not.
-        codes.expression = codes.expression or rules.exact or value != value
+        exact = rules.exact and not _is_written_out(value)
+        codes.expression = codes.expression or exact or value != value
         return value
 
     def g_code(self, word: Word, value: float) -> None:

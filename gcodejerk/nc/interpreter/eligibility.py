@@ -233,6 +233,7 @@ def _other_words(codes: Codes, dialect: Dialect, step: Step) -> bool:
     """Whether words stand in the block that act neither before nor after its motion for certain."""
     # Where the table does not say what a letter is for, nobody knows what it does to a rapid.
     others = set() if dialect.uses else set(codes.values) - set(AXES) - set("FST")
+    others |= {"$"} & set(codes.values)  # which of the words it belongs to, no line says
     return (
         any(not _keeps_its_place(code, dialect, step) for code in codes.g.values())
         or not dialect.before_m | dialect.after_m >= set(codes.m)

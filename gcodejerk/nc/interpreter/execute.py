@@ -132,7 +132,7 @@ class Executor(Phases):
             step.ends = False
         touched, state.touched = state.touched, before
         state.ended = ended
-        state.forget_touched(touched)
+        state.forget_touched(touched, Reason.NOT_UNDERSTOOD)
         if block.problem is not None or not self.dialect.strict:
             # A control that is not strict may run what we refuse, and move what it does not name.
             state.forget_positions()

@@ -303,8 +303,10 @@ class State:
         self.forget()
         self.offsets, self.touched = offsets, touched
 
-    def forget_touched(self, touched: Iterable[str | int]) -> None:
-        """Forget fields and axes that may or may not have been changed."""
+    def forget_touched(self, touched: Iterable[str | int], because: Reason | None = None) -> None:
+        """Forget fields and axes that may or may not have been changed, and name the reason."""
+        touched = list(touched)
+        named = [name for name in _NAMED_LOST if name in touched] if because else []
         for name in touched:
             if isinstance(name, int):
                 self.move(name, NAN)
@@ -314,6 +316,9 @@ class State:
                 self.set_variable(name[1:], NAN)
             else:
                 self.lose(name)
+        if because is not None:
+            lost = {n: Loss(self.line, because) for n in named if getattr(self, n) is None}
+            self.lost = {**self.lost, **lost}
 
     def unknown(self, mode: str) -> bool:
         """Whether a mode is not known."""

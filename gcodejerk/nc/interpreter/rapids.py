@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.interpreter.visits import Row, Visits
+from gcodejerk.nc.text.block import ELSEWHERE
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
@@ -223,6 +224,9 @@ class RapidLog:
             empty: NDArray[np.generic] = np.empty((0, width) if width else 0, dtype=dtype)
             columns[name] = np.concatenate([empty, *parts]).astype(dtype, copy=False)
         self._merge_visits(columns)
+        own = columns["line"] < ELSEWHERE
+        if not own.all():
+            columns = {name: column[own] for name, column in columns.items()}
         # In G93 every feed move carries its own F.
         mode, feed = columns["feed_mode"], columns["feed"]
         unknown = (mode == 0) | ((mode != 93) & columns["feed_needed"] & np.isnan(feed))

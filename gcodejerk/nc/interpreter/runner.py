@@ -58,6 +58,8 @@ class Runner:
         """Called where programs run that are not followed."""
         self.observe: Callable[[Line, State], None] | None = None
         """Called behind every line that may run more than once."""
+        self.elsewhere: list[tuple[int, str, int]] = []
+        """Of lines in other files: number of the first, the file, its number there; ascending."""
 
     @property
     def state(self) -> State:
@@ -195,10 +197,12 @@ class Runner:
         for number, (line, count) in sorted(self._lost.items())[:_SHOWN]:
             text = line.text.strip()[:40].decode("latin-1")
             rapids = "1 rapid" if count == 1 else f"{count} rapids"
+            name, at = self._place(number)
+            since = "this line" if name == self.name else f"line {at} of {name}"
             found.append(
                 Finding(
-                    number,
-                    f"what is in force is unknown since this line ({text}): {rapids} left "
+                    number if name == self.name else None,
+                    f"what is in force is unknown since {since} ({text}): {rapids} left "
                     "alone; state the modes again behind it (G40, G90, G21 and their kin)",
                 )
             )
@@ -208,7 +212,17 @@ class Runner:
         """Note a line that is not understood."""
         self.problem_count += 1
         if len(self.syntax_problems) < _SHOWN:
-            place = Place(self.name, line.number, column, line.text[:200].decode("latin-1"))
+            name, number = self._place(line.number)
+            place = Place(name, number, column, line.text[:200].decode("latin-1"))
+            there = "" if name == self.name else f"line {number} of {name}: "
             self.syntax_problems.append(
-                Finding(line.number, f"block not understood: {problem}", place)
+                Finding(None if there else number, f"{there}block not understood: {problem}", place)
             )
+
+    def _place(self, number: int) -> tuple[str, int]:
+        """File and number of a line, which may stand in another file."""
+        found = self.name, number
+        for first, name, there in self.elsewhere:
+            if first <= number:
+                found = name, there + number - first
+        return found

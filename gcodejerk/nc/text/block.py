@@ -63,6 +63,10 @@ class Block:
     names: tuple[Name, ...] = ()
 
 
+ELSEWHERE = 1_000_000_000
+"""Numbers of lines in other files begin here: they run with the program, and are not its own."""
+
+
 @dataclass(frozen=True, slots=True)
 class Line:
     """A line with its place in the file, kept where it may run more than once."""

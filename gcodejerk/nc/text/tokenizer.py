@@ -25,6 +25,7 @@ _IDENTIFIER = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
 _INDEX = re.compile(rb"[0-9]*")
 _R_ELEMENT = re.compile(rb"R[ \t]*\[", re.IGNORECASE)
 _FUNCTION = re.compile(rb"(IC|AC|DC|ACP|ACN)[ \t]*\(", re.IGNORECASE)
+_SPINDLE = re.compile(rb"\$[ \t]*(-?[0-9]+)\.?(?![-+0-9. \t#\[]*[-+0-9.#\[])")
 _TO_BLANK = re.compile(rb"[^ \t;]*")
 _TO_COMMENT = re.compile(rb"[^;]*")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
@@ -356,6 +357,9 @@ class _Line(Cursor):
             end = _TO_COMMENT.match(text, self.at).end()  # type: ignore[union-attr]
             self.names.append(Name("$", text[self.at : end]))
             self.at = end
+        elif "$" in self.dialect.letters and (match := _SPINDLE.match(text, self.at)):
+            self.words.append(Word("$", float(match[1]), self.at, match.end(), match[0]))
+            self.at = match.end()
         elif byte == b":" and rules.o_word == "program" and not self.words:
             self.flow()
         elif rules.checksum and _CHECKSUM.fullmatch(text, self.at):

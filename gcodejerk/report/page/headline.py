@@ -130,7 +130,7 @@ def _extra(summary: Record) -> str:
 
 
 def _change(summary: Record, unit: Unit, before: str, after: str) -> str:
-    """`falls from 469 to 31.1 um, to 6.6 %`."""
+    """`falls from 469 to 30.9 um, to 6.6 %`."""
     now, then = summary[before], summary[after]
     if now is None or then is None:
         return "is not known"

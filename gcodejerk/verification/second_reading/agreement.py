@@ -23,6 +23,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.second_reading.elsewhere import lines_elsewhere
 from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
 from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
 from gcodejerk.verification.second_reading.routes import LostError, calls, flows
@@ -234,8 +235,12 @@ def observations(
     original.seek(begin)
     walks = flows(whole, dialect)
     walked = None
-    if len(whole) <= MOST_BYTES and (walks or calls(whole, dialect)):
-        walked = _walked(whole, stepper, lambda: _begin(text, dialect, start))
+    if len(whole) <= MOST_BYTES:
+        more = _elsewhere(whole, dialect, start)
+        for rest in ([more] if more else []) + ([[]] if walks or calls(whole, dialect) else []):
+            walked = _walked(whole, stepper, lambda: _begin(text, dialect, start), rest)
+            if walked is not None:
+                break
     if walked is not None or walks:
         seen = walked or {}
         yield from ((k, seen.get(line - 1, Observation())) for k, line in enumerate(lines))
@@ -284,13 +289,22 @@ def observations(
             number, at = number + 1, end + 1
 
 
+def _elsewhere(whole: bytes, dialect: Dialect, start: Start) -> list[bytes]:
+    """Lines of other files that a program goes on in."""
+    rules = dialect.text
+    numbered = bool(rules.keywords) and rules.o_word == "program"
+    if not start.subprograms or not (numbered or (rules.names and rules.variables == "R")):
+        return []
+    return lines_elsewhere(whole, start.subprograms, dialect)
+
+
 def _walked(
-    whole: bytes, stepper: Stepper, begin: Callable[[], Tracker]
+    whole: bytes, stepper: Stepper, begin: Callable[[], Tracker], behind: list[bytes]
 ) -> dict[int, Observation] | None:
     """What is seen in the lines of a file with flow, from 0; None where it is not followed."""
     lines = [line.rstrip(b"\r") for line in whole.removeprefix(MARK).split(b"\n")]
     try:
-        return Walker(stepper, begin, lines).walk()
+        return Walker(stepper, begin, [*lines, *behind]).walk()
     except LostError:
         return None
 

@@ -31,7 +31,10 @@ _NAME = re.compile(rb"[$A-Z_][A-Z0-9_]*")
 _SIGN = re.compile(rb"[-+]")
 _HASH_WORD = re.compile(rb"(?<![A-Z])([A-FH-LP-Z])[ \t]*(?=[-+]?[ \t]*[#\[])")
 _NAMED_WORD = re.compile(rb"(?<![A-Z0-9_$])([A-FH-LP-Z])[ \t]*=[ \t]*(?:(IC|AC)[ \t]*\()?")
-_HASH_SET = re.compile(rb"#[ \t]*([0-9]+)[ \t]*=")
+_HASH_SET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
+_HASH_NAME = re.compile(rb"<[^<>]*>")
+_PLAIN = (b"+", b"-", b"*", b"/")
+"""All that is computed where no control rounds: the rest has rules of its own there."""
 _NAMED_SET = re.compile(
     rb"(?<![A-Z0-9_$\]])(R[0-9]+|(?:R|[A-Z_][A-Z_][A-Z0-9_]*)[ \t]*\[[ \t]*[0-9]+[ \t]*\]"
     rb"|[A-Z_][A-Z_][A-Z0-9_]*)"
@@ -64,7 +67,7 @@ class Computer:
     @property
     def computes(self) -> bool:
         """Whether this dialect's variables are followed here."""
-        return self.dialect.text.variables in ("#", "R") and not self.rules.exact
+        return self.dialect.text.variables in ("#", "R")
 
     # --- expressions ---
 
@@ -92,6 +95,8 @@ class Computer:
                     self._work(waiting.pop(), numbers)
                 return numbers[0], at
             operator = match[0]
+            if self.rules.exact and operator not in _PLAIN:
+                raise _UnknownError
             while waiting and ranks[waiting[-1]] >= ranks[operator]:
                 if ranks[operator] == 0 and ranks[waiting[-1]] == 0 and _is_comparison(operator):
                     raise _UnknownError
@@ -124,7 +129,7 @@ class Computer:
         if name == "NOT" and self.named:
             number, at = self._operand(text, match.end(), variables)
             return float(number == 0.0) if number == number else NAN, at
-        if name in self.rules.functions:
+        if name in self.rules.functions and not self.rules.exact:
             return self._function(name, text, match.end(), variables)
         if not self.named:
             raise _UnknownError
@@ -139,8 +144,8 @@ class Computer:
     def _hash(self, text: bytes, at: int, variables: Mapping[str, float]) -> tuple[float, int]:
         """``#5``, ``##5``, ``#[#1+2]``."""
         at = _BLANK.match(text, at).end()  # type: ignore[union-attr]
-        if text[at : at + 1] == b"<":
-            raise _UnknownError
+        if name := _HASH_NAME.match(text, at) if self.rules.exact else None:
+            return variables.get(_key(name[0]), NAN), name.end()
         number, at = self._operand(text, at, variables)
         if not (number == number and abs(number) < 1e6 and number.is_integer()):
             return NAN, at
@@ -263,11 +268,13 @@ class Computer:
             at = end
         return b" ".join([*out, text[at:]]) if out else text
 
-    @staticmethod
-    def _number(letter: bytes, number: float, inch: bool) -> bytes:
+    def _number(self, letter: bytes, number: float, inch: bool) -> bytes:
         """Spell a number, if it is certain to the last digit that counts."""
         if not abs(number) < 1e9:
             return b"#"
+        if self.rules.exact:
+            spelled = b"%.6f" % number
+            return spelled if float(spelled) == number else b"#"
         decimals = 6
         if _FINE.match(letter):
             decimals = 4 if inch and letter not in b"ABC" else 3

@@ -58,6 +58,7 @@ _FLOW = re.compile(
 """The same where the words of flow are not known, behind which comments are left out."""
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
+_SPINDLE = re.compile(rb"\$(-?[0-9]+)\.?(?![-+0-9.#\[])")
 _STRING = re.compile(rb"([A-Z])[ \t]*=[ \t]*\"[^\"]*\"")
 RUN_LINES = 512
 """Lines of a run in one match."""
@@ -240,6 +241,9 @@ class Text:
         if line.flow is None:
             if rules.blanks == "anywhere":
                 text = text.translate(None, _BLANKS)
+            if "$" in self.dialect.letters and b"$" in text:
+                line.words += [("$", float(n), False) for n in _SPINDLE.findall(text)]
+                text = _SPINDLE.sub(b"\0", text)
             self._words(text.replace(b"\0", b" "), line)
         return line
 

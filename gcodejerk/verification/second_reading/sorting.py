@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import HARMLESS, Dialect
+from gcodejerk.nc.dialects.gcodes import G80
 from gcodejerk.verification.second_reading.reading import NAN, Line
 
 LEAST = 0.001
@@ -70,10 +71,14 @@ class Sorted:
         """Sort a code; whether it is known, and the only one of its group."""
         code = round(number * 10.0) if number == number else -1
         group = dialect.groups.get(code)
-        if group is None or abs(number * 10.0 - code) > 1e-3 or group in self.g:
+        if group is None or abs(number * 10.0 - code) > 1e-3:
             return False
-        self.g[group] = code
-        return True
+        there = self.g.get(group)
+        if there not in (None, G80) and code != G80:
+            return False
+        if there in (None, G80):
+            self.g[group] = code  # beside G80, another code of its group is the one that counts
+        return there != code
 
     def _may_stand(self, letter: str, dialect: Dialect) -> bool:
         """Whether a letter is known, and neither it nor its axis stood in the line before."""

@@ -218,7 +218,9 @@ class Tracker(Drilling):
         kinds = set(effects.values())
         burnt = self.spindle != 5
         sure = self.sure_of_systems(effects, block.values)
-        seen = Observation(self._ban(kinds - SELECTIONS if sure else kinds), axes=block.axes)
+        doubted = not sure and self.strayed  # the other reader may know what was lost here
+        certain = SELECTIONS if sure or doubted else frozenset[Effect]()
+        seen = Observation(self._ban(kinds - certain), axes=block.axes)
         self._set_feed(block, kinds)
         ends = self.machine_codes(block)
         self._set_tool(block, seen)
@@ -229,7 +231,7 @@ class Tracker(Drilling):
         seen.end = list(self.at)
         seen.modes = self.in_force()
         burns = self.beam(block, burnt)
-        seen.sure = seen.sure and burns is False
+        seen.sure = seen.sure and burns is False and not doubted
         if burns:
             seen.against = seen.against or "a beam may be on"
         self._stop(block, ends=ends)
