@@ -61,7 +61,8 @@ def plan(
     from gcodejerk.emit import load_controller
     from gcodejerk.planning.lines import Play
     from gcodejerk.planning.move import not_planned, plan_move
-    from gcodejerk.report.records import conventional_motion, dump, move_record, stream_csv
+    from gcodejerk.report.move_record import conventional_motion, move_record, stream_csv
+    from gcodejerk.report.records import dump
     from gcodejerk.report.tables import move_limit, move_tables
 
     described = load_machine(machine)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -22,9 +21,7 @@ from gcodejerk.machine.subprograms import sum_of
 from gcodejerk.motion import whole_intervals
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.designs import known_limits
-from gcodejerk.planning.independent_axes import arrivals, dogleg_notes, path_deviation
-from gcodejerk.planning.move import Plan
+from gcodejerk.planning.independent_axes import arrivals
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left, settling_times
 from gcodejerk.reasons import REASONS
@@ -170,7 +167,7 @@ class Records:
         plans = self.plans
         if plans.machine.positioning == "linear":
             total = float(plans.times[row])
-            return _scaled(self.profiles.segments(of_move.start), float(plans.length[row]), total)
+            return scaled(self.profiles.segments(of_move.start), float(plans.length[row]), total)
         out: Record = {}
         for k in of_move:
             axis = int(np.argmax(plans.share[k] != 0.0))
@@ -178,7 +175,7 @@ class Records:
                 abs(float(plans.share[k, axis])),
                 float(plans.profile_times[k]),
             )
-            out[AXES[axis]] = _scaled(self.profiles.segments(k), length, total)
+            out[AXES[axis]] = scaled(self.profiles.segments(k), length, total)
         return out
 
     def _peak(self, of_move: range) -> Record:
@@ -298,7 +295,7 @@ def process_record(
 
 def process_head(result: Result, machine: Machine, output: str | None) -> Record:
     """The report on one processed program, but for its rapids."""
-    return _head(machine, result.controller, result.form, result.profile) | {
+    return report_head(machine, result.controller, result.form, result.profile) | {
         "input": result.program.name,
         "output": output,
         "dialect": result.program.dialect,
@@ -330,77 +327,7 @@ def place_record(rapids: Rapids, row: int, block: str) -> Record:
     }
 
 
-def _within_band(plan: Plan) -> Record:
-    """What one planned move leaves over the band of its machine, and could leave at best."""
-    worst = float(plan.plans.worst_in_band[0])
-    least = known_limits(plan.plans, band=plan.machine.design.band)
-    if least is None or not np.isfinite(worst):
-        return {}
-    return {
-        "worst_in_band": number(worst),
-        "limit_in_band": number(float(np.fmin(least[0], worst))),
-    }
-
-
-def move_record(plan: Plan) -> Record:
-    """The report on one planned move, in the same form."""
-    limit = known_limits(plan.plans)
-    deviation = path_deviation(plan.batch)
-    records = Records(
-        plan.plans,
-        plan.residual,
-        plan.conventional_residual,
-        limit,
-        deviation,
-    )
-    end = {axis: number(length) for axis, length in plan.displacement.items()}
-    row: Record = {
-        "line": None,
-        "block": None,
-        "start": dict.fromkeys(end, 0.0),
-        "end": end,
-    } | records.motion(0)
-    for entry, (own, usual) in zip(row["residual"], plan.unsampled(), strict=True):
-        entry["profile_acceleration"] = number(own)
-        entry["conventional_profile_acceleration"] = number(usual)
-    if row["limit"] is not None:
-        row |= _within_band(plan)
-    return _head(plan.machine, "csv", "stream", plan.profile) | {
-        "input": None,
-        "output": None,
-        "dialect": None,
-        "summary": {"blocks": 0} | records.summary(),
-        "notes": dogleg_notes(plan.plans, deviation),
-        "verified": None,
-        "rapids": [row],
-    }
-
-
-def conventional_motion(plan: Plan) -> Record:
-    """Time, segments and peaks of the controller's own G0, as the `motion` of a record has them."""
-    plans = plan.plans
-    usual = replace(plans, profiles=plans.conventional)
-    records = Records(usual, plan.residual, plan.conventional_residual)
-    motion = records.motion(0) | {"time": number(plan.conventional_time)}
-    if isinstance(motion["segments"], list):
-        motion["segments"] = _scaled(plans.conventional.segments(0), plan.length, 0.0)
-    else:
-        for k in plans.profiles_of(0):
-            axis = AXES[int(np.argmax(plans.share[k] != 0.0))]
-            motion["segments"][axis] = _scaled(plans.conventional.segments(k), 1.0, 0.0)
-    return motion
-
-
-def stream_csv(plan: Plan) -> bytes:
-    """The stream of a plan as a table: t and every axis of the machine, in mm and degrees."""
-    positions = plan.positions
-    lines = [",".join(["t", *positions])]
-    for row, t in enumerate(plan.t):
-        lines.append(",".join([f"{t:.10g}", *(f"{q[row]:.10g}" for q in positions.values())]))
-    return "\n".join(lines).encode() + b"\n"
-
-
-def _head(machine: Machine, controller: str, form: str, profile: str) -> Record:
+def report_head(machine: Machine, controller: str, form: str, profile: str) -> Record:
     """What every report begins with."""
     return {
         "gcodejerk": __version__,
@@ -427,7 +354,7 @@ def dump(record: Record) -> bytes:
     return text.encode("utf-8", "backslashreplace") + b"\n"
 
 
-def _scaled(segments: list[tuple[float, float]], length: float, time: float) -> list[Record]:
+def scaled(segments: list[tuple[float, float]], length: float, time: float) -> list[Record]:
     """Segments scaled to a length; a rest fills up the time of a profile that is shorter."""
     out = [{"duration": number(d), "jerk": number(j * length)} for d, j in segments]
     rest = time - sum(d for d, _ in segments)

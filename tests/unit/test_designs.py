@@ -17,7 +17,7 @@ from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import PROFILES, plan_moves
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.task import Task, worst_in_band
-from gcodejerk.report.records import move_record
+from gcodejerk.report.move_record import move_record
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 SAME_TIME = ("condition1", "condition2", "condition3", "symmetric", "cascade", "optimal")

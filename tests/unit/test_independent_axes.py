@@ -5,7 +5,7 @@ import pytest
 
 from gcodejerk import Machine, plan_move, process
 from gcodejerk.planning.independent_axes import arrivals, path_deviation
-from gcodejerk.report.records import move_record
+from gcodejerk.report.move_record import move_record
 
 TEXT = """
 interval: 0.001

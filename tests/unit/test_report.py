@@ -14,7 +14,8 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.planning.move import plan_move
 from gcodejerk.reasons import Reason
 from gcodejerk.report import columns
-from gcodejerk.report.records import dump, move_record, process_record, stream_csv
+from gcodejerk.report.move_record import move_record, stream_csv
+from gcodejerk.report.records import dump, process_record
 from gcodejerk.rewrite.pipeline import process
 
 SCHEMA = json.loads(files("gcodejerk.report").joinpath("report.schema.json").read_text())

@@ -419,11 +419,10 @@ class Tracker(Drilling):
             if True in self.frames.values():
                 seen.against = seen.against or "a rotation, scaling or mirroring is active"
         seen.against = seen.against or self._barred(block, seen)
-        dialect = self.dialect
         known = compensation == G40 and not self.turned() and self.depth == 0 and not self.doubt
         known = known and all(on is False for on in self.bars.values())
-        known = known and (self.path is not None or not dialect.path_has_to_be_stated)
-        known = known and (self.feed_unit is not None or not dialect.lengths_only)
+        known = known and (self.path is not None or not self.dialect.path_has_to_be_stated)
+        known = known and (self.feed_unit is not None or not self.dialect.lengths_only)
         seen.sure = known and seen.against is None
         if self.depth or self.doubt:
             seen.against = None
