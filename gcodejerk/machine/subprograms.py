@@ -43,14 +43,15 @@ def load_subprograms(folder: str, within: Path | None = None) -> Subprograms:
     Parameters
     ----------
     folder : str
-        Where they are; hidden files, and those of more than `MOST_BYTES`, are left out.
+        Where they are; hidden files are left out.
     within : Path, optional
         Where a relative name begins.
 
     Raises
     ------
     MachineError
-        It is no folder, cannot be read, or holds more than subprograms can be.
+        It is no folder, cannot be read, or holds more than subprograms can be: `MOST_FILES`,
+        `MOST_TOGETHER`, and `MOST_BYTES` in each.
     """
     root, place = (within or Path()) / folder, Place(folder)
     if not root.is_dir():
@@ -67,7 +68,13 @@ def load_subprograms(folder: str, within: Path | None = None) -> Subprograms:
             if any(part.startswith(".") for part in path.relative_to(root).parts):
                 continue
             if path.stat().st_size > MOST_BYTES:
-                continue
+                # Left out, a smaller file of the same number would be taken for the one called.
+                raise MachineError(
+                    f"{name!r} in the folder {folder!r} of subprograms has more than "
+                    f"{MOST_BYTES // 1_000_000} MB",
+                    "name a folder that holds nothing but subprograms",
+                    place,
+                )
             files[name] = data = path.read_bytes()
             size += len(data)
             together.update(b"%d %d " % (len(name), len(data)) + name.encode() + data)

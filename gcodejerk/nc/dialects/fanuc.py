@@ -11,6 +11,7 @@ What stands between the first % and the end of its line is skipped (B-63524EN/01
 section, B-64014EN/03 p. 21).
 A thread (G32, G33) ends at its words and stays there: Haas lathes, G32 ("no automatic position
 return is performed at the end"); ADT-CNC4620 programming manual p. 27 (X, Z: end of the thread).
+Of threads of changing lead (G34) no page was found.
 A machine builder adds M codes of his own, which may be macros that move. FreeCAD's post writes the
 name of the file as the first line.
 """
@@ -270,7 +271,7 @@ FANUC_LATHE_A = replace(
     },
     feed_modes={980: 94, 990: 95},
     increments={"U": "X", "V": "Y", "W": "Z", "H": "C"},
-    redrawn=frozenset({900, 920, 940}),
+    redrawn=frozenset({340, 900, 920, 940}),
     harmless=frozenset(
         {0, 180, 200, 210, 400, 610, 640, 960, 970, 980, 990, 131, 1130, 670, 220, 230, 250, 260}
     ),
@@ -297,7 +298,7 @@ FANUC_LATHE_B = replace(
     defaults={"plane": 180, "compensation": 400, "system": 540, "path": 640},
     feed_modes={940: 94, 950: 95},
     letters="FSTXYZCDEHIJKLPQR",
-    redrawn=frozenset({770, 780, 790}),
+    redrawn=frozenset({340, 770, 780, 790}),
     harmless=frozenset(
         {0, 180, 200, 210, 400, 610, 640, 900, 910, 940, 950, 960, 970, 980, 990}
         | {131, 1130, 670, 220, 230, 250, 260}
