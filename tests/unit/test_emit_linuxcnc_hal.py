@@ -11,6 +11,7 @@ import pytest
 from gcodejerk import EmitError, Machine, process, verify
 from gcodejerk.cli import main
 from gcodejerk.emit import load_controller
+from gcodejerk.machine import find_machine
 from gcodejerk.verification import verify_files
 
 ROOT = Path(__file__).parents[1]
@@ -49,6 +50,18 @@ def test_the_program_asks_for_the_rapids_that_stand_beside_it(form):
     asked = [int(n) for n in re.findall(rb"^M6[78] E3 Q([1-9][0-9]*)$", output, re.MULTILINE)]
     assert asked == list(samples(beside)) == [2, 3, 4, 5]
     assert judged(output, beside).ok
+
+
+def test_increments_of_ten_decimals_add_up():
+    """Five of them, each rounded to nine: the last point was past the end."""
+    program = (
+        b"G21 G91 G94 G64\nG90 G0 X0 Y0 Z0\nG91\nG0 X-1.1 Y-1\nG1 Z-.1 F10\nG0 Z.5\n"
+        b"G0 Z-.4 X1.1 Y1\nG1 Z-.1 F10\nG0 Z.5\nM2\n"
+    )
+    made = process(program, Machine.load(find_machine("vmc")), controller="linuxcnc-hal")
+    assert made.planned == 3
+    assert b"G0 Z-0.0000002598 X0.0000007145 Y0.0000006496" in made.output
+    assert made.verification.ok
 
 
 def test_stream_means_adaptive_feed():

@@ -31,8 +31,8 @@ TINY = 1e-9
 """Rounding of float64 in positions. [mm] or [deg]"""
 FINEST = 1e-3
 """An axis that moves a few steps may be written this much finer. [steps]"""
-SUM_SCALE = 1e9
-"""Increments are summed in units of their ninth decimal."""
+SUM_SCALE = 1e10
+"""Increments are summed in units of their tenth decimal: none is written with more."""
 _NUMBERS_ONLY = bytes(c if c in b"0123456789.+-" else 32 for c in range(256))
 LINEAR = np.array([axis not in "ABC" for axis in AXES])
 
@@ -257,7 +257,7 @@ def _fast_points(streams: Sequence[Stream]) -> list[Array]:
 def sum_up(increments: Array, begin: Index, end: Index) -> Array:
     """Distance from each stream's start, row by row.
 
-    Summed as whole numbers of the ninth decimal: rounding must not grow with the number of points.
+    Summed as whole numbers of the tenth decimal: rounding must not grow with the number of points.
     """
     whole = np.rint(np.nan_to_num(increments) * SUM_SCALE).astype(np.int64)
     total = np.cumsum(whole, axis=0)
