@@ -26,9 +26,9 @@ MOST_LINES = 4096
 """Groups of lines in one match, about."""
 FEWEST = 8
 """Lines below which columns are not worth it."""
-_NUMBER = rb"[-+]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?![0-9.])"
-_POINTED = rb"[-+]?(?:[0-9]++\.[0-9]*+|\.[0-9]++)(?![0-9.])"
-_BLANK = rb"[ \t]*+"
+_NUMBER = rb"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?![0-9.])"
+_POINTED = rb"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?![0-9.])"
+_BLANK = rb"[ \t]*"
 _FEED_LINES = 15
 """Lines without a G0 behind one that has it; more of them are a run (`Text.take_run`)."""
 _NUMBERS_ONLY = bytes(32 if chr(c) in "GNXYZF\r\n\t" else c for c in range(256))
@@ -80,8 +80,8 @@ class PlainLines:
         begin = _BLANK + rb"(?:N[0-9]{1,9}" + _BLANK + rb")?"
         rapid = begin + rb"G0?0(?![0-9.])" + _BLANK + block
         other = begin + rb"(?:G0?1(?![0-9.])" + _BLANK + rb")?" + block
-        group = rb"(?:%s(?:%s){0,%d}+)" % (rapid, other, _FEED_LINES)
-        self.pattern = re.compile(group + rb"{2,%d}+" % MOST_LINES)
+        group = rb"(?:%s(?:%s){0,%d})" % (rapid, other, _FEED_LINES)
+        self.pattern = re.compile(group + rb"{2,%d}" % MOST_LINES)
         self.possible = self._possible()
 
     def _possible(self) -> bool:
