@@ -18,3 +18,14 @@ def mm_from_inch(length_inch: float) -> float:
 def per_minute(speed: float) -> float:
     """Speed in units/min of a speed in units/s."""
     return speed * SECONDS_PER_MINUTE
+
+
+def percent(share: float) -> str:
+    """A share of a whole for a sentence: two digits, or all in front of the point.
+
+    Examples
+    --------
+    >>> [percent(share) for share in (0.0661, 0.00012, 1.372, 0.0)]
+    ['6.6 %', '0.012 %', '137 %', '0 %']
+    """
+    return f"{100.0 * share:.0f} %" if share >= 0.995 else f"{100.0 * share:.2g} %"

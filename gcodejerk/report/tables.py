@@ -15,7 +15,7 @@ from rich.text import Text
 
 from gcodejerk.reasons import Reason
 from gcodejerk.report.screen import ScreenTable
-from gcodejerk.units import MM_PER_INCH
+from gcodejerk.units import MM_PER_INCH, percent
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
@@ -88,8 +88,8 @@ def summary_line(name: str, summary: Record) -> str:
         now, then = (
             unit.small(summary[key]) for key in ("worst_conventional_residual", "worst_residual")
         )
-        share = 100.0 * summary["worst_residual_share"]
-        parts.append(f"worst residual {share:.2g} % of today's ({now} -> {then} {unit.residual})")
+        share = percent(summary["worst_residual_share"])
+        parts.append(f"worst residual {share} of today's ({now} -> {then} {unit.residual})")
     if summary["extended"]:
         extra = (summary["rapid_time"] - summary["conventional_time"]) * MS_PER_S
         parts.append(f"{summary['extended']} longer than today, {extra:.0f} ms in all")
@@ -112,7 +112,7 @@ def _set_line(summary: Record) -> str:
     share = (
         ""
         if summary["worst_residual_share"] is None
-        else (f"{100.0 * summary['worst_residual_share']:.2g} % of today's ")
+        else f"{percent(summary['worst_residual_share'])} of today's "
     )
     others = [
         f"{count} {reason}"

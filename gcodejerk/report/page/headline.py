@@ -15,7 +15,7 @@ import numpy as np
 from gcodejerk.reasons import EXPLAINED, REASONS, Reason
 from gcodejerk.report.page.text import escaped, with_code
 from gcodejerk.rewrite.result import Result
-from gcodejerk.units import MM_PER_INCH
+from gcodejerk.units import MM_PER_INCH, percent
 
 Record = dict[str, Any]
 BYTES_PER_KB = 1000.0
@@ -138,7 +138,7 @@ def _change(summary: Record, unit: Unit, before: str, after: str) -> str:
     if verb == "stays":
         return f"stays at {unit.vibration(now)} {unit.small}"
     text = f"{verb} from {unit.vibration(now)} to {unit.vibration(then)} {unit.small}"
-    return text + (f" ({100.0 * then / now:.2g} % of today's)" if now else "")
+    return text + (f" ({percent(then / now)} of today's)" if now else "")
 
 
 def _saved(summary: Record) -> float | None:
