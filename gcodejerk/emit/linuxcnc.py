@@ -47,9 +47,10 @@ from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
 """Of a block where the machine is not slow; two servo periods at least. [s]"""
-DECIMALS, INCH_DECIMALS = 6, 7
+DECIMALS, INCH_DECIMALS = 6, 8
 """Of positions, whatever the resolution: LinuxCNC computes in doubles, and speeds follow from
-lengths of blocks. Played: 6 decimals of mm are enough, 4 are not."""
+lengths of blocks. Played: 6 decimals of mm are enough, 4 are not; of inches 7 are not always: the
+tail of 2e-5 mm then turned off the line by 7 degrees, and LinuxCNC stopped in front of it."""
 FEED_DECIMALS, INCH_FEED_DECIMALS = 11, 12
 """Of F."""
 LEAD_TIME = 0.01

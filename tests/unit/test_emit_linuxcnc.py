@@ -11,6 +11,7 @@ import pytest
 from gcodejerk import Machine, plan_move, process
 from gcodejerk.emit import linuxcnc
 from gcodejerk.errors import EmitError
+from gcodejerk.machine import find_machine
 
 TEXT = """
 interval: 0.002
@@ -164,8 +165,8 @@ def test_inches_come_back_in_inches():
     x = words(points, "X")
     assert x == sorted(x)
     assert float(x[-1]) == 0.5
-    # Seven decimals, whatever the resolution.
-    assert all(-v.as_tuple().exponent == 7 for v in x[:-1])
+    # Eight decimals, whatever the resolution.
+    assert all(-v.as_tuple().exponent == 8 for v in x[:-1])
 
 
 def test_a_diameter_stays_a_diameter():
@@ -404,3 +405,21 @@ def test_blocks_of_one_speed_have_feeds_that_are_two_speeds_for_the_control(spee
     speeds = [f * (25.4 if inch else 1.0) / 60.0 for f in told]
     assert all(a != b for a, b in pairwise(speeds))
     assert speeds == pytest.approx([speed] * 4, abs=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["G21", "G20"])
+def test_the_tail_goes_along_the_line(unit):
+    """A tail off the line by 7 degrees made LinuxCNC stop in front of it, not by 3 (played)."""
+    scale = 25.4 if unit == "G20" else 1.0
+    ways = [(25.4, 12.7, 0.0), (60.0, 7.0, 0.0), (31.0, -17.0, 11.0), (5.0, 4.0, -40.0)]
+    for way in ways:
+        words = " ".join(f"{a}{x / scale:.4f}" for a, x in zip("XYZ", way, strict=True) if x)
+        program = f"{unit} G91 G94 F30\nG90 G0 X0 Y0 Z0\nG91\nG1 X-0.1\nG0 {words}\nM2\n".encode()
+        made = process(program, Machine.load(find_machine("vmc")), controller="linuxcnc")
+        points = re.findall(rb"^G1 ((?:[XYZ]\S+ )+)F\S+$", made.output, re.MULTILINE)
+        tail = dict.fromkeys("XYZ", 0.0)
+        tail |= {word[:1].decode(): float(word[1:]) for word in points[-1].split()}
+        step, line = np.array([tail[a] for a in "XYZ"]), np.array(way)
+        cosine = step @ line / np.linalg.norm(step) / np.linalg.norm(line)
+        assert np.linalg.norm(step) * scale == pytest.approx(2e-5, rel=0.1)
+        assert np.degrees(np.arccos(min(cosine, 1.0))) < 3.0, (way, tail)

@@ -16,7 +16,7 @@ from gcodejerk.verification.bytes.form import Stream, StreamReader, run_of
 from gcodejerk.verification.bytes.modes import read_words
 from gcodejerk.verification.findings import Kind
 
-DECIMALS, INCH_DECIMALS, FEED_DECIMALS = 6, 7, 12
+DECIMALS, INCH_DECIMALS, FEED_DECIMALS = 6, 8, 12
 """Of positions in mm and in inches, and of F, at most."""
 Words = list[tuple[str, Decimal]]
 
