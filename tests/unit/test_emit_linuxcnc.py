@@ -409,7 +409,7 @@ def test_blocks_of_one_speed_have_feeds_that_are_two_speeds_for_the_control(spee
 
 @pytest.mark.parametrize("unit", ["G21", "G20"])
 def test_the_tail_goes_along_the_line(unit):
-    """A tail off the line by 7 degrees made LinuxCNC stop in front of it, not by 3 (played)."""
+    """A tail 7 degrees off the line made LinuxCNC stop in front of it, 2.6 did not (played)."""
     scale = 25.4 if unit == "G20" else 1.0
     ways = [(25.4, 12.7, 0.0), (60.0, 7.0, 0.0), (31.0, -17.0, 11.0), (5.0, 4.0, -40.0)]
     for way in ways:
