@@ -148,10 +148,6 @@ class Tuning:
         row = self.scheme.checked(numbers)
         return _at(self.judge, np.where(np.isnan(row), start, row), self.goal)
 
-    def number(self, key: str) -> float:
-        """The chosen number of a setting, by its key; ValueError where there is none."""
-        return float(self.written[[s.key for s in self.scheme.settings].index(key)])
-
     def sweep(self, setting: int) -> tuple[Array, Array, Array]:
         """What one setting does, all others as chosen.
 

@@ -75,7 +75,8 @@ def test_a_confirmed_number_is_a_live_line_in_the_users_unit():
     machine = replace(MACHINE, controller_parameters=confirmed)
     found, sheet = sheet_of("fanuc", "constant-acceleration", machine)
     live = live_lines(load_controller("fanuc"), sheet)
-    first, second = found.number("1620 X"), found.number("1621 X")
+    numbers = dict(zip([s.key for s in found.scheme.settings], found.written, strict=True))
+    first, second = numbers["1620 X"], numbers["1621 X"]
     assert f"N1620 P1 R{first:.0f}" in live
     assert f"N1621 P1 R{second / 1e3:g}" in live
     assert not any(line.startswith("N1621 P2") for line in live)

@@ -17,7 +17,6 @@ from gcodejerk.machine.sources.draft import Draft, Fact
 from gcodejerk.units import SECONDS_PER_MINUTE
 
 KIND = "Fanuc parameters"
-WANTED = (1020, 1320, 1321, 1401, 1420, 1620, 1621)
 LETTERS = "XYZABCUVW"
 ORDER = "XYZABC"
 MS = 1e-3

@@ -43,7 +43,6 @@ def _set_defaults(state: State, dialect: Dialect) -> None:
     state.fixed = _fixed(dialect)
     units = dialect.defaults.get("units")
     state.unit = None if units is None else MM_PER_INCH if dialect.units[units] else 1.0
-    state.unit_stated = units is not None
 
 
 def _fixed(dialect: Dialect) -> frozenset[str]:

@@ -103,7 +103,7 @@ FIELDS = (
     *(Field(name, "table") for name in ("offsets", "variables")),
     *(
         Field(name, "once", False)
-        for name in ("distance_stated", "feed_mode_stated", "unit_stated", "rotates", "turns")
+        for name in ("distance_stated", "feed_mode_stated", "rotates", "turns")
     ),
     Field("restores", "once", False),
     Field("system_stated", "mode", False),
@@ -191,7 +191,6 @@ class State:
     """Variables whose value is certain, by `expressions.variable_name`."""
     distance_stated: bool
     feed_mode_stated: bool
-    unit_stated: bool
     system_stated: bool | None
     """The work system is in force because the program, or the machine file, has said so."""
     rotates: bool

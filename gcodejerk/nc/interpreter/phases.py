@@ -160,7 +160,6 @@ class Phases(Effects):
             if state.cycle is not None:
                 self._lose_depths()
         state.put("unit", unit)
-        state.put("unit_stated", True)
 
     def _g_effects(self, codes: Codes, step: Step) -> None:
         """What G codes do besides: tool length, work system, diameters; in the unit just stated."""

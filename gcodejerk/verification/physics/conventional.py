@@ -66,32 +66,11 @@ def _peak(velocity: float, acceleration: float, jerk: float) -> float:
     return high
 
 
-def rapid_speed(
-    t: Array, total: Array, peak: Array, acceleration: Array, jerk: Array, *, bell: bool = False
-) -> Array:
-    """Speed [1/s] of such moves at moments t, their own durations and peaks being known.
-
-    Jerk must be finite: a trapezoid is never written.
-    """
-    if bell:
-        t, width = np.clip(t, 0.0, total), acceleration / jerk
-        before, now = (_trapezoid(at, peak, acceleration, 2) for at in (t - width, t))
-        return np.asarray(np.maximum(now - before, 0.0) / width)
-    t = np.minimum(t, total - t)
-    full = np.minimum(acceleration, np.sqrt(peak * jerk))
-    ramp, rise = _ramp(peak, acceleration, jerk), full / jerk
-    rising = 0.5 * jerk * t**2
-    falling = peak - 0.5 * jerk * (ramp - t) ** 2
-    straight = full * (t - 0.5 * rise)
-    speed = np.where(t < rise, rising, np.where(t > ramp - rise, falling, straight))
-    return np.where(t <= 0.0, 0.0, np.where(t >= ramp, peak, speed))
-
-
-def _trapezoid(t: Array, peak: Array, acceleration: Array, power: int) -> Array:
-    """Position (power 2), or its integral (3), of a trapezoid of velocity over the length 1."""
+def _integrated_trapezoid(t: Array, peak: Array, acceleration: Array) -> Array:
+    """Integral of the position of a trapezoid of velocity over the length 1."""
     rise, wide = peak / acceleration, 1.0 / peak
-    parts = [np.maximum(t - at, 0.0) ** power for at in (0.0, rise, wide, wide + rise)]
-    out: Array = (parts[0] - parts[1] - parts[2] + parts[3]) * acceleration / (2.0, 6.0)[power - 2]
+    parts = [np.maximum(t - at, 0.0) ** 3 for at in (0.0, rise, wide, wide + rise)]
+    out: Array = (parts[0] - parts[1] - parts[2] + parts[3]) * acceleration / 6.0
     return out
 
 
@@ -130,7 +109,7 @@ def rapid_position(
     if bell:
         peak, acceleration, width = peak[owner], acceleration[owner], (acceleration / jerk)[owner]
         total = 1.0 / peak + peak / acceleration + width
-        before, now = (_trapezoid(at, peak, acceleration, 3) for at in (t - width, t))
+        before, now = (_integrated_trapezoid(at, peak, acceleration) for at in (t - width, t))
         return np.where(t >= total, 1.0, (now - before) / width)
     widths = box_widths(velocity, acceleration, jerk)
     peak, wide, narrow, rise = (column[owner] for column in (peak, *widths))

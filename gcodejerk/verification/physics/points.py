@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids, parse_block
-from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from gcodejerk.units import MM_PER_INCH
 from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.findings import Findings, Kind
 
@@ -362,19 +362,3 @@ def _report(
         k = int(owner[at])
         block = max(int(bad[at] - paths.begin[k]) - 1, 0)
         _complain(found, kind, paths, k, block, problem)
-
-
-def feed_speed(paths: Paths) -> tuple[Array, Array]:
-    """Speed that F asks for along the path, per row [mm/s], and what F refers to, per stream [mm].
-
-    F is the speed along the first of XYZ, UVW, ABC that moves (LinuxCNC, G94).
-    """
-    D = paths.displacement
-    length = np.zeros(len(D))
-    unit = np.ones(len(D))
-    for axes in (slice(0, 3), slice(6, 9), slice(3, 6)):
-        norm = np.sqrt((D[:, axes] ** 2).sum(axis=1))
-        first = length == 0.0
-        unit = np.where(first & (norm > 0.0), 1.0 if axes.start == 3 else paths.unit, unit)
-        length = np.where(first, norm, length)
-    return paths.feed * unit[paths.owner] / SECONDS_PER_MINUTE, length

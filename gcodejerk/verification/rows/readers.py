@@ -263,10 +263,6 @@ def _in_counts(tick: float, **more: float) -> Callable[[Machine], Steps]:
     return steps
 
 
-def _csp_steps(machine: Machine) -> Steps:
-    return _in_counts(machine.interval)(machine)
-
-
 def _si_steps(machine: Machine) -> Steps:
     rotary = np.array([a in machine.axis_names and machine.axis(a).rotary for a in AXES])
     unit = np.where(rotary, 180.0 / math.pi, 1e3)
