@@ -283,18 +283,15 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
     state = moment.state
     code, inch = moment.cycle or 0, state.unit != 1.0
     cycle = rules.cycles[code]
-    given = {}
-    for word in block.words:
-        if word.letter not in "GMN":
-            number = length(word, rules, inch=inch)
-            if number is None:
-                return LeftAlone(str(Reason.DECIMAL_POINT))
-            given[word.letter] = number
+    said = [(w.letter, length(w, rules, inch=inch)) for w in block.words if w.letter not in "GMN"]
+    numbers = {letter: number for letter, number in said if number is not None}
+    if any(number is None for _, number in said):
+        return LeftAlone(str(Reason.DECIMAL_POINT))
     if not _dwell_is_that_of_g4(block, rules):
         return LeftAlone(f"{rules.dwell} may not count as in G4")
     before = series.sticky or {} if series.code == code else {}
-    sticky = _sticky(before, given, PLANES[state.plane or G17][2], rules)
-    repeats = given.get(rules.repeats, Decimal(1))
+    sticky = _sticky(before, numbers, PLANES[state.plane or G17][2], rules)
+    repeats = numbers.get(rules.repeats, Decimal(1))
     if repeats != int(repeats) or repeats < 1 or not _is_complete(sticky, cycle):
         return LeftAlone(str(Reason.NOT_UNDERSTOOD))
     assert series.level is not None
@@ -327,16 +324,23 @@ def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) 
         binary=binary,
         exact_pecks=rules.exact_pecks,
     )
-    if rules.unmeasured and min(call.start, call.level) < r:
-        return LeftAlone("R is above where the tool stands")
-    if rules.plain_levels and cycle.out is Out.FEED_TO_R and end_of(call) != r:
-        return LeftAlone("how it goes beyond R is told in two ways")
-    if rules.own_group and cycle.pecks is not Pecks.NONE and call.clearance >= call.peck:
-        return LeftAlone("its pecks are not longer than the way back")
-    if most_moves(call) > MOST_MOVES:
-        return LeftAlone(f"one block makes more than {MOST_MOVES} moves")
+    if doubt := _doubt_of(call, rules):
+        return LeftAlone(doubt)
     series.code, series.sticky, series.at = code, sticky, end_of(call)
     return call
+
+
+def _doubt_of(call: Call, rules: DrillingRules) -> str | None:
+    """Why it is not certain what a complete call does, or why it is too long."""
+    if rules.unmeasured and min(call.start, call.level) < call.r:
+        return "R is above where the tool stands"
+    if rules.plain_levels and call.cycle.out is Out.FEED_TO_R and end_of(call) != call.r:
+        return "how it goes beyond R is told in two ways"
+    if rules.own_group and call.cycle.pecks is not Pecks.NONE and call.clearance >= call.peck:
+        return "its pecks are not longer than the way back"
+    if most_moves(call) > MOST_MOVES:
+        return f"one block makes more than {MOST_MOVES} moves"
+    return None
 
 
 def _dwell_is_that_of_g4(block: Block, rules: DrillingRules) -> bool:

@@ -26,6 +26,8 @@ from gcodejerk.motion.profiles.symmetric import SymmetricProfiles
 Complex = NDArray[np.complex128]
 STILL = 1e-9
 """Acceleration that is none, of the profile's peak. [-]"""
+AT_ONCE = 4000
+"""Numbers of an array that stays in the processor's nearest memory."""
 
 
 def mode_poles(frequency: ArrayLike, damping: ArrayLike) -> Complex:
@@ -219,9 +221,12 @@ def _steps_response(profiles: Profiles, poles: Complex, starts: NDArray[np.int64
     response = np.empty((len(starts), len(poles)), dtype=np.complex128)
     left = np.repeat(profiles.total, np.diff(profiles.first) + 1) - profiles.step_times()
     a, j = profiles.acceleration_steps(), profiles.jerk_steps()
-    for m, pole in enumerate(poles):
+    # Some poles at once: of few steps, a pole by itself is mostly calls.
+    some = max(1, AT_ONCE // max(len(left), 1))
+    for first in range(0, len(poles), some):
+        pole = poles[first : first + some, np.newaxis]
         each = (a + j / pole) * (_exponential(pole, left) / pole)
-        response[:, m] = np.add.reduceat(each, starts)
+        response[:, first : first + some] = np.add.reduceat(each, starts, axis=1).T
     return response
 
 
@@ -247,15 +252,15 @@ def symmetric_response(profiles: SymmetricProfiles, poles: Complex) -> Complex:
     return response
 
 
-def _exponential(pole: complex, duration: Array) -> Complex:
+def _exponential(pole: complex | Complex, duration: Array) -> Complex:
     """exp(pole t), by real functions: numpy's complex one takes twice the time."""
     if not duration.any():
         return np.ones(1, dtype=np.complex128)
-    power = np.empty(duration.shape, dtype=np.complex128)
     phase = pole.imag * duration
+    power = np.empty(phase.shape, dtype=np.complex128)
     np.cos(phase, out=power.real)
     np.sin(phase, out=power.imag)
-    if pole.real:
+    if np.any(pole.real):
         power *= np.exp(pole.real * duration)
     return power
 

@@ -77,23 +77,9 @@ class _Path:
 
     def line(self, words: list[tuple[str, float]]) -> None:
         """Take one line."""
-        codes = [value for letter, value in words if letter == "G"]
-        for code in codes:
-            if code in _MOTION:
-                self.motion = int(code)
-            elif code in (90, 91):
-                self.incremental = code == 91
-            elif code in (93, 94, 95):
-                self.per_minute = code == _FEED_PER_MINUTE
-            elif code in (28, 30, 53, 92, 10, 52):
-                # Other places, or another frame; of a printer's G92 E0 and G10 none.
-                if code in (28, 30) or {"X", "Y", "Z", "P"} & {letter for letter, _ in words}:
-                    self.at.clear()
+        for letter, code in words:
+            if letter == "G" and self._code(code, words):
                 return
-            elif 73 <= code <= 89 and code != 80:
-                self.motion = -1
-            elif 54 <= code < 60 or code in (43, 49):
-                self.at.clear()
         given = dict(words)
         self.feed = given.get("F", self.feed)
         moved = {axis: given[axis] for axis in "XYZ" if axis in given}
@@ -106,6 +92,25 @@ class _Path:
             elif axis in self.at:
                 self.at[axis] += value
         self._move(before, moved, "E" in given)
+
+    def _code(self, code: float, words: list[tuple[str, float]]) -> bool:
+        """Take a G code; whether the line is none of plain moves."""
+        if code in _MOTION:
+            self.motion = int(code)
+        elif code in (90, 91):
+            self.incremental = code == 91
+        elif code in (93, 94, 95):
+            self.per_minute = code == _FEED_PER_MINUTE
+        elif code in (28, 30, 53, 92, 10, 52):
+            # Other places, or another frame; of a printer's G92 E0 and G10 none.
+            if code in (28, 30) or {"X", "Y", "Z", "P"} & {letter for letter, _ in words}:
+                self.at.clear()
+            return True
+        elif 73 <= code <= 89 and code != 80:
+            self.motion = -1
+        elif 54 <= code < 60 or code in (43, 49):
+            self.at.clear()
+        return False
 
     def _move(self, before: dict[str, float], moved: dict[str, float], prints: bool) -> None:
         """Take one move."""

@@ -63,11 +63,7 @@ def family_profiles(
     moving = {AXES[k] for k in np.flatnonzero((share != 0.0).any(axis=0))}
     profiles, notes, absent = {}, {}, {}
     for name, family in FAMILIES.items():
-        missing = _missing(machine, family, moving)
-        own = [q for q in missing if q in EQUIVALENT]
-        needs = [q for q in missing if q not in EQUIVALENT]
-        if any("J" in EQUIVALENT[q] for q in own) and "jerk" not in needs:
-            needs += [] if _has_jerk(machine, moving) else ["jerk"]
+        own, needs = _replaced_and_needed(machine, family, moving)
         if needs:
             absent[name] = f"needs {', '.join(needs)} (axes.?.rapid)"
             continue
@@ -78,6 +74,19 @@ def family_profiles(
             said.setdefault(EQUIVALENT[q], []).append(q)
         notes[name] = "; ".join(f"{', '.join(names)} = {what}" for what, names in said.items())
     return profiles, notes, absent
+
+
+def _replaced_and_needed(
+    machine: Machine, family: Family, moving: set[str]
+) -> tuple[list[str], list[str]]:
+    """Quantities that are not stated: those with an equivalent, and those that nothing replaces."""
+    missing = _missing(machine, family, moving)
+    own = [q for q in missing if q in EQUIVALENT]
+    needs = [q for q in missing if q not in EQUIVALENT]
+    of_jerk = any("J" in EQUIVALENT[q] for q in own)
+    if of_jerk and "jerk" not in needs and not _has_jerk(machine, moving):
+        needs.append("jerk")
+    return own, needs
 
 
 def _missing(machine: Machine, family: Family, moving: set[str]) -> list[str]:

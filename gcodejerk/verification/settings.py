@@ -356,34 +356,48 @@ def _same(text: str, wanted: str) -> bool:
 
 def _beyond(values: Values, control: Control, machine: Machine) -> list[str]:
     """What is beyond the machine's limits, or no number of its kind."""
-    out = []
     names = {axis.name for axis in machine.axes}
+    out = []
     for (number, axis), text in values.items():
         if axis and axis not in names:
             out.append(f"{number} {axis}: the machine has no such axis")
-        elif number == control.acceleration and number:
-            own = [
-                max(a.limit.acceleration, a.rapid.acceleration)
-                for a in _moved(control, machine, axis)
-            ]
-            most = min(own) if control.shared else max(own)
-            if not 0.0 < float(text) <= most + 1.0:
-                out.append(f"{number} {axis}= {text} is beyond the acceleration limit {most:g}")
-        elif number == control.frequency and number and not 0.1 <= float(text) <= 1000.0:
-            out.append(f"{number} {axis}= {text} is no frequency of a shaper")
-        elif number == control.damping and number and not 0.0 <= float(text) < 1.0:
-            out.append(f"{number} {axis}= {text} is no damping ratio")
-    if ("G231", PATH) in values and ("G233", PATH) in values:
-        a, ramp = (float(values[(g, PATH)]) / 100.0 for g in ("G231", "G233"))
-        for one in machine.axes if a > 0.0 and ramp > 0.0 else ():
-            for what, new, now, most in (
-                ("acceleration", a, one.rapid.acceleration, one.limit.acceleration),
-                ("jerk", a / ramp, one.rapid.jerk, one.limit.jerk),
-            ):
-                if new * now > max(now, most) * (1.0 + 1e-6):
-                    out.append(
-                        f"axis {one.name}: {what} {new * now:g} is beyond {max(now, most):g}"
-                    )
-        if not (a > 0.0 and ramp > 0.0):
-            out.append("G231 or G233 is 0")
-    return out
+        elif problem := _impossible(number, axis, text, control, machine):
+            out.append(f"{number} {axis}= {text} {problem}")
+    return out + _percentages_beyond(values, machine)
+
+
+def _impossible(
+    number: str, axis: str, text: str, control: Control, machine: Machine
+) -> str | None:
+    """Why a setting cannot have a value; None where it can."""
+    if not number:
+        return None
+    if number == control.acceleration:
+        moved = _moved(control, machine, axis)
+        own = [max(a.limit.acceleration, a.rapid.acceleration) for a in moved]
+        most = min(own) if control.shared else max(own)
+        if not 0.0 < float(text) <= most + 1.0:
+            return f"is beyond the acceleration limit {most:g}"
+    elif number == control.frequency and not 0.1 <= float(text) <= 1000.0:
+        return "is no frequency of a shaper"
+    elif number == control.damping and not 0.0 <= float(text) < 1.0:
+        return "is no damping ratio"
+    return None
+
+
+def _percentages_beyond(values: Values, machine: Machine) -> list[str]:
+    """Axes that G231 and G233, percentages of today's acceleration and of its ramp, overload."""
+    if ("G231", PATH) not in values or ("G233", PATH) not in values:
+        return []
+    acceleration, ramp = (float(values[(g, PATH)]) / 100.0 for g in ("G231", "G233"))
+    if not (acceleration > 0.0 and ramp > 0.0):
+        return ["G231 or G233 is 0"]
+    return [
+        f"axis {axis.name}: {what} {share * now:g} is beyond {max(now, most):g}"
+        for axis in machine.axes
+        for what, share, now, most in (
+            ("acceleration", acceleration, axis.rapid.acceleration, axis.limit.acceleration),
+            ("jerk", acceleration / ramp, axis.rapid.jerk, axis.limit.jerk),
+        )
+        if share * now > max(now, most) * (1.0 + 1e-6)
+    ]

@@ -114,11 +114,16 @@ def _run(hal: Hal, commands: Iterator[tuple[list[str], Place]], ini: Ini) -> Non
         elif verb == "unlinkp" and rest:
             hal.signal.pop(rest[0], None)
         elif verb == "addf" and len(rest) > 1:
-            thread = hal.functions.setdefault(rest[1], [])
-            where = int(rest[2]) if len(rest) > 2 and re.fullmatch(r"-?\d+", rest[2]) else -1
-            if where > 0:
-                thread.insert(where - 1, rest[0])
-            elif where == -1:
-                thread.append(rest[0])
-            else:
-                hal.unclear = hal.unclear or place
+            _add_function(hal, rest, place)
+
+
+def _add_function(hal: Hal, rest: list[str], place: Place) -> None:
+    """Put a function into a thread: `addf FUNCTION THREAD [POSITION]`."""
+    thread = hal.functions.setdefault(rest[1], [])
+    where = int(rest[2]) if len(rest) > 2 and re.fullmatch(r"-?\d+", rest[2]) else -1
+    if where > 0:
+        thread.insert(where - 1, rest[0])
+    elif where == -1:
+        thread.append(rest[0])
+    else:
+        hal.unclear = hal.unclear or place

@@ -112,28 +112,12 @@ def structure_of(
     if not values:
         return None
     if "file" in values:
-        for name in WHOLE:
-            if name in values:
-                _tell(checker, (*path, name), "stands beside structure.file", "keep one of them")
-        matrices = _load(values["file"], folder, checker)
-        if matrices is None:
-            return None
-        _require_servos([axis for axis, _ in matrices.nut], axes, checker)
-        return Structure(matrices=matrices)
+        return _of_file(values, axes, folder, checker)
     missing = [name for name in ("bodies", "tool", "workpiece", "at") if not values.get(name)]
     if missing:
         _tell(checker, path, f"has no {missing[0]}", f"add {missing[0]}, or file")
     bodies = values.get("bodies", {})
-    names = [body.get("name") for body in bodies.values()]
-    for i, name in enumerate(names):
-        if name == GROUND or name in names[:i]:
-            what = "the ground's" if name == GROUND else "that of another body, too"
-            _tell(checker, (*path, "bodies", i, "name"), f"{name!r} is {what}", "choose another")
-        if ("size" in bodies[i]) == ("inertia" in bodies[i]):
-            _tell(
-                checker, (*path, "bodies", i), "needs size or inertia, one of them",
-                "size: [600, 500, 1300] is that of a box of the same inertia [mm]",
-            )  # fmt: skip
+    names = _checked_bodies(bodies, path, checker)
     _check_names(values, path, [*names, GROUND], checker)
     screws = [screw.get("axis") for screw in values.get("screws", {}).values()]
     _require_servos([axis for axis in screws if axis], axes, checker)
@@ -235,6 +219,35 @@ def _load(name: str, folder: Path, checker: Checker) -> Matrices | None:
     return Matrices(name, M, K, C, rows("nut_"), rows("tool_"))
 
 
+def _of_file(
+    values: dict[str, Any], axes: dict[str, Any], folder: Path, checker: Checker
+) -> Structure | None:
+    """A structure whose matrices stand in a file."""
+    for name in WHOLE:
+        if name in values:
+            _tell(checker, ("structure", name), "stands beside structure.file", "keep one of them")
+    matrices = _load(values["file"], folder, checker)
+    if matrices is None:
+        return None
+    _require_servos([axis for axis, _ in matrices.nut], axes, checker)
+    return Structure(matrices=matrices)
+
+
+def _checked_bodies(bodies: dict[int, Any], path: KeyPath, checker: Checker) -> list[Any]:
+    """The names of the bodies; each is one body's, and each body's inertia is told once."""
+    names = [body.get("name") for body in bodies.values()]
+    for i, name in enumerate(names):
+        if name == GROUND or name in names[:i]:
+            what = "the ground's" if name == GROUND else "that of another body, too"
+            _tell(checker, (*path, "bodies", i, "name"), f"{name!r} is {what}", "choose another")
+        if ("size" in bodies[i]) == ("inertia" in bodies[i]):
+            _tell(
+                checker, (*path, "bodies", i), "needs size or inertia, one of them",
+                "size: [600, 500, 1300] is that of a box of the same inertia [mm]",
+            )  # fmt: skip
+    return names
+
+
 def _wrong_matrices(found: dict[str, Any]) -> str:
     """What is wrong with the arrays of a file; empty where nothing is."""
     for key in ("M", "K"):
@@ -249,10 +262,7 @@ def _wrong_matrices(found: dict[str, Any]) -> str:
             return f"{key} has the shape {value.shape}, expected as M, which has {found['M'].shape}"
         if not np.isfinite(value).all():
             return f"{key} holds what is no number"
-        if (
-            not vector
-            and np.abs(value - value.T).max(initial=0.0) > SYMMETRIC * np.abs(value).max()
-        ):
+        if not vector and not _is_symmetric(value):
             return f"{key} is not symmetric"
     if count < 1 or np.linalg.eigvalsh(found["M"]).min() <= 0.0:
         return "M is not positive definite"
@@ -260,6 +270,10 @@ def _wrong_matrices(found: dict[str, Any]) -> str:
     if nuts != {key[-1] for key in found if key.startswith("tool_")} or not nuts:
         return "every axis needs both nut_ and tool_"
     return ""
+
+
+def _is_symmetric(matrix: Any) -> bool:
+    return bool(np.abs(matrix - matrix.T).max(initial=0.0) <= SYMMETRIC * np.abs(matrix).max())
 
 
 def digest(structure: Structure) -> Structure:

@@ -40,7 +40,7 @@ STEPS, HALVINGS = 40, 10
 SETTLED = 1e-9
 """Share of the sum that a shortened step has to gain for another one."""
 
-FASTER, SLOWER, EVEN = 1, -1, 0
+FASTER, SLOWER, EVEN, ANY = 1, -1, 0, 2
 """What a block may be."""
 
 
@@ -65,7 +65,7 @@ class Wanted:
     least, most : ndarray, shape (n,)
         Limits of the speed at all knots but the first and the last. [of the mean]
     kind : ndarray of int, shape (n, k - 1)
-        FASTER, SLOWER or EVEN: of the block behind each knot but the last.
+        FASTER, SLOWER, EVEN or ANY: of the block behind each knot but the last.
     poles : ndarray of complex, shape (m,)
         Of the modes. [rad/s]
     response : ndarray of complex, shape (n, m)

@@ -51,23 +51,14 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
     plane = PLANES[state.plane]
     along = AXES.index(plane[2])
     cycle = _cycle_in_force(state, code, values, rules)
-    repeats = next((values[letter] for letter in rules.repeats if letter in values), 1.0)
-    if any(letter in values for letter in rules.maybe_repeats):
-        repeats = NAN
+    repeats = _repeats(values, rules)
     beside = any(axis in values for axis in AXES if axis not in plane)
     if cycle is None or repeats <= 0 or beside:
         return False
     if state.cycle is None:
         state.put("cycle_level", state.position[along])
     state.put("cycle", cycle)
-    scale = state.scale(along)
-    r, bottom = cycle[2] * scale, cycle[1] * scale
-    if along == 0 and state.diameter is not False:
-        r = NAN  # X is a diameter; whether R is, too, differs: LinuxCNC takes it as it is
-    if state.distance == G91:
-        r, bottom = r + state.cycle_level, r + state.cycle_level + bottom
-    elif state.distance is None:
-        r = bottom = NAN
+    r, bottom = _heights(state, along, cycle)
     if r < bottom:
         return False
     end = _end(state, r, rules)
@@ -76,6 +67,24 @@ def run_cycle(state: State, code: int, values: Mapping[str, float], rules: Drill
             _go_to_hole(state, AXES.index(letter), values[letter], repeats)
     state.move(along, end)
     return True
+
+
+def _repeats(values: Mapping[str, float], rules: Drilling) -> float:
+    """How often a block drills; NaN where it is not certain."""
+    if any(letter in values for letter in rules.maybe_repeats):
+        return NAN
+    return next((values[letter] for letter in rules.repeats if letter in values), 1.0)
+
+
+def _heights(state: State, along: int, cycle: tuple[int, float, float]) -> tuple[float, float]:
+    """R and the bottom along the drilling axis, in mm."""
+    scale = state.scale(along)
+    r, bottom = cycle[2] * scale, cycle[1] * scale
+    if along == 0 and state.diameter is not False:
+        r = NAN  # X is a diameter; whether R is, too, differs: LinuxCNC takes it as it is
+    if state.distance == G91:
+        return r + state.cycle_level, r + state.cycle_level + bottom
+    return (NAN, NAN) if state.distance is None else (r, bottom)
 
 
 def _cycle_in_force(

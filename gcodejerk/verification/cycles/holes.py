@@ -140,11 +140,38 @@ def calls_for(
     series: Series, block: Block, state: State, code: int, turning: int
 ) -> list[list[Event]] | Doubt:
     """What a block calls for: its moves, for each count of pecks that may be meant."""
+    control, along = series.control, PLANES[state.plane or G17]
+    said = _said(series, block, state, code)
+    if isinstance(said, Doubt):
+        return said
+    _remember(series, code, said, along[2])
+    repeats = said.get(control.repeats, Fraction(1))
+    needs = {"z", "R"} | _own_words(control.heights[code])
+    if needs - series.said.keys() or repeats < 1 or repeats.denominator != 1:
+        return Doubt("a word that it needs is missing")
+    r, z = _heights(series, state)
+    if doubt := _doubt_of(series, state, code, turning, r, z):
+        return Doubt(doubt)
+    level = series.level[1]
+    top = r if state.retract == G99 else max(r, level)
+    if not control.levels and "r" in control.heights[code] and top != r:
+        return Doubt("how G85 goes beyond R")
+    out = []
+    for pecks in _pecks(series, code, r, z):
+        if (pecks + 1) * repeats > MOST_PECKS:
+            return Doubt(f"it pecks more than {MOST_PECKS} times")
+        visits = [*_visits(series, code, (r, z, top), pecks, state, turning)]
+        places = _places(series, said, visits, (r, top), int(repeats), state)
+        out.append([*_moving(places, series, along)])
+    return out
+
+
+def _said(series: Series, block: Block, state: State, code: int) -> dict[str, Fraction] | Doubt:
+    """The numbers of a block's words, by letter."""
     plane, control = PLANES[state.plane or G17], series.control
+    letters = {*plane, "R", control.repeats, *control.letters} | _own_words(control.heights[code])
     said: dict[str, Fraction] = {}
-    own = _own_words(control.heights[code])
     for word in block.words:
-        letters = {*plane, "R", control.repeats, *control.letters} | own
         if not _belongs(word, code, letters, control.switches):
             return Doubt(f"nobody knows when {word.text.decode('latin-1')} acts")
         if word.letter in "XYZRPQ" or word.letter == control.repeats:
@@ -156,34 +183,26 @@ def calls_for(
             return Doubt("its dwell may be another one in G4")
     if control.xy and not set(plane[:2]) & said.keys():
         return Doubt("it names neither X nor Y")
-    _remember(series, code, said, plane[2])
-    needs = {"z", "R"} | own
-    repeats = said.get(control.repeats, Fraction(1))
-    if needs - series.said.keys() or repeats < 1 or repeats.denominator != 1:
-        return Doubt("a word that it needs is missing")
-    r, z = _heights(series, state)
-    if z > r or ("Q" in needs and series.said["Q"] <= 0):
-        return Doubt("the controller refuses it")
-    if not control.watched and (series.level[1] < r or series.at[plane[2]][1] < r):
-        return Doubt("R is above the tool")
+    return said
+
+
+def _doubt_of(
+    series: Series, state: State, code: int, turning: int, r: Fraction, z: Fraction
+) -> str | None:
+    """Why it is not certain what a complete cycle from R to the bottom does."""
+    control = series.control
+    if z > r or ("Q" in _own_words(control.heights[code]) and series.said["Q"] <= 0):
+        return "the controller refuses it"
+    along = PLANES[state.plane or G17][2]
+    if not control.watched and (series.level[1] < r or series.at[along][1] < r):
+        return "R is above the tool"
     if not _pecks_are_told(series, code, state):
-        return Doubt("the machine file does not say how it pecks")
-    level = series.level[1]
-    if state.retract is None and level > r:
-        return Doubt("G98 or G99 is not known")
+        return "the machine file does not say how it pecks"
+    if state.retract is None and series.level[1] > r:
+        return "G98 or G99 is not known"
     if "S" in control.heights[code] and not turning:
-        return Doubt("the spindle may stand")
-    top = r if state.retract == G99 else max(r, level)
-    if not control.levels and "r" in control.heights[code] and top != r:
-        return Doubt("how G85 goes beyond R")
-    out = []
-    for pecks in _pecks(series, code, r, z):
-        if (pecks + 1) * repeats > MOST_PECKS:
-            return Doubt(f"it pecks more than {MOST_PECKS} times")
-        visits = [*_visits(series, code, (r, z, top), pecks, state, turning)]
-        places = _places(series, said, visits, (r, top), int(repeats), state)
-        out.append([*_moving(places, series, plane)])
-    return out
+        return "the spindle may stand"
+    return None
 
 
 def _own_words(heights: str) -> set[str]:

@@ -7,7 +7,7 @@ twentieth of a limit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 
@@ -39,7 +39,7 @@ from gcodejerk.verification.physics.points import (
 )
 from gcodejerk.verification.rows.files import RowsFile
 from gcodejerk.verification.rows.motion import Pieces
-from gcodejerk.verification.rows.moves import Move
+from gcodejerk.verification.rows.moves import Move, Steps
 from gcodejerk.verification.rows.readers import CYCLIC
 
 BATCH = 500
@@ -121,27 +121,18 @@ def _framed(move: Move, i: int, file: RowsFile, rapids: Rapids, found: Findings)
         position += begin
     elif np.isnan(position[0]).any():
         position[0] = begin
-    near = 1e-4 * step + 1e-12 * np.abs(end) + 1e-13
     if not np.isfinite(position).all() or not np.isfinite(move.velocity).all():
         complain(Kind.TABLE, "nan stands for what the program does not tell, and only for that")
         return None
-    gaps = np.diff(move.t)
-    ticks = move.t / steps.tick
-    # float64 of a decimal time in ticks of 1 ns
-    slack = 1e-3 + 4e-16 * np.abs(ticks)
-    if move.t[0] != 0.0 or (gaps <= 0.5 * steps.tick).any():
-        complain(Kind.TIME, "the times of the rows do not rise from 0")
+    if not _timed(move, steps, complain):
         return None
-    if (np.abs(ticks - np.rint(ticks)) > slack).any():
-        complain(Kind.TIME, f"a time is no whole number of ticks of {steps.tick:g} s")
-    if (gaps > steps.longest * (1.0 + WITHIN)).any() or len(gaps) > steps.most:
-        complain(Kind.TIME, "a segment is longer, or there are more, than the controller can take")
-    for what, kind, row, wanted in (
-        ("begins", Kind.START, 0, begin),
-        ("ends", Kind.END, -1, end),
+    near = 1e-4 * step + 1e-12 * np.abs(end) + 1e-13
+    for what, kind, row, wanted, told in (
+        ("begins", Kind.START, 0, begin, start),
+        ("ends", Kind.END, -1, end, target),
     ):
         for k in np.flatnonzero(np.abs(position[row] - wanted) > near).tolist():
-            at, said = position[row, k], (start if row == 0 else target)[axes[k]]
+            at, said = position[row, k], told[axes[k]]
             complain(kind, f"{AXES[axes[k]]} {what} at {at:.12g}, the program says {said:.12g}")
         if move.velocity[row].any():
             complain(kind, "the motion is not at rest there: its velocity is not 0")
@@ -150,12 +141,27 @@ def _framed(move: Move, i: int, file: RowsFile, rapids: Rapids, found: Findings)
     for a in np.flatnonzero(moved).tolist():
         if a not in axes:
             complain(Kind.AXES, f"axis {AXES[a]} does not move, and the block moves it")
-    for k, a in enumerate(axes):
-        still = not moved[a]
-        if still and (np.ptp(position[:, k]) > near[k] or move.velocity[:, k].any()):
-            complain(Kind.AXES, f"axis {AXES[a]} moves, which the block does not move")
-            return None
+    strays = (np.ptp(position, axis=0) > near) | move.velocity.any(axis=0)
+    for k in np.flatnonzero(strays & ~moved[axes])[:1].tolist():
+        complain(Kind.AXES, f"axis {AXES[axes[k]]} moves, which the block does not move")
+        return None
     return replace(move, position=position, relative=False)
+
+
+def _timed(move: Move, steps: Steps, complain: Callable[[Kind, str], None]) -> bool:
+    """Whether the times of a motion can be judged further: they rise from 0 in whole ticks."""
+    gaps = np.diff(move.t)
+    ticks = move.t / steps.tick
+    # float64 of a decimal time in ticks of 1 ns
+    slack = 1e-3 + 4e-16 * np.abs(ticks)
+    if move.t[0] != 0.0 or (gaps <= 0.5 * steps.tick).any():
+        complain(Kind.TIME, "the times of the rows do not rise from 0")
+        return False
+    if (np.abs(ticks - np.rint(ticks)) > slack).any():
+        complain(Kind.TIME, f"a time is no whole number of ticks of {steps.tick:g} s")
+    if (gaps > steps.longest * (1.0 + WITHIN)).any() or len(gaps) > steps.most:
+        complain(Kind.TIME, "a segment is longer, or there are more, than the controller can take")
+    return True
 
 
 def _judge_points(

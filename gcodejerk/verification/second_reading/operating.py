@@ -71,14 +71,8 @@ def binary(operator: str, a: float, b: float) -> float:
             return NAN
         difference = 0.0 if near else a - b
         return float(_COMPARED[operator](difference))
-    if operator in ("AND", "OR", "XOR"):
-        if {a, b} - {0.0, 1.0}:
-            return NAN
-        return float({"AND": min(a, b), "OR": max(a, b), "XOR": abs(a - b)}[operator])
-    if operator in ("MOD", "DIV"):
-        if not (a.is_integer() and b.is_integer() and 0.0 <= a < 1e8 and b > 0.0):
-            return NAN
-        return float(a % b if operator == "MOD" else a // b)
+    if operator in ("AND", "OR", "XOR", "MOD", "DIV"):
+        return _whole(operator, a, b)
     simple = {"+": a + b, "-": a - b, "*": a * b}
     if operator in simple:
         number = simple[operator]
@@ -87,6 +81,17 @@ def binary(operator: str, a: float, b: float) -> float:
     else:
         number = math.pow(a, b)
     return number if math.isfinite(number) else NAN
+
+
+def _whole(operator: str, a: float, b: float) -> float:
+    """An operation of truth values, or of whole numbers; NaN of others."""
+    if operator in ("AND", "OR", "XOR"):
+        if {a, b} - {0.0, 1.0}:
+            return NAN
+        return float({"AND": min(a, b), "OR": max(a, b), "XOR": abs(a - b)}[operator])
+    if not (a.is_integer() and b.is_integer() and 0.0 <= a < 1e8 and b > 0.0):
+        return NAN
+    return float(a % b if operator == "MOD" else a // b)
 
 
 _COMPARED: dict[str, Callable[[float], bool]] = {
