@@ -6,6 +6,11 @@ import tempfile
 import zlib
 
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
+
+# As many processes as cores run tests: threads of their linear algebra would wait for each other.
+# Set before numpy is imported here, and for the commands that tests start.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 USUAL = 60
 """Examples of a property test that does not say how many."""
@@ -17,6 +22,11 @@ def pytest_configure(config):
     # How long an example takes says what else the machine does, not what the package does.
     settings.register_profile("untimed", deadline=None, max_examples=USUAL)
     settings.load_profile("untimed")
+    if not explores(config) and hasattr(providers, "_get_local_constants"):
+        # Hypothesis draws from the constants of all modules that happen to be imported by then:
+        # what a test draws, and how long it takes, would depend on the tests in front of it.
+        none = providers.Constants()
+        providers._get_local_constants = lambda: none
     # No test reads or fills the user's own cache of solutions.
     config.cache_folder = tempfile.mkdtemp(prefix="gcodejerk-cache-")
     os.environ["GCODEJERK_CACHE"] = config.cache_folder
@@ -76,12 +86,16 @@ def pytest_itemcollected(item):
         item.add_marker("quick")
 
 
+def explores(config):
+    """Whether the run draws what every usual one does not."""
+    return config.getoption("--long") or config.getoption("--explore")
+
+
 def pytest_runtest_setup(item):
     # A change is judged by the same draws wherever its tests run; what they do not come to, the
     # runs that explore do, each of which draws others. Parts of a test draw by their own names.
-    explores = item.config.getoption("--long") or item.config.getoption("--explore")
     test = getattr(item, "obj", None)
-    if hasattr(test, "hypothesis") and not explores:
+    if hasattr(test, "hypothesis") and not explores(item.config):
         test._hypothesis_internal_use_seed = zlib.crc32(item.nodeid.encode())
 
 

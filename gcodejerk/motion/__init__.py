@@ -25,6 +25,7 @@ from gcodejerk.motion.sampling import (
     knots_steps,
     sample_profiles,
     sampled_response,
+    steps_response,
     whole_intervals,
 )
 from gcodejerk.motion.search.condition3 import design_four_segments, four_segment_range
@@ -51,6 +52,7 @@ __all__ = [
     "round_positions",
     "sample_profiles",
     "sampled_response",
+    "steps_response",
     "symmetric_response",
     "whole_intervals",
 ]

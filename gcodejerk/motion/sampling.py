@@ -8,6 +8,7 @@ and that is the same in a whole column: a residual is one product of matrices.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,10 @@ from gcodejerk.motion.residual import Complex
 
 Counts = NDArray[np.int64]
 
+FEW = 16
+"""Modes of which every exponential is computed."""
+CELLS = 1 << 20
+"""Exponentials that are computed at a time, of moments at frequencies: 16 MB."""
 GRID_TOLERANCE = 1e-6
 """A time this little above a whole number of intervals is that number [intervals]."""
 
@@ -165,8 +170,55 @@ def knots_response(values: Array, grid: Grid, poles: Complex) -> Complex:
     ndarray of complex, shape (n, m)
     """
     every = knots_steps(values, grid)
+    if len(poles) > FEW:
+        return steps_response(every, grid.interval, poles)
     decay = np.exp(poles * (np.arange(every.shape[1]) * grid.interval)[:, np.newaxis])
     response: Complex = every @ decay.real + 1j * (every @ decay.imag)
+    return response
+
+
+def steps_response(steps: Array, interval: float, poles: Complex) -> Complex:
+    r"""Response of many modes to changes of velocity, by the intervals that are left.
+
+    Parameters
+    ----------
+    steps : ndarray, shape (n, k)
+        Of `knots_steps`.
+    interval : float
+        [s]
+    poles : ndarray of complex, shape (m,)
+        Of the modes. [rad/s]
+
+    Returns
+    -------
+    ndarray of complex, shape (n, m)
+
+    Notes
+    -----
+    Exponentials cost most. The moments are therefore taken in blocks of :math:`b` intervals, each
+    of which turns as the others do: with :math:`E = e^{\lambda b h}`, and :math:`B_i` the sum of
+    block i by itself, :math:`B_0 + E (B_1 + E (B_2 + \dots))` needs :math:`b + 1` of them in place
+    of k. Powers of E are at most 1, so that nothing is lost.
+    """
+    used = np.flatnonzero(steps.any(axis=0))
+    response = np.zeros((len(steps), len(poles)), dtype=np.complex128)
+    if not len(used):
+        return response
+    block = math.isqrt(int(used[-1])) + 1
+    edges = np.searchsorted(used, np.arange(0, int(used[-1]) + block, block))
+    width = max(1, CELLS // (block + len(steps)))
+    for first in range(0, len(poles), width):
+        some = slice(first, first + width)
+        decay = np.exp(poles[some] * (np.arange(block) * interval)[:, np.newaxis])
+        real, imag = decay.real.copy(), decay.imag.copy()
+        turn = np.exp(poles[some] * (block * interval))
+        for k in range(len(edges) - 2, -1, -1):
+            response[:, some] *= turn
+            columns = used[edges[k] : edges[k + 1]]
+            if len(columns):
+                here, at = steps[:, columns], columns - k * block
+                response.real[:, some] += here @ real[at]
+                response.imag[:, some] += here @ imag[at]
     return response
 
 

@@ -21,8 +21,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.motion import Objective, grouped
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.sampling import CELLS
 from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
-from gcodejerk.planning.lines import CELLS
 from gcodejerk.planning.plans import Plans, path_length
 
 MOST_PASSED = 0.05

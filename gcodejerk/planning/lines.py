@@ -30,15 +30,13 @@ from gcodejerk.motion import (
     knots_response,
     knots_steps,
     residual_displacement,
+    steps_response,
 )
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.sampling import Counts
 from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
 from gcodejerk.planning.plans import Plans
-
-CELLS = 1 << 20
-"""Exponentials that are computed at a time, of moments at frequencies: 16 MB."""
 
 
 class Play(Enum):
@@ -213,16 +211,11 @@ def worst_of_lines(
     around = felt.in_band(band, longest, JUDGED, JUDGED_FEWEST)
     response = np.zeros((len(grid.counts), len(around.poles)), dtype=np.complex128)
     for row, axis in enumerate(axes):
-        steps = knots_steps(positions[axis], grid)
-        used = np.flatnonzero(steps.any(axis=0))
-        steps, left = steps[:, used], used * grid.interval
         excited = np.flatnonzero(around.weights[row])
-        width = max(1, CELLS // max(len(used), 1))
-        for begin in range(0, len(excited), width):
-            index = excited[begin : begin + width]
-            decay = np.exp(around.poles[index] * left[:, np.newaxis]) * around.weights[row, index]
-            response.real[:, index] += steps @ decay.real
-            response.imag[:, index] += steps @ decay.imag
+        found = steps_response(
+            knots_steps(positions[axis], grid), grid.interval, around.poles[excited]
+        )
+        response[:, excited] += found * around.weights[row, excited]
     displacement = np.abs(response) / around.poles.imag
     if early is not None:
         displacement *= undecayed(early, around.poles * grid.interval)
