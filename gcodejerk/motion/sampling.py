@@ -204,8 +204,9 @@ def steps_response(steps: Array, interval: float, poles: Complex) -> Complex:
     response = np.zeros((len(steps), len(poles)), dtype=np.complex128)
     if not len(used):
         return response
-    block = math.isqrt(int(used[-1])) + 1
-    edges = np.searchsorted(used, np.arange(0, int(used[-1]) + block, block))
+    last = int(used[-1])
+    block = math.isqrt(last) + 1
+    edges = np.searchsorted(used, np.arange(0, last + block + 1, block))
     width = max(1, CELLS // (block + len(steps)))
     for first in range(0, len(poles), width):
         some = slice(first, first + width)

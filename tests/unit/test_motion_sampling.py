@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from gcodejerk.motion import Grid, SymmetricProfiles, sample_profiles
+from gcodejerk.motion import Grid, SymmetricProfiles, sample_profiles, steps_response
+from gcodejerk.motion.residual import mode_poles
 
 INTERVAL = 0.0005
 SHAPES = {
@@ -128,3 +129,23 @@ def test_a_grid_is_aligned_at_the_end():
 def test_a_grid_of_no_moves_has_no_rows():
     grid = Grid.every(np.zeros(0, dtype=np.int64), 2, 0.001)
     assert len(grid.knots) == len(grid.blocks) == 0
+
+
+@pytest.mark.parametrize("last", [*range(40), 143, 144, 145, 1000])
+def test_many_modes_answer_to_steps_as_each_of_them_alone(last):
+    rng = np.random.default_rng(last)
+    steps = np.zeros((3, last + 7))
+    steps[:, rng.permutation(last + 1)[: last // 2 + 1]] = rng.normal(size=(3, last // 2 + 1))
+    steps[1, last] = 1.0
+    poles = mode_poles(rng.uniform(5.0, 450.0, 30), rng.uniform(0.0, 0.1, 30))
+    expected = [
+        [sum(row[k] * np.exp(pole * k * 1e-3) for k in range(last + 7)) for pole in poles]
+        for row in steps
+    ]
+    found = steps_response(steps, 1e-3, poles)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_without_a_step_nothing_answers():
+    found = steps_response(np.zeros((2, 5)), 1e-3, mode_poles([30.0], [0.02]))
+    assert found.tolist() == [[0.0], [0.0]]
