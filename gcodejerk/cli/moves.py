@@ -142,35 +142,22 @@ def map_amplitudes(
     """Map what is left of vibration over T1 and T_SUM, for one move of one axis."""
     from gcodejerk.batch.files import new_file
 
-    if condition is not None and condition.upper() not in CONDITIONS:
-        raise typer.BadParameter(f"--condition {condition}: choose I, II or III")
-    if conditions and condition is not None:
-        raise typer.BadParameter("--conditions draws all three: leave --condition out")
-    if conditions and output is None:
-        raise typer.BadParameter("--conditions is of maps that are drawn (-o FILE)")
+    suffix = _suffix_of_map(output, condition, conditions=conditions)
     if output is None and (points is not None or longest is not None):
         raise typer.BadParameter("--points and --longest are of a map that is written (-o FILE)")
-    suffix = Path(output).suffix.lower() if output is not None else ""
-    if output is not None and suffix not in MAPS:
-        raise typer.BadParameter(f"-o {output}: a map is one of {', '.join(MAPS)}")
-    if conditions and suffix == TABLE:
-        raise typer.BadParameter(
-            f"-o {output}: --conditions draws {', '.join(FIGURES)}; a .csv is of one condition"
-        )
     described = load_machine(machine)
     survey = _survey(described, axis, length, (condition or "III").upper(), mode, suffix == TABLE)
     if as_json:
         from gcodejerk.report.map_record import map_record
 
         print(json.dumps(map_record(survey), indent=1, ensure_ascii=False, allow_nan=False))
-    if output is None and as_json:
-        return
-    if output is None:
+    elif output is None:
         from gcodejerk.report.tables import map_tables
 
         screen = console()
         for table in map_tables(survey):
             screen.print(table)
+    if output is None:
         return
     with new_file(output) as file:
         if suffix == TABLE:
@@ -183,6 +170,26 @@ def map_amplitudes(
 
             plot = plot_conditions if conditions else plot_map
             plot(survey, file, Path(output).suffix, points or POINTS, longest)
+
+
+def _suffix_of_map(output: str | None, condition: str | None, *, conditions: bool) -> str:
+    """What kind of file a map goes to, empty for none; options that contradict it are refused."""
+    if condition is not None and condition.upper() not in CONDITIONS:
+        raise typer.BadParameter(f"--condition {condition}: choose I, II or III")
+    if conditions and condition is not None:
+        raise typer.BadParameter("--conditions draws all three: leave --condition out")
+    if conditions and output is None:
+        raise typer.BadParameter("--conditions is of maps that are drawn (-o FILE)")
+    if output is None:
+        return ""
+    suffix = Path(output).suffix.lower()
+    if suffix not in MAPS:
+        raise typer.BadParameter(f"-o {output}: a map is one of {', '.join(MAPS)}")
+    if conditions and suffix == TABLE:
+        raise typer.BadParameter(
+            f"-o {output}: --conditions draws {', '.join(FIGURES)}; a .csv is of one condition"
+        )
+    return suffix
 
 
 def compare(

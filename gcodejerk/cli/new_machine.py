@@ -7,7 +7,7 @@ import os
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -72,8 +72,6 @@ def machine_new(
     from gcodejerk.errors import MachineError
     from gcodejerk.machine import Machine
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
-    from gcodejerk.machine.sources.draft import Fact
-    from gcodejerk.machine.sources.quantity import quantity
 
     if output != "-" and os.path.lexists(output) and not force:
         raise MachineError(
@@ -90,10 +88,7 @@ def machine_new(
     draft.name = name or draft.name
     draft.controller = controller or draft.controller
     draft.dialect = dialect
-    if positioning is not None:
-        draft.positioning = positioning, "as stated"
-    if interval is not None:
-        draft.interval = Fact(quantity(interval, "time", "interval"), f"as stated, {interval}")
+    _state(draft, positioning, interval)
     for words in axis or ():
         stated_axis(draft, words)
     if asked:
@@ -104,19 +99,33 @@ def machine_new(
     text = text_of(draft)
     # What is not a machine file never leaves.
     Machine.loads(text, output if output != "-" else str(folder / "new.yaml"))
-    if as_json:
-        record = {
-            "file": output, "kind": draft.kind, "controller": draft.controller,
-            "axes": [one.name for one in draft.ordered()], "modes_known": draft.known,
-            "assumed": [line.strip() for line in text.splitlines() if "ASSUMED:" in line],
-            "notes": draft.notes, "text": text,
-        }  # fmt: skip
     if output != "-" or not as_json:
         with new_file(output) as file:
             file.write(text.encode())
     if as_json:
-        print(json.dumps(record, indent=1, ensure_ascii=False))
+        print(json.dumps(_record(draft, text, output), indent=1, ensure_ascii=False))
     _say(draft, text, output)
+
+
+def _record(draft: Draft, text: str, output: str) -> dict[str, Any]:
+    """The file with what was assumed."""
+    return {
+        "file": output, "kind": draft.kind, "controller": draft.controller,
+        "axes": [one.name for one in draft.ordered()], "modes_known": draft.known,
+        "assumed": [line.strip() for line in text.splitlines() if "ASSUMED:" in line],
+        "notes": draft.notes, "text": text,
+    }  # fmt: skip
+
+
+def _state(draft: Draft, positioning: str | None, interval: str | None) -> None:
+    """Put what the user says in place of what was read."""
+    from gcodejerk.machine.sources.draft import Fact
+    from gcodejerk.machine.sources.quantity import quantity
+
+    if positioning is not None:
+        draft.positioning = positioning, "as stated"
+    if interval is not None:
+        draft.interval = Fact(quantity(interval, "time", "interval"), f"as stated, {interval}")
 
 
 def _say(draft: Draft, text: str, output: str) -> None:

@@ -87,14 +87,8 @@ def parameters(
         raise typer.BadParameter("give programs, or --lengths FROM:TO such as 1:500, and not both")
     if goal not in GOALS:
         raise typer.BadParameter(f"--goal {goal}: choose {' or '.join(GOALS)}")
-    if plot is not None and Path(plot).suffix.lower() not in FIGURES:
-        raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
-    if plot is not None and no_curve:
-        raise typer.BadParameter("--plot draws the curve: leave --no-curve out")
     own = _numbers(tried or [])
-    written = [name for name in (output, as_json, plot) if name is not None]
-    if len(set(written)) < len(written):
-        raise typer.BadParameter("-o, --json and --plot are different files")
+    written = _written(output, as_json, plot, no_curve=no_curve)
     described = load_machine(machine, files or ())
     emitter = load_controller(controller or described.controller)
     if not isinstance(emitter, Sheets):
@@ -135,6 +129,20 @@ def parameters(
         print(f"the setup sheet, with the way back: -o NAME{emitter.sheet_suffix}")
     else:
         print(f"{output}: the setup sheet, with the way back")
+
+
+def _written(
+    output: str | None, as_json: str | None, plot: str | None, *, no_curve: bool
+) -> list[str]:
+    """The files that are asked for; those that cannot be made are refused."""
+    if plot is not None and Path(plot).suffix.lower() not in FIGURES:
+        raise typer.BadParameter(f"--plot {plot}: a figure is one of {', '.join(FIGURES)}")
+    if plot is not None and no_curve:
+        raise typer.BadParameter("--plot draws the curve: leave --no-curve out")
+    written = [name for name in (output, as_json, plot) if name is not None]
+    if len(set(written)) < len(written):
+        raise typer.BadParameter("-o, --json and --plot are different files")
+    return written
 
 
 def _moves(
