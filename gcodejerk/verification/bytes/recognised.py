@@ -206,62 +206,75 @@ class Recognised:
     ) -> _Form | None:
         """Make holes where the numbers stand."""
         end = reader.line_end
-        words = [(w.letter, w.begin) for w in reader.block.words if w.letter not in "NG"]
         points = stream.text
         if not stream.rest:
             # The last point is spelled as the others are.
             points = points[: points.rstrip(b"\r\n").rfind(b"\n") + 1]
-        if (
-            reader.block.comments
-            or [a for a, _ in words] != [a.decode() for a, _ in plain.axes]
-            or not points
-            or len(stream.rest) > 1
-            or text.count(points) != 1
-        ):
+        words = [w.letter for w in reader.block.words if w.letter not in "NG"]
+        simple = words == [a.decode() for a, _ in plain.axes] and not reader.block.comments
+        if not simple or not points or len(stream.rest) > 1 or text.count(points) != 1:
             return None
         before, _, behind = text.partition(points)
         front, back = before.split(end)[:-1], behind.split(end)[:-1]
-        opens, closes = self.comment
-        commented = front[:1] == [opens + b"gcodejerk: " + plain.comment + closes]
-        front = front[commented:]
-        head = 0
-        if plain.head.strip() not in (b"", b"G0", b"G00"):
-            head = 1 if front[:1] == [plain.head] else 2
-            if front[:1] != [plain.head if head == 1 else plain.head.rstrip()]:
-                return None
-            front = front[1:]
+        opened = self._opened(front, plain)
+        if opened is None:
+            return None
+        commented, head, front = opened
         cut = len(front) - len(stream.lead)
-        setup, lead_lines = front[:cut], front[cut:]
-        lead = [_LEAD.fullmatch(line) for line in lead_lines]
+        setup = front[:cut]
+        lead = [found for line in front[cut:] if (found := _LEAD.fullmatch(line))]
         last = _END.fullmatch(back[0]) if back else None
-        if last is None or None in lead or any(b"gcodejerk" in line for line in setup):
+        if last is None or len(lead) < len(front) - cut or any(b"gcodejerk" in x for x in setup):
             return None
         letters = [word[:1] for word in last[2].split()]
         moving = set(stream.letters).union(*stream.lead) - {"F"}
-        if letters != [a for a, _ in plain.axes] or not moving <= {a.decode() for a in letters}:
+        if letters != [a for a, _ in plain.axes] or not moving <= set(words):
             return None
-        number = _NUMBER.replace(rb"\.?", rb"\.") if self._points_needed else _NUMBER
-        pattern = b"".join(re.escape(line + end) for line in setup)
-        for one in lead:
-            assert one is not None
-            pattern += re.escape(one[1] + b" " + one[2]) + _NUMBER
-            pattern += (b" F" + _FEED if one[4] else b"") + re.escape(end)
         run = reader.run(stream.letters).pattern
-        pattern += rb"(?P<points>" + run + rb")" + re.escape(last[1])
-        pattern += b"".join(b" " + letter + number for letter in letters)
-        pattern += (b" F" + _FEED if last[3] else b"") + re.escape(end)
-        pattern += b"".join(re.escape(line + end) for line in back[1:])
         widest = 25 * len(AXES) + 40
         return _Form(
             commented,
             head,
-            re.compile(pattern),
+            self._pattern(setup, lead, run, last, back[1:], end),
             stream.letters,
-            tuple((one[2].decode(), *("F" if one[4] else "")) for one in lead if one),
+            tuple((one[2].decode(), *("F" if one[4] else "")) for one in lead),
             tuple(letters),
             bool(last[3]),
             0 if reader.allowed.limit >= widest else reader.allowed.limit,
         )
+
+    def _opened(self, front: list[bytes], plain: Plain) -> tuple[bool, int, list[bytes]] | None:
+        """Whether a comment names the block, how its head stands, and the lines behind these."""
+        opens, closes = self.comment
+        commented = front[:1] == [opens + b"gcodejerk: " + plain.comment + closes]
+        front = front[commented:]
+        if plain.head.strip() in (b"", b"G0", b"G00"):
+            return commented, 0, front
+        head = 1 if front[:1] == [plain.head] else 2
+        if front[:1] != [plain.head if head == 1 else plain.head.rstrip()]:
+            return None
+        return commented, head, front[1:]
+
+    def _pattern(
+        self,
+        setup: list[bytes],
+        lead: list[re.Match[bytes]],
+        run: bytes,
+        last: re.Match[bytes],
+        behind: list[bytes],
+        end: bytes,
+    ) -> re.Pattern[bytes]:
+        """The lines of a replacement, with holes for its numbers."""
+        number = _NUMBER.replace(rb"\.?", rb"\.") if self._points_needed else _NUMBER
+        pattern = b"".join(re.escape(line + end) for line in setup)
+        for one in lead:
+            pattern += re.escape(one[1] + b" " + one[2]) + _NUMBER
+            pattern += (b" F" + _FEED if one[4] else b"") + re.escape(end)
+        pattern += rb"(?P<points>" + run + rb")" + re.escape(last[1])
+        pattern += b"".join(b" " + word[:1] + number for word in last[2].split())
+        pattern += (b" F" + _FEED if last[3] else b"") + re.escape(end)
+        pattern += b"".join(re.escape(line + end) for line in behind)
+        return re.compile(pattern)
 
     @property
     def _points_needed(self) -> bool:
