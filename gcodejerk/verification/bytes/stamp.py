@@ -94,20 +94,28 @@ def read_stamp(processed: BinaryIO, machine: Machine) -> Stamp | None:
     fed = "" if machine.rapid_feed is None else machine.rapid_feed.text
     names = dict.fromkeys((machine.controller, *_controllers()))
     profiles = dict.fromkeys((machine.design.profile, *PROFILES))
-    chosen = _choices(machine.settings_hash, tuple(names), tuple(profiles), fed).get(found)
+    chosen = _chosen(found, machine.settings_hash, tuple(names), tuple(profiles), fed)
     return Stamp(found, True, *chosen) if chosen else Stamp(found)
 
 
-@lru_cache(maxsize=16)
-def _choices(
-    settings_hash: str, names: tuple[str, ...], profiles: tuple[str, ...], rapid_feed: str
-) -> dict[str, tuple[str, str, str | None, bool]]:
-    """Controller, profile, dialect and expansion by their hash: all that a user can choose."""
-    out: dict[str, tuple[str, str, str | None, bool]] = {}
+@lru_cache(maxsize=256)
+def _chosen(
+    stamped: str,
+    settings_hash: str,
+    names: tuple[str, ...],
+    profiles: tuple[str, ...],
+    rapid_feed: str,
+) -> tuple[str, str, str | None, bool] | None:
+    """Controller, profile, dialect and expansion that give a hash, of all that a user can choose.
+
+    The machine file's own come first: most stamps are found at once.
+    """
     for dialect, expand, name, profile in product(
         (None, *DIALECTS, "auto"), (False, True), names, profiles
     ):
         for form in (*FORMS.get(name, (FORM,)), PARAMETERS):
-            found = choices_hash(settings_hash, name, profile, expand, dialect, form, rapid_feed)
-            out.setdefault(found, (name, profile, dialect, expand))
-    return out
+            if stamped == choices_hash(
+                settings_hash, name, profile, expand, dialect, form, rapid_feed
+            ):
+                return name, profile, dialect, expand
+    return None

@@ -25,6 +25,7 @@ then neither the distance of the points excuses anything, nor how few there are 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,6 +176,21 @@ class _Streams:
         out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
         if self.laws is not None:
             return self._by_law(modes, self.laws)
+        widths, rest = self._boxes
+        for a in self.axes:
+            felt = np.flatnonzero(modes.participation[:, a])
+            pole = modes.poles[felt]
+            factor = pole * np.exp(pole * rest[:, a, np.newaxis])
+            for width in widths[a]:
+                factor = factor * _phi(pole * width[:, np.newaxis])
+            amount = modes.participation[felt, a] * displacement[:, a, np.newaxis]
+            out[:, felt] += amount * factor / pole.imag
+        return out
+
+    @cached_property
+    def _boxes(self) -> tuple[dict[int, tuple[Array, Array, Array]], Array]:
+        """Of each axis the widths of its three averages, and how long it waits for the last."""
+        displacement = self.paths.displacement
         ends = np.zeros(displacement.shape)
         widths = {}
         for a in self.axes:
@@ -182,17 +198,7 @@ class _Streams:
             V, A, J = (np.where(moves, limit[:, a], 1.0) for limit in self.limits)
             widths[a] = box_widths(V, A, J, bell=self.machine.planner == BELL)
             ends[:, a] = np.where(moves, np.sum(widths[a], axis=0), 0.0)
-        rest = ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
-        for m, pole in enumerate(modes.poles):
-            for a in self.axes:
-                amount = modes.participation[m, a] * displacement[:, a]
-                if not amount.any():
-                    continue
-                factor = pole * np.exp(pole * rest[:, a])
-                for width in widths[a]:
-                    factor = factor * _phi(pole * width)
-                out[:, m] += amount * factor / pole.imag
-        return out
+        return widths, ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
 
     def _by_law(self, modes: Oscillators, laws: OwnRapids) -> NDArray[np.complex128]:
         """The same of a control with a law or a filter of its own."""
