@@ -16,9 +16,12 @@ velocity within V and A, and from its position the mean over the last A/J.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gcodejerk.verification.physics.oscillators import Oscillators
 
 Array = NDArray[np.float64]
 
@@ -159,3 +162,52 @@ def rapid_time(velocity: Array, acceleration: Array, jerk: Array, *, bell: bool 
     ramp = _ramp(peak, acceleration, jerk)
     cruise = np.maximum(1.0 - peak * ramp, 0.0) / peak
     return 2.0 * ramp + cruise
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Boxes:
+    """Rapids as three averages of a step, one behind the other, each axis with its own.
+
+    Attributes
+    ----------
+    displacement : ndarray, shape (n, 9)
+        [mm] or [deg]
+    widths : ndarray, shape (3, n, 9)
+        Over how long each average goes. [s]
+    rest : ndarray, shape (n, 9)
+        How long an axis that has arrived waits for the last one. [s]
+    """
+
+    displacement: Array
+    widths: Array
+    rest: Array
+
+    @classmethod
+    def of(cls, displacement: Array, limits: Array, *, bell: bool = False) -> Boxes:
+        """Of rapids within limits over the displacement, (3, n, 9), as `box_widths` has them."""
+        moves = displacement != 0.0
+        V, A, J = (np.where(moves, limit, 1.0) for limit in limits)
+        widths = np.where(moves, box_widths(V, A, J, bell=bell), 0.0)
+        ends = widths.sum(axis=0)
+        return cls(displacement, widths, ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends)
+
+    def response(self, modes: Oscillators) -> NDArray[np.complex128]:
+        """Vibration that they leave, shape (n, m) [mm]."""
+        out = np.zeros((len(self.displacement), len(modes.poles)), dtype=np.complex128)
+        for a in np.flatnonzero(self.displacement.any(axis=0)).tolist():
+            felt = np.flatnonzero(modes.participation[:, a])
+            pole = modes.poles[felt]
+            factor = pole * np.exp(pole * self.rest[:, a, np.newaxis])
+            for width in self.widths[:, :, a]:
+                factor = factor * _phi(pole * width[:, np.newaxis])
+            amount = modes.participation[felt, a] * self.displacement[:, a, np.newaxis]
+            out[:, felt] += amount * factor / pole.imag
+        return out
+
+
+def _phi(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """(exp(x) - 1)/x, 1 at 0."""
+    small = np.abs(x) < 1e-6
+    safe = np.where(small, 1.0, x)
+    out: NDArray[np.complex128] = np.where(small, 1.0 + 0.5 * x, (np.exp(safe) - 1.0) / safe)
+    return out

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
-from gcodejerk.verification.physics.conventional import box_widths, rapid_position
+from gcodejerk.verification.physics.conventional import Boxes, rapid_position
 from gcodejerk.verification.physics.laws import OwnRapids, has_law
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import Array, Index, Paths
@@ -172,33 +172,15 @@ class _Streams:
 
     def own(self, modes: Oscillators) -> NDArray[np.complex128]:
         """Vibration left by the controller's own rapid, shape (streams, m) [mm]."""
-        displacement = self.paths.displacement
-        out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
         if self.laws is not None:
             return self._by_law(modes, self.laws)
-        widths, rest = self._boxes
-        for a in self.axes:
-            felt = np.flatnonzero(modes.participation[:, a])
-            pole = modes.poles[felt]
-            factor = pole * np.exp(pole * rest[:, a, np.newaxis])
-            for width in widths[a]:
-                factor = factor * _phi(pole * width[:, np.newaxis])
-            amount = modes.participation[felt, a] * displacement[:, a, np.newaxis]
-            out[:, felt] += amount * factor / pole.imag
-        return out
+        return self._boxes.response(modes)
 
     @cached_property
-    def _boxes(self) -> tuple[dict[int, tuple[Array, Array, Array]], Array]:
-        """Of each axis the widths of its three averages, and how long it waits for the last."""
-        displacement = self.paths.displacement
-        ends = np.zeros(displacement.shape)
-        widths = {}
-        for a in self.axes:
-            moves = displacement[:, a] != 0.0
-            V, A, J = (np.where(moves, limit[:, a], 1.0) for limit in self.limits)
-            widths[a] = box_widths(V, A, J, bell=self.machine.planner == BELL)
-            ends[:, a] = np.where(moves, np.sum(widths[a], axis=0), 0.0)
-        return widths, ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
+    def _boxes(self) -> Boxes:
+        """The controller's own rapids: the band asks for them again and again."""
+        bell = self.machine.planner == BELL
+        return Boxes.of(self.paths.displacement, self.limits, bell=bell)
 
     def _by_law(self, modes: Oscillators, laws: OwnRapids) -> NDArray[np.complex128]:
         """The same of a control with a law or a filter of its own."""
@@ -256,11 +238,3 @@ class _Streams:
         position[k] = middle
         out: Array = np.abs(self.lines(modes, position) - fine) / 3.0
         return out
-
-
-def _phi(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(exp(x) - 1)/x, 1 at 0."""
-    small = np.abs(x) < 1e-6
-    safe = np.where(small, 1.0, x)
-    out: NDArray[np.complex128] = np.where(small, 1.0 + 0.5 * x, (np.exp(safe) - 1.0) / safe)
-    return out

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cached_property
 from itertools import islice
 
 import numpy as np
@@ -18,7 +19,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
 from gcodejerk.nc import CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.physics.conventional import box_widths
+from gcodejerk.verification.physics.conventional import Boxes
 from gcodejerk.verification.physics.dynamics import check_dynamics
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.own_rapids import (
@@ -349,7 +350,7 @@ class _Judge:
         for factor in self._band(modes):
             around = modes.at(float(factor))
             left = np.maximum(left, around.largest(self.pieces.response(around)))
-            allowed = np.maximum(allowed, around.largest(self._own(around)))
+            allowed = np.maximum(allowed, around.largest(np.abs(self._own.response(around))))
         allowed *= 1.0 + RELATIVE
         if self.machine.design.profile == "shortest":
             allowed = np.maximum(allowed, SHORTEST * self.machine.design.tolerance)
@@ -368,31 +369,14 @@ class _Judge:
         half = max(BAND_POINTS // 2, int(np.ceil(phase / BAND_STEP)))
         return np.linspace(1.0 - band, 1.0 + band, 2 * half + 1) if band else np.ones(1)
 
-    def _own(self, modes: Oscillators) -> Array:
-        """What the controller's own rapids leave, in closed form, shape (b, m) [mm]."""
+    @cached_property
+    def _own(self) -> Boxes:
+        """The controller's own rapids."""
         limits = rapid_limits(self.paths, self.machine)
         if self.machine.positioning == "linear":
             limits = np.repeat(limits.min(axis=2)[:, :, np.newaxis], len(AXES), axis=2)
-        D = self.paths.displacement
-        V, A, J = (np.where(D != 0.0, limit, 1.0) for limit in limits)
-        widths = box_widths(V, A, J, bell=self.machine.planner == BELL)
-        ends = np.where(D != 0.0, np.sum(widths, axis=0), 0.0)
-        rest = ends.max(axis=1, keepdims=True) - ends
-        out = np.zeros((len(D), len(modes.poles)), dtype=np.complex128)
-        for m, pole in enumerate(modes.poles):
-            factor = modes.participation[m] * D * pole * np.exp(pole * rest)
-            for width in widths:
-                factor = factor * _phi(pole * width)
-            out[:, m] = factor.sum(axis=1) / pole.imag
-        return np.abs(out)
-
-
-def _phi(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(exp(x) - 1)/x, 1 at 0."""
-    small = np.abs(x) < 1e-6
-    safe = np.where(small, 1.0, x)
-    out: NDArray[np.complex128] = np.where(small, 1.0 + 0.5 * x, (np.exp(safe) - 1.0) / safe)
-    return out
+        bell = self.machine.planner == BELL
+        return Boxes.of(self.paths.displacement, limits, bell=bell)
 
 
 def _ends(index: Index, moves: list[Move], rapids: Rapids, machine: Machine) -> Paths:
