@@ -144,12 +144,13 @@ class Candidates:
                 break
         return value, int(index[at]), int(group)
 
-    def cut(self, move: int, group: int, alive: NDArray[np.bool_]) -> None:
-        """Bound all candidates that are alive by what one move leaves at one frequency."""
-        if (move, group) in self.cuts or not alive.any():
+    def cut(self, move: int, groups: set[int], alive: NDArray[np.bool_]) -> None:
+        """Bound all candidates that are alive by what one move leaves at some frequencies."""
+        new = groups - {group for own, group in self.cuts if own == move}
+        if not new or not alive.any():
             return
-        self.cuts.add((move, group))
-        one = self.judge.take(np.array([move])).at(np.array([group]))
+        self.cuts |= {(move, group) for group in new}
+        one = self.judge.take(np.array([move])).at(np.array(sorted(new)))
         index = np.flatnonzero(alive)
         self.bound[index] = np.maximum(self.bound[index], one.worst(self.rows[index])[:, 0])
 
@@ -179,7 +180,7 @@ class Candidates:
             if value < best_value:
                 best, best_value, judged[k] = k, value, value
             if value > self.bound[k] * (1.0 + 1e-9):
-                self.cut(move, group, alive)
+                self.cut(move, {group}, alive)
         return None if best < 0 else self._found(best, judged, proven)
 
     def mean_of(self, goal: Goal) -> Found | None:
@@ -208,9 +209,13 @@ class Candidates:
         index = np.flatnonzero(alive)
         tried = [start] if start >= 0 else []
         tried += index[np.linspace(0, len(index) - 1, FIRST_CUTS).astype(int)].tolist()
-        for k in dict.fromkeys(tried):
-            _, move, group = self.largest(k, 0.0)
-            self.cut(move, group, alive)
+        left = self.judge.take(self.sample).residuals(self.rows[list(dict.fromkeys(tried))])
+        worst: dict[int, set[int]] = {}
+        for each in left:
+            at, group = np.unravel_index(int(each.argmax()), each.shape)
+            worst.setdefault(int(self.sample[at]), set()).add(int(group))
+        for move, groups in worst.items():
+            self.cut(move, groups, alive)
 
     def _found(self, best: int, judged: dict[int, float], proven: bool) -> Found:
         """The best, or one as good as it that is faster."""
