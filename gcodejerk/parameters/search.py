@@ -33,6 +33,8 @@ MOST_OF_ONE = 256
 """Numbers of one setting that are searched at a time."""
 SAMPLE = 48
 """Moves that stand for all where candidates are sorted out."""
+MOST_AHEAD = 256
+"""Candidates of which the times of all moves are computed at once."""
 SAME = 1.0 + 1e-6
 """Times that differ by less are the same. [-]"""
 SURE = 0.03
@@ -116,14 +118,22 @@ class Candidates:
         if not len(self.sample):
             self.sample = self.needed
         self.totals: dict[int, float] = {}
+        self.ahead = 1
+        """For how many candidates times are computed at once: twice as many each time."""
 
-    def total(self, k: int) -> float:
-        """Time of all moves at one candidate [s]."""
+    def total(self, k: int, alive: NDArray[np.bool_] | None = None) -> float:
+        """Time of all moves at one candidate [s]; `alive`: those that are asked for next."""
+        if self.exact:
+            return float(self.estimated[k])
         if k not in self.totals:
-            if self.exact:
-                self.totals[k] = float(self.estimated[k])
-            else:
-                self.totals[k] = float(self.judge.times(self.rows[k : k + 1])[0] @ self.moves.count)
+            some = [k]
+            if alive is not None:
+                near = np.flatnonzero(alive)
+                near = near[np.argsort(self.bound[near], kind="stable")]
+                some += near[: self.ahead - 1].tolist()
+                self.ahead = min(2 * self.ahead, MOST_AHEAD)
+            times = self.judge.times(self.rows[some]) @ self.moves.count
+            self.totals |= dict(zip(some, times.tolist(), strict=True))
         return self.totals[k]
 
     def residuals(self, k: int) -> Array:
@@ -172,7 +182,7 @@ class Candidates:
                 break
             k = int(np.flatnonzero(alive)[self.bound[alive].argmin()])
             alive[k] = False
-            if self.total(k) > goal.budget * SAME:
+            if self.total(k, alive) > goal.budget * SAME:
                 continue
             rounds += 1
             value, move, group = self.largest(k, best_value)

@@ -110,7 +110,9 @@ def unit_quantities(family: Family, values: Mapping[str, Array], share: Array) -
     dict of str to ndarray, shape (n,) or (k n,)
         Limits in 1/s, 1/s^2, 1/s^3; times in s.
     """
-    size = np.abs(share)
+    used = np.flatnonzero(share.any(axis=0)) if share.any() else np.arange(share.shape[1])
+    values = {name: np.asarray(value)[..., used] for name, value in values.items()}
+    size = np.abs(share[:, used])
     moving = size > 0.0
     with np.errstate(divide="ignore"):
         inverse = np.where(moving, 1.0 / size, np.inf)
