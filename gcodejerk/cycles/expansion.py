@@ -209,6 +209,7 @@ class _Expander(Walker):
         if self.series is not None:
             self._close(self.series)
 
+    # Complex: what is known before a line acts has to be kept until it has acted.
     def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
         """Take one line; its cycles are noticed before and after it acts."""
         bare = text.removesuffix(b"\r")

@@ -278,6 +278,7 @@ class LeftAlone:
     reason: str
 
 
+# Complex: one doubt behind another, in the order in which they are told.
 def call_of(series: Series, moment: Moment, block: Block, rules: DrillingRules) -> Call | LeftAlone:
     """One block of a series as a call of its cycle, or why it is none; the series goes on."""
     state = moment.state

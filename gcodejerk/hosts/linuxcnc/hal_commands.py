@@ -93,6 +93,7 @@ def _commands(path: Path) -> Iterator[tuple[list[str], Place]]:
             yield words, Place(str(path), begun)
 
 
+# Complex: one case for each command of HAL.
 def _run(hal: Hal, commands: Iterator[tuple[list[str], Place]], ini: Ini) -> None:
     """Note what commands do."""
     for raw, place in commands:

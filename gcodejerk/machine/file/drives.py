@@ -248,6 +248,7 @@ def _checked_bodies(bodies: dict[int, Any], path: KeyPath, checker: Checker) -> 
     return names
 
 
+# Complex: one thing that can be wrong behind another.
 def _wrong_matrices(found: dict[str, Any]) -> str:
     """What is wrong with the arrays of a file; empty where nothing is."""
     for key in ("M", "K"):

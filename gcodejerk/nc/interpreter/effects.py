@@ -70,6 +70,7 @@ class Effects:
             return "none"
         return self.dialect.names.get(name.name, "flow")
 
+    # Complex: one case for each effect.
     def _effect(self, effect: Effect, code: int, values: dict[str, float], step: Step) -> None:
         """Do what a code outside the non-modal group, or a name, does besides."""
         state = self.state
@@ -178,6 +179,7 @@ class Effects:
                 self._effect("cycle", 0, {}, step)
                 self._transform("swivel", on=on)
 
+    # Complex: what TRANS, ATRANS and ROT have in common is nearly all.
     def _program_frame(self, effect: Effect, codes: Codes) -> None:
         """TRANS shifts the frame, ATRANS by more, ROT turns it; each of them alone ends it all."""
         state, values = self.state, codes.values

@@ -119,6 +119,7 @@ def looks_rapid(
     return bool((dialect.rapid in stated or implied) and axes)
 
 
+# Complex: one reason behind another, in the order in which they are told.
 def why_left_alone(
     block: Block,
     codes: Codes,

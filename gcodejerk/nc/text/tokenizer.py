@@ -111,6 +111,7 @@ class _Line(Cursor):
             else:
                 raise SyntaxProblem("text after an O-word", self.at)
 
+    # Complex: called for every word that is read the slow way; its usual case makes no call.
     def word(self) -> None:
         """Take one word."""
         begin = self.at

@@ -201,6 +201,7 @@ class Recognised:
             self.forms.clear()
         self.forms[self._key(stream.rapid, plain, follows)] = form
 
+    # Complex: each line asks for one more thing that a simple form has.
     def _form(
         self, reader: StreamReader, stream: Stream, plain: Plain, text: bytes
     ) -> _Form | None:

@@ -123,6 +123,7 @@ class RowsFile:
             raise NoRowError("nothing stands below the title of a rapid")
         return text.parse(body, self.machine)
 
+    # Complex: one grammar, line by line: its parts would hand five variables to each other.
     def _blocks(self, text: TextFormat) -> Iterator[Move]:
         """Titled blocks of lines; comments that no title begins are not looked at."""
         title: tuple[int, int] | None = None

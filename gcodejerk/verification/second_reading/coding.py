@@ -133,6 +133,7 @@ class Codes(Known):
                 self.bars[self.dialect.m_bars[m]] = _switched(block.values.get("P", 1.0))
         return ends
 
+    # Complex: one case for each group of M codes.
     def _m_groups(self, block: Sorted) -> bool:
         """Do what the groups of M codes say; whether the program ends behind the block."""
         ends = False

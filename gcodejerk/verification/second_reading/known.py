@@ -278,6 +278,7 @@ class Known:
         self.home = {}
         self.bars.update({"offsets": True, "tool data": True})
 
+    # Complex: one case for each way in which controls wrap an axis.
     def turn(self, k: int, angle: float) -> float:
         """Where a rotary axis ends that was told an absolute angle."""
         wrap, here = self.facts.wraps.get(AXES[k]), self.at[k]

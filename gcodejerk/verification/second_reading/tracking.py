@@ -406,6 +406,7 @@ class Tracker(Drilling):
                     there = self.turn(k, there)
                 self.at[k] = NAN if distance is None and how is None else there
 
+    # Complex: one reason behind another, in the order in which they are told.
     def _why_not(self, block: Sorted, seen: Observation) -> None:
         """Whether the move was a rapid in a known frame."""
         compensation = self.g.get("compensation")
