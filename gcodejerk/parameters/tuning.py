@@ -238,7 +238,9 @@ def tune(
     for share, way in sorted(found.items(), key=lambda item: item[0]):
         if way is not None:
             one = _at(judge, way[0], goal)
-            points.append(Point(share, one.total, one.value, way[0]))
+            tidy = _tidy(scheme, way[0], before)
+            shown = np.where(np.isnan(tidy), way[0], tidy)
+            points.append(Point(share, one.total, one.value, shown))
     points = [
         point
         for point in points
