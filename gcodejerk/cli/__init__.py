@@ -71,6 +71,10 @@ machine_app.command("schema")(machine_schema)
 def main() -> None:
     """Run the command line; every mistake of a user is a message, every other one a traceback."""
     _end_in_order()
+    # Our matrices are small: threads would wait for each other, on a busy computer for longer than
+    # all the rest takes. Read by the libraries as numpy is imported, here and in our processes.
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+        os.environ.setdefault(name, "1")
     try:
         try:
             app(standalone_mode=True)

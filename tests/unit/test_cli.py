@@ -310,3 +310,19 @@ def test_a_reader_that_closes_its_end_gets_no_traceback(folder):
     )  # fmt: skip
     assert done.stdout.strip() == "{"
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("4", "4")])
+def test_linear_algebra_has_one_thread_unless_the_user_says_otherwise(given, threads):
+    code = (
+        "import os, sys; from gcodejerk.cli import main; early = 'numpy' in sys.modules\n"
+        "sys.argv = ['gcodejerk', '--version']\n"
+        "try: main()\n"
+        "except SystemExit: print(early, os.environ['OPENBLAS_NUM_THREADS'])\n"
+    )
+    own = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    own |= {} if given is None else {"OPENBLAS_NUM_THREADS": given}
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=own, capture_output=True, text=True, check=True
+    )
+    assert run.stdout.splitlines()[-1] == f"False {threads}"
