@@ -406,21 +406,15 @@ class Tracker(Drilling):
                     there = self.turn(k, there)
                 self.at[k] = NAN if distance is None and how is None else there
 
-    # Complex: one reason behind another, in the order in which they are told.
     def _why_not(self, block: Sorted, seen: Observation) -> None:
         """Whether the move was a rapid in a known frame."""
-        compensation = self.g.get("compensation")
-        if compensation != G40:
+        compensated = self.g.get("compensation") != G40
+        if compensated:
             self.lose(self.in_plane())
-            if compensation is not None:
-                seen.against = seen.against or "cutter compensation is active"
-        if self.turned():
-            if not self.drilled_behind(seen):
-                self.lose()
-            if True in self.frames.values():
-                seen.against = seen.against or "a rotation, scaling or mirroring is active"
+        if self.turned() and not self.drilled_behind(seen):
+            self.lose()
         seen.against = seen.against or self._barred(block, seen)
-        known = compensation == G40 and not self.turned() and self.depth == 0 and not self.doubt
+        known = not (compensated or self.turned() or self.depth or self.doubt)
         known = known and all(on is False for on in self.bars.values())
         known = known and (self.path is not None or not self.dialect.path_has_to_be_stated)
         known = known and (self.feed_unit is not None or not self.dialect.lengths_only)
@@ -430,6 +424,10 @@ class Tracker(Drilling):
 
     def _barred(self, block: Sorted, seen: Observation) -> str | None:
         """What else speaks against rewriting the move."""
+        if self.g.get("compensation") not in (G40, None):
+            return "cutter compensation is active"
+        if True in self.frames.values():
+            return "a rotation, scaling or mirroring is active"
         for name, on in self.bars.items():
             if on:
                 return f"rapids have to stay as they are ({name})"
