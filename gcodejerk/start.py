@@ -107,6 +107,8 @@ class Start:
     rapid_feed: RapidFeed | None = None
     """Feed moves that count as rapids; None, as a rule: none do."""
     cycles: CycleSettings = field(default_factory=CycleSettings)
+    unrolled_lines: int | None = None
+    """Lines that loops and calls may be written out as, at most; None: the program's own bound."""
     subprograms: Mapping[str, bytes] = field(default_factory=dict)
     """Files in which the control finds what a program calls: name -> text."""
 

@@ -2,7 +2,7 @@
 
 This module owns the walk through the file. Whether a series of cycles is certain, and what its
 blocks become, is told by `series`; what a cycle does, by `drilling`; where the lines of the result
-come from, by `line_map`.
+come from, by `nc.line_map`.
 
 Rule 1: the file is walked twice, first to judge every series, then to write; so no series is held
 in memory, however long it is.
@@ -22,7 +22,6 @@ import numpy as np
 from gcodejerk.cycles.blocks import write_block
 from gcodejerk.cycles.called import JUMPS, CallExpander
 from gcodejerk.cycles.drilling import DRILLING, rules_for
-from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.cycles.numbers import decimal
 from gcodejerk.cycles.series import (
     LeftAlone,
@@ -44,6 +43,7 @@ from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G61, G61_1, G64
 from gcodejerk.nc.interpreter.runner import Finding
+from gcodejerk.nc.line_map import LineMap
 from gcodejerk.nc.text.block import Block
 from gcodejerk.nc.text.tokenizer import parse_line
 from gcodejerk.reasons import Reason

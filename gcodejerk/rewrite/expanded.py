@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.cycles.expansion import Expansion, expand
-from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
+from gcodejerk.nc.line_map import LineMap
 from gcodejerk.verification import Verification, Violation, require, verify_files
 from gcodejerk.verification.cycles.expansion import check_expansion
 
@@ -271,15 +271,16 @@ def hunks(
             np.where(stamp, first, rapids.line[at]) if len(rapids) else np.full(len(edits), first)
         )
         return np.stack([edits[:, 0], edits[:, 1], line, begin, end], axis=1)
+    spans = lines.replaced
     grown = np.concatenate([[0], np.cumsum(edits[:, 1] - edits[:, 0] - (end - begin))])
     out = [
         place + grown[np.searchsorted(end, place, side="right")]
-        for place in (lines.begin, lines.end)
+        for place in (spans.begin, spans.end)
     ]
-    back = TERMINATOR_LENGTH[lines.original_terminator]
-    blocks = [*out, lines.original_line, lines.original_begin, lines.original_end + back]
-    k = np.searchsorted(lines.begin, begin, side="right") - 1
-    alone = stamp | (k < 0) | (begin >= lines.end[k])
+    back = TERMINATOR_LENGTH[spans.original_terminator]
+    blocks = [*out, spans.original_line, spans.original_begin, spans.original_end + back]
+    k = np.searchsorted(spans.begin, begin, side="right") - 1
+    alone = stamp | (k < 0) | (begin >= spans.end[k])
     mapped = lines.rapids_of(rapids)
     original = np.where(stamp, insert_at, mapped.begin[at])
     line = np.where(stamp, first, mapped.line[at])

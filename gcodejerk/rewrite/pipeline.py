@@ -17,13 +17,13 @@ from typing import BinaryIO
 import numpy as np
 
 from gcodejerk.cycles.expansion import Expansion
-from gcodejerk.cycles.line_map import LineMap
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, read_program
+from gcodejerk.nc.line_map import LineMap
 from gcodejerk.planning.independent_axes import dogleg_notes
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans

@@ -50,6 +50,7 @@ class Kind(enum.StrEnum):
     CYCLE = "moves of a cycle"
     READING = "second reading"
     SETTING = "settings of the control"
+    FLOW = "blocks of a loop or call"
     SERIES = "cycle that had to be left to the controller"
 
 

@@ -38,7 +38,7 @@ ROOMS = {
     "": order("""
     _version axes errors units reasons start advice
  <- nc | machine | motion
- <- cycles | planning
+ <- cycles | unrolling | planning
  <- studies | parameters | verification | testing | identification | simulation
  <- emit
  <- rewrite
@@ -68,19 +68,19 @@ ROOMS = {
  <- reader
  <- following_reader
  <- program
- <- feed_moves
+ <- feed_moves line_map
 """),
     "verification": order("""
     findings
  <- bytes
  <- physics | second_reading
- <- cycles | table samples settings | rows | reported
+ <- cycles unrolling | table samples settings | rows | reported
  <- proof
 """),
 }
 """Room -> its parts in the order in which they may import; the package itself is ``""``."""
 NEVER = {
-    "verification": {"motion", "planning", "emit", "cycles"},
+    "verification": {"motion", "planning", "emit", "cycles", "unrolling"},
     "emit": {"verification", "report"},
 }
 """What the picture alone would allow, or what matters enough to be said twice."""

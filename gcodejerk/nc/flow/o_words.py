@@ -124,6 +124,10 @@ class Passes:
         """What LinuxCNC keeps of the jumps so far: a pass may run otherwise once it has changed."""
         return self._broken, self._continued, len(self._stale)
 
+    def _same(self, before: State, behind: State) -> bool:
+        """Whether a pass has changed nothing, so that every further pass is the same."""
+        return agree(before, behind)
+
     def _count(self) -> None:
         self._spent += 1
         if self._spent > ALL:
@@ -239,7 +243,7 @@ class Passes:
             before, memory = current.copy(), self._memory()
             current, broken = self._pass(node, current, exits)
             leave = _either(leave, broken)
-            same = current is not None and agree(before, current)
+            same = current is not None and self._same(before, current)
             if same and broken is None and memory == self._memory():
                 break  # every further pass is the same
         if current is not None and self._continued:
@@ -280,7 +284,7 @@ class Passes:
                     _add(exits, self._settle(node, current, test_first))
                     current = exits.pop(NEXT, None)
                     break
-            same = current is not None and agree(before, current)
+            same = current is not None and self._same(before, current)
             if same and memory == self._memory():
                 current = None  # endless
         return self._left(exits, _either(current, leave))

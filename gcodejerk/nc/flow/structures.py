@@ -54,7 +54,9 @@ def plain_name(name: str) -> str | None:
 class Collector:
     """Takes lines until a structure is complete."""
 
-    def __init__(self) -> None:
+    def __init__(self, comments: bool = False) -> None:
+        """Begin; `comments`: lines with nothing else belong to a body, too."""
+        self.comments = comments
         self.lines: list[Line] = []
         self._stack: list[Node] = []
         self._size = 0
@@ -81,7 +83,8 @@ class Collector:
         if len(self.lines) > MOST_LINES or self._size > MOST_BYTES or block.percent:
             raise ValueError
         if block.o_word is None:
-            if block.words or block.assigns or block.names or block.problem:
+            says = block.words or block.assigns or block.names or block.problem
+            if says or (self.comments and block.comments):
                 self._append(Node("line", "", line))
             return None
         name = plain_name(block.o_name)

@@ -1,4 +1,8 @@
-"""Where the blocks that were written out stand: from the lines of the result to the original's."""
+"""From the lines of a program with blocks written out to those of the original.
+
+Rule: whatever stands in front of the eight steps and writes blocks out (drilling cycles, loops and
+calls) leaves such a map, and everybody who names lines of its result goes through it.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +33,13 @@ class LineMap:
     original_end: NDArray[np.int64]
     original_terminator: NDArray[np.int64]
     """As `Rapids.terminator`."""
+    whole: LineMap | None = None
+    """What was replaced as one, where several blocks of the original were; None: each by itself."""
+
+    @property
+    def replaced(self) -> LineMap:
+        """What was replaced, piece by piece, in the order of both files."""
+        return self if self.whole is None else self.whole
 
     def __len__(self) -> int:
         return len(self.line)

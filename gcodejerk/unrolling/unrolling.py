@@ -1,0 +1,149 @@
+"""The step in front that writes a program's flow out; what it gives back.
+
+Rule: a file is read whole, up to `MOST_BYTES`, and judged before anything is written.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import BinaryIO
+
+from gcodejerk.errors import EmitError, ProgramError
+from gcodejerk.nc.dialects import find_dialect
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.runner import Finding
+from gcodejerk.nc.line_map import LineMap
+from gcodejerk.nc.program import follow
+from gcodejerk.nc.text.chunks import read_chunks
+from gcodejerk.start import NOTHING_KNOWN, Start
+from gcodejerk.unrolling.o_words import OWordUnroller
+from gcodejerk.unrolling.pieces import LeftAloneError, Piece, put_together
+
+MOST_LINES = 100_000
+"""Lines that are written, where the machine file says nothing else."""
+MOST_BYTES = 16_000_000
+"""Of a program."""
+_SHOWN = 20
+"""Structures left alone that get a finding of their own."""
+_PLACE = re.compile(rb"<_(?:value|value_returned|call_level|remap_level|line)>")
+"""Variables of LinuxCNC that say where in the flow it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unrolling:
+    """What was written out, and what was not."""
+
+    blocks: int
+    """Of the original."""
+    structures: int
+    """Loops, branches and calls of the main program."""
+    written: int
+    """Those of them that were written out."""
+    lines: int
+    """That stand in their place."""
+    findings: tuple[Finding, ...]
+    map: LineMap
+
+
+def unroll(
+    source: BinaryIO,
+    target: BinaryIO,
+    *,
+    name: str = "<program>",
+    dialect: str | Dialect = "linuxcnc",
+    start: Start = NOTHING_KNOWN,
+    comments: bool = True,
+) -> Unrolling:
+    r"""Write loops, branches and calls out in the order in which their blocks run.
+
+    Parameters
+    ----------
+    source : BinaryIO
+        The program, seekable, at its beginning.
+    target : BinaryIO
+        Takes the result; nothing is written where nothing can be written out.
+    name : str, optional
+        For messages.
+    dialect : str or Dialect, optional
+        How the program is written.
+    start : Start, optional
+        What may be assumed when it starts; `Start.unrolled_lines` is the bound.
+    comments : bool, optional
+        Name each structure that is written out in a comment.
+
+    Returns
+    -------
+    Unrolling
+        With `written` 0, and nothing in `target`, where nothing is certain.
+
+    Raises
+    ------
+    ProgramError
+        The file cannot be an NC program, or the dialect's flow cannot be written out.
+    EmitError
+        The file was changed meanwhile.
+
+    Examples
+    --------
+    >>> import io
+    >>> program = b"#1=0\no1 while [#1 LT 2]\nG0 X#1\n#1=[#1+1]\no1 endwhile\nM2\n"
+    >>> target = io.BytesIO()
+    >>> unroll(io.BytesIO(program), target, comments=False).lines
+    4
+    >>> target.getvalue().decode().split("\n")[:-1]
+    ['#1=0', 'G0 X#1', '#1=[#1+1]', 'G0 X#1', '#1=[#1+1]', 'M2']
+    """
+    chosen = find_dialect(dialect)
+    if chosen.text.o_word != "flow":
+        raise ProgramError(
+            f"loops and calls of dialect '{chosen.name}' cannot be written out",
+            "leave --unroll out; it knows those of: linuxcnc",
+        )
+    begin = source.tell()
+    data = source.read(MOST_BYTES + 1)
+    source.seek(begin)
+    most = start.unrolled_lines or MOST_LINES
+    reader = OWordUnroller(name, chosen, start, most, comments)
+    program = follow(read_chunks(source, name), reader, None, True)
+    pieces = reader.pieces()
+    left = reader.left
+    if len(data) > MOST_BYTES:
+        pieces, left = [], [(1, LeftAloneError(f"more than {MOST_BYTES // 10**6} MB", 1))]
+    elif match := _PLACE.search(data.translate(None, b" \t").lower()):
+        read = match[0].decode()
+        pieces, left = [], [(1, LeftAloneError(f"the program reads #{read}", 1))]
+    again = target if pieces else None
+    source.seek(begin)
+    lines = put_together(source, again, pieces, program.newline)
+    source.seek(begin)
+    if source.read(MOST_BYTES + 1) != data:
+        raise EmitError(
+            f"{name} was changed while it was being read",
+            "run the command again when nothing writes to the file",
+        )
+    return Unrolling(
+        program.blocks,
+        reader.structures,
+        _written(pieces),
+        sum(len(piece.lines) for piece in pieces),
+        _findings(left),
+        lines,
+    )
+
+
+def _written(pieces: Sequence[Piece]) -> int:
+    """How many structures were written out, definitions of subprograms not among them."""
+    return sum(hasattr(piece, "jumped") for piece in pieces)
+
+
+def _findings(left: Sequence[tuple[int, LeftAloneError]]) -> tuple[Finding, ...]:
+    """What the user should know of the structures that stay."""
+    found = []
+    for line, error in left[:_SHOWN]:
+        where = "" if error.line == line else f" (line {error.line})"
+        found.append(Finding(line, f"loop or call not written out: {error.reason}{where}"))
+    if len(left) > _SHOWN:
+        found.append(Finding(None, f"{len(left) - _SHOWN} more loops or calls not written out"))
+    return tuple(found)

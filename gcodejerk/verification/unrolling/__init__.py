@@ -1,0 +1,1 @@
+"""Where a program's flow leads, followed a second time, against the same program written out."""
