@@ -70,4 +70,5 @@ def _hash(machine: Machine, settings: Settings) -> str:
         settings.dialect,
         form,
         "" if machine.rapid_feed is None else machine.rapid_feed.text,
+        unroll=settings.unroll,
     )

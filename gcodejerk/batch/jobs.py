@@ -91,7 +91,7 @@ class Done:
     """Rapids that were rewritten, and left alone."""
     left: int = 0
     written_out: int = 0
-    """Blocks of drilling cycles that became explicit moves."""
+    """Blocks of drilling cycles that became explicit moves, loops and calls written out."""
     set_at: int = 0
     """Places at which lines set the control, or take that back."""
     summary: str = ""
@@ -253,7 +253,8 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         diff = difference(source, target, result) if job.mode == "diff" else b""
         if job.in_place and version(job.input) != before:
             raise changed_error(job.input)  # an edit of the user's would be lost
-        written = 0 if result.expansion is None else result.expansion.written
+        steps = (result.expansion, result.unrolling)
+        written = sum(step.written for step in steps if step is not None)
         places = 0 if result.settings is None else result.settings.places
         left = result.left if result.settings is None else result.unserved
         counts = (result.planned, left, written, places)

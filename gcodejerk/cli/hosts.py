@@ -28,6 +28,9 @@ def filter_program(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    unroll: Annotated[
+        bool, typer.Option("--unroll", help="write loops, branches and calls out")
+    ] = False,
     rapid_feed: RapidFeedOption = None,
     rapid_clearance: ClearanceOption = None,
 ) -> None:
@@ -40,8 +43,9 @@ def filter_program(
         raise typer.BadParameter("a filter is given a file: it has no standard input")
     described = counting(load_machine(machine, [file]), rapid_feed, rapid_clearance)
     settings = Settings(
-        controller=controller, profile=profile, dialect=dialect, expand_cycles=expand_cycles
-    )
+        controller=controller, profile=profile, dialect=dialect, expand_cycles=expand_cycles,
+        unroll=unroll,
+    )  # fmt: skip
     asked = progress or wants_progress()
     for line in pass_on(file, described, settings, progress=asked):
         print(line, file=sys.stderr)

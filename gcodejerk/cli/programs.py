@@ -59,6 +59,9 @@ def process(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    unroll: Annotated[
+        bool, typer.Option("--unroll", help="write loops, branches and calls out")
+    ] = False,
     rapid_feed: RapidFeedOption = None,
     rapid_clearance: ClearanceOption = None,
     subprograms: SubprogramsOption = None,
@@ -138,6 +141,7 @@ def process(
         verify=not no_verify,
         force=force,
         expand_cycles=expand_cycles,
+        unroll=unroll,
     )
     described = counting(load_machine(machine, files), rapid_feed, rapid_clearance)
     described = calling(described, subprograms)
@@ -247,6 +251,9 @@ def inspect(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
+    unroll: Annotated[
+        bool, typer.Option("--unroll", help="write loops, branches and calls out")
+    ] = False,
     rapid_feed: RapidFeedOption = None,
     rapid_clearance: ClearanceOption = None,
     subprograms: SubprogramsOption = None,
@@ -260,7 +267,9 @@ def inspect(
 
     described = counting(load_machine(machine, [file]), rapid_feed, rapid_clearance)
     described = calling(described, subprograms)
-    settings = Settings(profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles)
+    settings = Settings(
+        profile=profile, dialect=dialect, force=True, expand_cycles=expand_cycles, unroll=unroll
+    )
     with open_input(file) as source, progress(as_json) as show:
         result = process_file(source, None, described, settings, file, show)
         record = record_of(result, described, None, source, show, bounds=as_json)
@@ -290,6 +299,9 @@ def verify(
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="the original's cycles are written out")
     ] = False,
+    unroll: Annotated[
+        bool, typer.Option("--unroll", help="the original's loops and calls are written out")
+    ] = False,
     rapid_feed: RapidFeedOption = None,
     rapid_clearance: ClearanceOption = None,
     subprograms: SubprogramsOption = None,
@@ -303,7 +315,7 @@ def verify(
 ) -> None:
     """Prove that a program is the original with only its rapids re-timed; list what it is not."""
     from gcodejerk.batch.files import open_input
-    from gcodejerk.rewrite.expanded import verify_expanded
+    from gcodejerk.rewrite.expanded import Front, verify_written
     from gcodejerk.verification import verify_files
     from gcodejerk.verification.bytes.hal import CONTROLLER
     from gcodejerk.verification.bytes.stamp import read_stamp
@@ -315,19 +327,20 @@ def verify(
         raise typer.BadParameter("only one of the two can be standard input")
     described = counting(load_machine(machine, [original]), rapid_feed, rapid_clearance)
     described = calling(described, subprograms)
-    if report is not None and expand_cycles:
-        raise typer.BadParameter("--report: its lines are the original's, before its cycles")
-    no_cycles = "--expand-cycles: a table of streams has no cycles written out"
-    if processed.lower().endswith(".csv") and expand_cycles:
-        raise typer.BadParameter(no_cycles)
+    front = Front(unroll, expand_cycles)
+    if report is not None and front:
+        raise typer.BadParameter("--report: its lines are the original's, as it was")
+    in_table = f"{front.options}: a table of streams has no {front.what} written out"
+    if processed.lower().endswith(".csv") and front:
+        raise typer.BadParameter(in_table)
     reported = None if report is None else read_reported(report)
-    written = 0
+    told = ""
     with ExitStack() as files:
         one, other = (files.enter_context(open_input(name)) for name in (original, processed))
         names = (original, processed)
         table = processed.lower().endswith(".csv") or rows_format(other) is not None
-        if table and expand_cycles:
-            raise typer.BadParameter(no_cycles)
+        if table and front:
+            raise typer.BadParameter(in_table)
         # What the user does not say again, the stamp says.
         stamp = read_stamp(other, described)
         if stamp is not None and not stamp.known:
@@ -339,7 +352,7 @@ def verify(
             )
         elif stamp is not None:
             profile, dialect = profile or stamp.profile, dialect or stamp.dialect
-            expand_cycles = expand_cycles or stamp.expand_cycles
+            front = Front(unroll or stamp.unroll, expand_cycles or stamp.expand_cycles)
             controller = controller or stamp.controller
         if controller is not None:
             described = replace(described, controller=controller)
@@ -347,10 +360,12 @@ def verify(
         beside = files.enter_context(open_input(samples)) if samples is not None else None
         if profile is not None:
             described = replace(described, design=replace(described.design, profile=profile))
-        if expand_cycles:
-            found, written = verify_expanded(
-                one, other, described, names=names, dialect=dialect, most=most, beside=beside
-            )
+        if front:
+            found, written = verify_written(
+                one, other, described, front, names=names, dialect=dialect, most=most,
+                beside=beside,
+            )  # fmt: skip
+            told = written.told
         else:
             found = verify_files(
                 one, other, described, names=names, dialect=dialect, most=most, table=table,
@@ -375,9 +390,8 @@ def verify(
         )
         return
     if found.ok:
-        cycles = f"{written} cycles written out, " if expand_cycles else ""
         print(
-            f"{processed}: is {original} with {cycles}{found.rewritten} of its {found.rapids} "
+            f"{processed}: is {original} with {told}{found.rewritten} of its {found.rapids} "
             "rapids re-timed and nothing else changed; "
             f"{found.confirmed} of {found.rewritten} confirmed by a second reading"
             + _read_once(found.rewritten - found.confirmed)

@@ -165,6 +165,7 @@ class Machine(Description):
             rapid_feed=self.rapid_feed,
             diameter=any(axis.diameter for axis in self.axes),
             cycles=self.program.cycles,
+            unrolled_lines=self.program.unrolled_lines,
             subprograms={} if self.subprograms is None else self.subprograms.files,
         )
 

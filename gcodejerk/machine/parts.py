@@ -255,6 +255,8 @@ class ProgramStart:
     """Codes (``M8``) that the control runs before the motion of their block, and behind it."""
     cycles: CycleSettings = field(default_factory=CycleSettings)
     """What settings of the control decide about drilling cycles."""
+    unrolled_lines: int | None = None
+    """Lines that loops and calls may be written out as, at most; None: as many as usual."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -229,6 +229,10 @@ def summary_of(result: Result) -> Record:
     if result.expansion is not None:
         summary["cycles"] = result.expansion.holes
         summary["cycles_expanded"] = result.expansion.written
+    if result.unrolling is not None:
+        summary["structures"] = result.unrolling.structures
+        summary["structures_unrolled"] = result.unrolling.written
+        summary["unrolled_lines"] = result.unrolling.lines
     if result.settings is not None:
         summary |= _of_settings(result.settings)
     return summary

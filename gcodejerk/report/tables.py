@@ -83,6 +83,10 @@ def summary_line(name: str, summary: Record) -> str:
     if summary.get("cycles"):
         of = f" of {summary['cycles']}" if summary["cycles_expanded"] != summary["cycles"] else ""
         parts.append(f"{summary['cycles_expanded']}{of} cycles written out")
+    if summary.get("structures"):
+        done, among = summary["structures_unrolled"], summary["structures"]
+        of = f" of {among}" if done != among else ""
+        parts.append(f"{done}{of} loops and calls written out")
     if summary["planned"] and summary["worst_conventional_residual"]:
         unit = _Unit.of(summary)
         now, then = (

@@ -1,20 +1,21 @@
-"""Programs whose drilling cycles are written out: their proof, and their way back to the original.
+"""Programs with blocks written out in front of the eight steps: their proof, and their way back.
 
-A program goes through the pipeline with its cycles written out (`cycles.expansion`); whoever reads
-the results has the original in hand. This module owns what connects the two: the proof that both
-make the same moves, and lines, rapids and differences in terms of the original.
+A program goes through the pipeline with its loops and calls (`unrolling`) and its drilling cycles
+(`cycles`) written out; whoever reads the results has the original in hand. This module owns what
+connects the two: the proof that both make the same moves, and lines, rapids and differences in
+terms of the original.
 
-Rule: how an expanded program came about proves nothing. `verification` compares it with the
-original by means of its own, and the processed program with it.
+Rule: how such a program came about proves nothing. `verification` compares it with the original by
+means of its own, step by step, and the processed program with it.
 """
 
 from __future__ import annotations
 
 import contextlib
 import tempfile
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import BinaryIO, cast
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,28 +24,108 @@ from gcodejerk.cycles.expansion import Expansion, expand
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
-from gcodejerk.nc.line_map import LineMap
-from gcodejerk.verification import Verification, Violation, require, verify_files
+from gcodejerk.nc.interpreter.runner import Finding
+from gcodejerk.nc.line_map import Chain, Lines
+from gcodejerk.start import Start
+from gcodejerk.unrolling.unrolling import Unrolling, unroll
+from gcodejerk.verification import Verification, Violation, verify_files
 from gcodejerk.verification.cycles.expansion import check_expansion
+from gcodejerk.verification.unrolling.checking import check_unrolling
 
 SPOOL = 8 << 20
-"""An expanded program is held in memory up to this size, then on disk. [bytes]"""
+"""A program with blocks written out is held in memory up to this size, then on disk. [bytes]"""
 TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
 """Bytes of a line end, by `Rapids.terminator`."""
 _COMMENTS = (b"\n(gcodejerk: ", b"\n; gcodejerk: ")
+
+
+@dataclass(frozen=True, slots=True)
+class Front:
+    """What is to be written out in front."""
+
+    unroll: bool = False
+    """Loops, branches and calls."""
+    cycles: bool = False
+    """Drilling cycles."""
+
+    def __bool__(self) -> bool:
+        return self.unroll or self.cycles
+
+    @property
+    def what(self) -> str:
+        """Words for it."""
+        wanted = [(self.unroll, "loops"), (self.cycles, "cycles")]
+        return " or ".join(word for asked, word in wanted if asked)
+
+    @property
+    def options(self) -> str:
+        """As the user has asked for it."""
+        wanted = [(self.unroll, "--unroll"), (self.cycles, "--expand-cycles")]
+        return " and ".join(option for asked, option in wanted if asked)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrittenOut:
+    """What was written out, and what was not."""
+
+    unrolling: Unrolling | None
+    expansion: Expansion | None
+    """None: not asked for."""
+
+    @property
+    def map(self) -> Lines:
+        """From the lines of the result to the original's."""
+        steps = [step.map for step in (self.unrolling, self.expansion) if step is not None]
+        return Chain(*steps) if len(steps) == 2 else steps[0]
+
+    @property
+    def blocks(self) -> int:
+        """Of the original."""
+        step = self.unrolling or self.expansion
+        assert step is not None
+        return step.blocks
+
+    @property
+    def written(self) -> int:
+        """Structures and blocks that were written out."""
+        return sum(step.written for step in (self.unrolling, self.expansion) if step is not None)
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Files whose subprograms were written out."""
+        return () if self.unrolling is None else self.unrolling.used
+
+    @property
+    def told(self) -> str:
+        """Words for it, in front of what else was done."""
+        loops, cycles = self.unrolling, self.expansion
+        text = "" if loops is None else f"{loops.written} loops and calls written out, "
+        return text + ("" if cycles is None else f"{cycles.written} cycles written out, ")
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the user should know, with lines of the original."""
+        first = () if self.unrolling is None else self.unrolling.findings
+        later = () if self.expansion is None else self.expansion.findings
+        if self.unrolling is not None:
+            line_of = self.unrolling.map.line_of
+            later = tuple(replace(f, line=line_of(f.line)) for f in later)
+        return (*first, *later)
 
 
 @contextlib.contextmanager
 def written_out(
     source: BinaryIO,
     machine: Machine,
+    front: Front,
     *,
     name: str,
     dialect: str | None,
     comments: bool,
-    prove: bool,
-) -> Iterator[tuple[BinaryIO, Expansion]]:
-    """A program with its cycles written out, for as long as the block lasts.
+    prove: Callable[[Verification], object] | None,
+    most: int = 100,
+) -> Iterator[tuple[BinaryIO, WrittenOut]]:
+    """A program with its loops, calls and cycles written out, for as long as the block lasts.
 
     Parameters
     ----------
@@ -52,113 +133,134 @@ def written_out(
         The program, seekable; read from its beginning.
     machine : Machine
         What it runs on.
+    front : Front
+        What is to be written out.
     name : str
         What messages call it.
     dialect : str or None
         The machine's by default.
     comments : bool
-        Name each block that is written out in a comment.
-    prove : bool
-        Compare the result with the program.
+        Name what is written out in comments.
+    prove : callable or None
+        Takes what is found where a result is compared with what it was made of; None: nothing is.
+    most : int, optional
+        Violations after which a comparison stops.
 
     Yields
     ------
     used : BinaryIO
-        At its beginning; the source itself where no cycle can be written out.
-    expansion : Expansion
+        At its beginning; the source itself where nothing can be written out.
+    written : WrittenOut
         What was written out, and what was not.
 
     Raises
     ------
     EmitError
-        There are subprograms in other files.
-    VerifyError
-        What was written is not right.
+        There are subprograms in other files, whose cycles would stay.
     """
-    if machine.subprograms is not None:
-        raise EmitError(
-            "--expand-cycles and subprograms of other files are not possible together: a cycle may "
-            "go on in a file that stays as it is",
-            "leave one of them out (--subprograms, or program.subprograms of the machine file)",
-        )
-    with tempfile.SpooledTemporaryFile(max_size=SPOOL) as file:
-        between = cast(BinaryIO, file)
+    names, language = (name, f"the output for {name}"), dialect or machine.dialect
+    chosen = Chosen(name, language, machine.program_start(), comments)
+    with contextlib.ExitStack() as files:
+        used, unrolling, expansion = source, None, None
         source.seek(0)
-        expansion = expand(
-            source,
-            between,
-            name=name,
-            dialect=dialect or machine.dialect,
-            start=machine.program_start(),
-            comments=comments,
-        )
-        used = between if expansion.written else source
-        if expansion.written and prove:
-            names = (name, f"the output for {name}")
-            require(prove_expansion(source, between, machine, names=names, dialect=dialect))
+        if front.unroll:
+            between = cast(
+                BinaryIO, files.enter_context(tempfile.SpooledTemporaryFile(max_size=SPOOL))
+            )
+            unrolling = unroll(used, between, **chosen.options())
+            if unrolling.written and prove is not None:
+                prove(_proven(check_unrolling, used, between, machine, names, dialect, most))
+            used = between if unrolling.written else used
+            used.seek(0)
+        if front.cycles:
+            _require_own(machine, unrolling)
+            after = cast(
+                BinaryIO, files.enter_context(tempfile.SpooledTemporaryFile(max_size=SPOOL))
+            )
+            expansion = expand(used, after, **chosen.options())
+            if expansion.written and prove is not None:
+                found = _proven(check_expansion, used, after, machine, names, dialect, most)
+                prove(lines_in_original(found, None if unrolling is None else unrolling.map))
+            used = after if expansion.written else used
         used.seek(0)
-        yield used, expansion
+        yield used, WrittenOut(unrolling, expansion)
 
 
-def prove_expansion(
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """How a program is read and written."""
+
+    name: str
+    dialect: str
+    start: Start
+    comments: bool
+
+    def options(self) -> dict[str, Any]:
+        """As `expand` and `unroll` take it."""
+        return {
+            "name": self.name,
+            "dialect": self.dialect,
+            "start": self.start,
+            "comments": self.comments,
+        }
+
+
+def _require_own(machine: Machine, unrolling: Unrolling | None) -> None:
+    """Refuse to write cycles out where a program goes on in other files."""
+    if machine.subprograms is None or (unrolling is not None and unrolling.whole):
+        return
+    if unrolling is None:
+        remedy = "add --unroll, which writes the calls out, or leave one of the two out"
+    else:
+        remedy = "leave --expand-cycles out: not all loops and calls could be written out"
+    raise EmitError(
+        "--expand-cycles and subprograms of other files are not possible together: a cycle may "
+        "go on in a file that stays as it is",
+        f"{remedy} (--subprograms, or program.subprograms of the machine file)",
+    )
+
+
+def _proven(
+    check: Callable[..., Verification],
     original: BinaryIO,
-    expanded: BinaryIO,
+    other: BinaryIO,
     machine: Machine,
-    *,
     names: tuple[str, str],
-    dialect: str | None = None,
-    most: int = 100,
+    dialect: str | None,
+    most: int,
 ) -> Verification:
-    """Compare a program with the same program after its cycles were written out.
-
-    Parameters
-    ----------
-    original, expanded : BinaryIO
-        Seekable; read from their beginning, and left there.
-    machine : Machine
-        What the program runs on.
-    names : tuple of str
-        For messages.
-    dialect : str, optional
-        The machine's by default.
-    most : int, optional
-        Violations after which it stops.
-
-    Returns
-    -------
-    Verification
-        Without lines of the expanded program, which nobody else sees.
-    """
+    """Compare two files; both are left at their beginning."""
     original.seek(0)
-    expanded.seek(0)
-    found = check_expansion(
+    other.seek(0)
+    found = check(
         original,
-        expanded,
+        other,
         dialect=dialect or machine.dialect,
         start=machine.program_start(),
         names=names,
         most=most,
     )
     original.seek(0)
-    expanded.seek(0)
+    other.seek(0)
     violations = (replace(violation, line=None) for violation in found.violations)
     return replace(found, violations=tuple(violations))
 
 
-def verify_expanded(
+def verify_written(
     original: BinaryIO,
     processed: BinaryIO,
     machine: Machine,
+    front: Front,
     *,
     names: tuple[str, str] = ("<original>", "<processed>"),
     dialect: str | None = None,
     most: int = 100,
     beside: BinaryIO | None = None,
-) -> tuple[Verification, int]:
-    """Prove that a program is another one with its cycles written out and its rapids re-timed.
+) -> tuple[Verification, WrittenOut]:
+    """Prove that a program is another one with blocks written out and its rapids re-timed.
 
-    The original's cycles are written out once more; then both steps are proven, from the original
-    to that program and from that program to the processed one.
+    The original's loops, calls and cycles are written out once more; then every step is proven,
+    from the original to that program and from that program to the processed one.
 
     Parameters
     ----------
@@ -166,6 +268,8 @@ def verify_expanded(
         Seekable, at their beginning.
     machine : Machine
         What the program was processed for.
+    front : Front
+        What was written out.
     names : tuple of str, optional
         For messages.
     dialect : str, optional
@@ -179,24 +283,30 @@ def verify_expanded(
     -------
     verification : Verification
         Of both steps; lines are those of the processed and of the original program.
-    written : int
-        Blocks of cycles that are written out.
+    written : WrittenOut
+        What is written out.
     """
     comments = _names_blocks(processed)
+    first: list[Violation] = []
     with written_out(
-        original, machine, name=names[0], dialect=dialect, comments=comments, prove=False
-    ) as (between, expansion):
-        first: tuple[Violation, ...] = ()
-        if expansion.written:
-            first = prove_expansion(
-                original, between, machine, names=names, dialect=dialect, most=most
-            ).violations
+        original, machine, front, name=names[0], dialect=dialect, comments=comments,
+        prove=lambda found: first.extend(found.violations), most=most,
+    ) as (between, written):  # fmt: skip
         found = verify_files(
             between, processed, machine, names=names, dialect=dialect, most=most, beside=beside
         )
-    later = (_in_original(violation, expansion.map) for violation in found.violations)
+    later = (_in_original(violation, written.map) for violation in found.violations)
     violations = (*first, *later)[:most]
-    return replace(found, violations=violations), expansion.written
+    return replace(found, violations=violations), written
+
+
+def verify_expanded(
+    original: BinaryIO, processed: BinaryIO, machine: Machine, **options: Any
+) -> tuple[Verification, int]:
+    """`verify_written` for drilling cycles alone; how many of their blocks are written out."""
+    front = Front(cycles=True)
+    found, written = verify_written(original, processed, machine, front, **options)
+    return found, written.written
 
 
 def _names_blocks(processed: BinaryIO) -> bool:
@@ -209,12 +319,12 @@ def _names_blocks(processed: BinaryIO) -> bool:
     return found
 
 
-def _in_original(violation: Violation, lines: LineMap) -> Violation:
+def _in_original(violation: Violation, lines: Lines) -> Violation:
     """A violation with the line of the original."""
     return replace(violation, original_line=lines.line_of(violation.original_line))
 
 
-def lines_in_original(verification: Verification, lines: LineMap | None) -> Verification:
+def lines_in_original(verification: Verification, lines: Lines | None) -> Verification:
     """A verification with the lines of the original, where there is a map to them."""
     if lines is None:
         return verification
@@ -222,21 +332,22 @@ def lines_in_original(verification: Verification, lines: LineMap | None) -> Veri
     return replace(verification, violations=later)
 
 
-def in_original(program: Program, expansion: Expansion | None) -> Program:
+def in_original(program: Program, written: WrittenOut | None) -> Program:
     """A program as it was read, its rapids and findings with their lines in the original."""
-    if expansion is None or not expansion.written:
+    if written is None or not written.written:
         return program
-    findings = (replace(f, line=expansion.map.line_of(f.line)) for f in program.findings)
+    findings = (replace(f, line=written.map.line_of(f.line)) for f in program.findings)
     return replace(
         program,
-        blocks=expansion.blocks,
+        blocks=written.blocks,
         findings=tuple(findings),
-        rapids=expansion.map.rapids_of(program.rapids),
+        rapids=written.map.rapids_of(program.rapids),
+        subprograms=tuple(dict.fromkeys((*written.used, *program.subprograms))),
     )
 
 
 def hunks(
-    edits: NDArray[np.int64], rapids: Rapids, insert_at: int, lines: LineMap | None
+    edits: NDArray[np.int64], rapids: Rapids, insert_at: int, lines: Lines | None
 ) -> NDArray[np.int64]:
     """Where an output differs from the original, and from what.
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.advice import ABSOLUTE, NO_MODES, at_the_machine
-from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.emit import Controller
 from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.nc import Program
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Residuals
+from gcodejerk.rewrite.expanded import WrittenOut
 
 _NAMED = 8
 """Files that are named."""
@@ -53,10 +53,10 @@ def subprogram_notes(program: Program, machine: Machine) -> list[str]:
 
 
 def program_notes(
-    program: Program, expansion: Expansion | None, emitter: Controller, machine: Machine
+    program: Program, written: WrittenOut | None, emitter: Controller, machine: Machine
 ) -> list[str]:
     """What was found in the program, and what its dialect means for the control."""
-    findings = (*program.findings, *(() if expansion is None else expansion.findings))
+    findings = (*program.findings, *(() if written is None else written.findings))
     notes = [_finding(finding.line, finding.message) for finding in findings]
     notes += subprogram_notes(program, machine)
     home = DIALECT_OF_CONTROLLER.get(emitter.name)

@@ -16,14 +16,13 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gcodejerk.cycles.expansion import Expansion
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, read_program
-from gcodejerk.nc.line_map import LineMap
+from gcodejerk.nc.line_map import Lines
 from gcodejerk.planning.independent_axes import dogleg_notes
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
@@ -33,6 +32,8 @@ from gcodejerk.planning.told import in_steps, told_in
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.control_settings import PARAMETERS
 from gcodejerk.rewrite.expanded import (
+    Front,
+    WrittenOut,
     hunks,
     in_original,
     lines_in_original,
@@ -68,6 +69,13 @@ class Settings:
     """Process a file that carries our stamp."""
     expand_cycles: bool = False
     """Write drilling cycles out as explicit moves first."""
+    unroll: bool = False
+    """Write loops, branches and calls out first."""
+
+    @property
+    def front(self) -> Front:
+        """What is to be written out in front."""
+        return Front(unroll=self.unroll, cycles=self.expand_cycles)
 
 
 def process(
@@ -82,6 +90,7 @@ def process(
     verify: bool = True,
     force: bool = False,
     expand_cycles: bool = False,
+    unroll: bool = False,
     name: str = "<program>",
 ) -> Result:
     r"""Rewrite every rapid of a program that is certain.
@@ -104,6 +113,8 @@ def process(
         Accept a program that carries our stamp.
     expand_cycles : bool
         Write drilling cycles out as explicit moves, whose rapids can then be rewritten.
+    unroll : bool
+        Write loops, branches and calls out, so that every pass has rapids of its own.
     name : str
         What messages call the program.
 
@@ -130,7 +141,9 @@ def process(
     >>> result.planned, result.left
     (1, 1)
     """
-    settings = Settings(controller, form, profile, dialect, comments, verify, force, expand_cycles)
+    settings = Settings(
+        controller, form, profile, dialect, comments, verify, force, expand_cycles, unroll
+    )
     target, beside = io.BytesIO(), io.BytesIO()
     result = process_file(io.BytesIO(data), target, machine, settings, name, beside=beside)
     return replace(result, output=target.getvalue(), beside=beside.getvalue() or None)
@@ -181,26 +194,28 @@ def process_file(
             f"controller {emitter.name} writes two files: the program and its {emitter.beside}",
             "give it a file for each",
         )
-    if not settings.expand_cycles:
+    front = settings.front
+    if not front:
         return _process(
             source, target, machine, settings, name, emitter, progress or silent, None, beside
         )
     if target is not None and not emitter.in_place:
         raise EmitError(
-            f"--expand-cycles needs streams within the program, those of controller {emitter.name} "
+            f"{front.options} needs streams within the program, those of controller {emitter.name} "
             "are a file of their own",
-            "choose another --controller, or leave --expand-cycles out",
+            f"choose another --controller, or leave {front.options} out",
         )
     with written_out(
         source,
         machine,
+        front,
         name=name,
         dialect=settings.dialect,
         comments=settings.comments,
-        prove=target is not None and settings.verify,
-    ) as (used, expansion):
+        prove=require if target is not None and settings.verify else None,
+    ) as (used, written):
         return _process(
-            used, target, machine, settings, name, emitter, progress or silent, expansion, beside
+            used, target, machine, settings, name, emitter, progress or silent, written, beside
         )
 
 
@@ -212,11 +227,11 @@ def _process(
     name: str,
     emitter: Controller,
     report: Progress,
-    expansion: Expansion | None,
+    written: WrittenOut | None,
     beside: BinaryIO | None,
 ) -> Result:
-    """Process a program; the source is that with its cycles written out, if they are."""
-    lines = None if expansion is None else expansion.map
+    """Process a program; the source is that with its flow and cycles written out, if they are."""
+    lines = None if written is None else written.map
     program = _read(source, machine, settings, name, emitter, report, lines)
     check_dialect(machine, program)
     plans = _plan(source, program, machine, settings, emitter, report)
@@ -247,7 +262,7 @@ def _process(
     what_if = entry_notes(source, program, machine.program_start())
     edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
     differences = hunks(edits, program.rapids, program.insert_at, lines)
-    program = in_original(program, expansion)
+    program = in_original(program, written)
     return Result(
         program=program,
         plans=plans,
@@ -261,10 +276,11 @@ def _process(
         verification=verification,
         edits=edits,
         hunks=differences,
-        expansion=expansion,
+        expansion=None if written is None else written.expansion,
+        unrolling=None if written is None else written.unrolling,
         notes=(
             *operator_notes(emitter, machine, plans),
-            *program_notes(program, expansion, emitter, machine),
+            *program_notes(program, written, emitter, machine),
             *what_if,
             *instead_notes(source, plans, emitter.name),
             *dogleg_notes(plans, deviation),
@@ -286,10 +302,11 @@ def _set(
 ) -> Result:
     """Tune the control for a program, and put the lines that set it into it."""
     sheets = require_way(emitter, emitter.name)
-    if settings.expand_cycles:
+    if settings.front:
         raise EmitError(
-            "--expand-cycles has nothing to do with --as parameters: no block is rewritten",
-            "leave --expand-cycles out",
+            f"{settings.front.options} has nothing to do with --as parameters: no block is "
+            "rewritten",
+            f"leave {settings.front.options} out",
         )
     program = _read(source, machine, settings, name, emitter, report, None)
     chosen = _chosen(machine, settings, emitter.name, PARAMETERS)
@@ -310,7 +327,7 @@ def _read(
     name: str,
     emitter: Controller,
     report: Progress,
-    lines: LineMap | None,
+    lines: Lines | None,
 ) -> Program:
     """The program, refused where it is none, or one that was processed before."""
     source.seek(0, io.SEEK_END)
@@ -370,6 +387,7 @@ def _chosen(machine: Machine, settings: Settings, name: str, form: str) -> list[
     """The user's choices that shape the output, for the stamp."""
     chosen = [name, form, settings.profile or machine.design.profile]
     chosen += ["expand-cycles"] if settings.expand_cycles else []
+    chosen += ["unroll"] if settings.unroll else []
     chosen += [machine.rapid_feed.text] if machine.rapid_feed is not None else []
     return chosen + ([f"dialect {settings.dialect}"] if settings.dialect is not None else [])
 
@@ -382,7 +400,7 @@ def _verified(
     program: Program,
     plans: Plans,
     emitter: Controller,
-    lines: LineMap | None,
+    lines: Lines | None,
     beside: BinaryIO | None,
     report: Progress,
 ) -> Verification:

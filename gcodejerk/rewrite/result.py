@@ -18,6 +18,7 @@ from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.control_settings import ControlSettings
+from gcodejerk.unrolling.unrolling import Unrolling
 from gcodejerk.verification import Verification
 
 REMEMBERED = 2000
@@ -162,9 +163,11 @@ class Result:
         Begin and end in the output of every stream, and the rapid that it replaces; -1 for the
         stamp. Empty where the output is a file of its own. [bytes]
     hunks : ndarray of int, shape (n, 5)
-        All that is not the source's, cycles included: see `expanded.hunks`.
+        All that is not the source's, what was written out included: see `expanded.hunks`.
     expansion : Expansion or None
         The outcome for the cycles; None where they were not to be written out.
+    unrolling : Unrolling or None
+        The same for loops, branches and calls.
     settings : ControlSettings or None
         What the control is set to, where it was to be (form `parameters`); every rapid then stays
         as it is.
@@ -193,6 +196,7 @@ class Result:
     output: bytes | None = field(default=None, repr=False)
     beside: bytes | None = field(default=None, repr=False)
     settings: ControlSettings | None = None
+    unrolling: Unrolling | None = None
 
     def __repr__(self) -> str:
         return f"<Result {self.program.name}: {self.planned} of {len(self.plans)} rapids rewritten>"

@@ -250,10 +250,15 @@ class OWordUnroller(Reader):
         self._structure = Collector(comments=True)
         self._first: Line | None = None
 
+    @property
+    def straight(self) -> bool:
+        """Whether nothing stays that leads elsewhere."""
+        return not (self.left or self._kept or self.passes.lost)
+
     def pieces(self) -> list[Piece]:
         """What is to be replaced, in the order of the file; behind its end."""
         found: list[Piece] = []
-        stays = bool(self.left) or self._kept or self.passes.lost
+        stays = not self.straight
         for piece in self._pieces:
             if stays and piece.jumped:
                 self.left.append((piece.first.number, LeftAloneError(JUMPED, piece.first.number)))

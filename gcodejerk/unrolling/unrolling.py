@@ -43,8 +43,12 @@ class Unrolling:
     """Those of them that were written out."""
     lines: int
     """That stand in their place."""
+    whole: bool
+    """Nothing of the flow is left."""
     findings: tuple[Finding, ...]
     map: LineMap
+    used: tuple[str, ...] = ()
+    """Files in which subprograms were found."""
 
 
 def unroll(
@@ -128,8 +132,10 @@ def unroll(
         reader.structures,
         _written(pieces),
         sum(len(piece.lines) for piece in pieces),
+        not left and reader.straight,
         _findings(left),
         lines,
+        reader.used if pieces else (),
     )
 
 

@@ -381,4 +381,7 @@ def _program(values: dict[str, Any]) -> ProgramStart:
         m_before=_codes(values, "m_before"),
         m_after=_codes(values, "m_after"),
         cycles=CycleSettings(**values.get("cycles", {})),
+        unrolled_lines=None
+        if values.get("unrolled_lines") is None
+        else int(values["unrolled_lines"]),
     )

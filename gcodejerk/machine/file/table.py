@@ -301,6 +301,9 @@ _PROGRAM = Section(
         Key("cycles", _CYCLES,
             "What settings of a Fanuc or Haas decide about its drilling cycles, for "
             "--expand-cycles."),
+        Key("unrolled_lines", Number("lines", at_least=1, at_most=1e6),
+            "Lines that --unroll may write a program's loops and calls out as, at most. Left out: "
+            "100000.", example="20000"),
         Key("subprograms", Text(r".*\S.*", "a folder"),
             "Folder with the subprograms that programs call in other files, as the control has "
             "them (O1000.nc, L54.SPF, name.ngc); named from the folder of this file. Left out: "

@@ -94,6 +94,11 @@ def machine_yaml(machine: Description) -> str:
             ),
             *_cycles(program.cycles),
             *(
+                [f"  unrolled_lines: {program.unrolled_lines}"]
+                if program.unrolled_lines is not None
+                else []
+            ),
+            *(
                 [f"  subprograms: {quoted(machine.subprograms.folder)}"]
                 if machine.subprograms is not None
                 else []

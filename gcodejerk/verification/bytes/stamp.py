@@ -29,6 +29,7 @@ PARAMETERS = "parameters"
 FORMS = {"linuxcnc-hal": ("adaptive-feed", "position")}
 """Of controllers that have others than FORM."""
 EXPANDED = "expand-cycles"
+UNROLLED = "unroll"
 _STAMP = re.compile(rb"^[(;] ?gcodejerk stamp [ -~]{1,20}? ([0-9a-f]{8})(?![0-9a-f])", re.MULTILINE)
 
 
@@ -45,6 +46,7 @@ class Stamp:
     dialect: str | None = None
     """None: that of the machine file."""
     expand_cycles: bool = False
+    unroll: bool = False
 
 
 def choices_hash(
@@ -55,9 +57,12 @@ def choices_hash(
     dialect: str | None,
     form: str = FORM,
     rapid_feed: str = "",
+    *,
+    unroll: bool = False,
 ) -> str:
     """Eight hex digits of the hash of a machine file's settings and a user's choices."""
     chosen = [controller, form, profile, *([EXPANDED] if expand_cycles else [])]
+    chosen += [UNROLLED] if unroll else []
     chosen += [rapid_feed] if rapid_feed else []
     chosen += [] if dialect is None else [f"dialect {dialect}"]
     text = " ".join((settings_hash, *chosen)).encode()
@@ -105,17 +110,17 @@ def _chosen(
     names: tuple[str, ...],
     profiles: tuple[str, ...],
     rapid_feed: str,
-) -> tuple[str, str, str | None, bool] | None:
-    """Controller, profile, dialect and expansion that give a hash, of all that a user can choose.
+) -> tuple[str, str, str | None, bool, bool] | None:
+    """Controller, profile, dialect and what is written out that give a hash, of all that is there.
 
     The machine file's own come first: most stamps are found at once.
     """
-    for dialect, expand, name, profile in product(
-        (None, *DIALECTS, "auto"), (False, True), names, profiles
+    for unroll, dialect, expand, name, profile in product(
+        (False, True), (None, *DIALECTS, "auto"), (False, True), names, profiles
     ):
         for form in (*FORMS.get(name, (FORM,)), PARAMETERS):
             if stamped == choices_hash(
-                settings_hash, name, profile, expand, dialect, form, rapid_feed
+                settings_hash, name, profile, expand, dialect, form, rapid_feed, unroll=unroll
             ):
-                return name, profile, dialect, expand
+                return name, profile, dialect, expand, unroll
     return None

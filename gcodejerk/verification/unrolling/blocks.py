@@ -70,6 +70,14 @@ class Sides:
         """A line that may run subprograms nobody follows."""
         self._foreign: dict[bytes, bool] = {}
 
+    def _reads_place(self) -> int | None:
+        """A line that reads where in the flow it is, which is elsewhere in the other file."""
+        for at in range(self.size):
+            text = self.mine[at]
+            if b"_" in text and _READS_PLACE.search(text.translate(None, b" \t").upper()):
+                return at
+        return None
+
     def _is_next(self, at: int) -> bool:
         return self.k < len(self.theirs) and self.theirs[self.k] == self.mine[at]
 
@@ -120,8 +128,6 @@ class Sides:
         if code == b"%":
             self.ended, self.opened = self.opened, True
             return
-        if _READS_PLACE.search(code) and not at_top:
-            raise self._doubt(at, "it reads where in the flow it is")
         if not at_top and _ACTIVE.search(text):
             raise self._doubt(at, "a comment runs Python")
         if self._is_foreign(code):

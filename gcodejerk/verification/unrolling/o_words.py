@@ -60,6 +60,8 @@ class FlowProof(Sides):
         stays = self.stays if self.stays is not None else self.lost
         if self.dropped is not None and stays is not None:
             raise StopError(Kind.FLOW, "a subprogram is left out that may still be called", stays)
+        if self.written and (place := self._reads_place()) is not None:
+            raise self._doubt(place, "a line reads where in the flow it is")
         if self.jumped is not None and stays is not None:
             told = "a jump was written out, and LinuxCNC keeps it for what stays"
             raise StopError(Kind.FLOW, told, self.jumped)
