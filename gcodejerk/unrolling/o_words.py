@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.o_words import END, NEXT, Exits, Passes, TooLongError
 from gcodejerk.nc.flow.structures import Collector, Node, plain_name
+from gcodejerk.nc.interpreter.expressions import variable_name
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.runner import Runner
 from gcodejerk.nc.reader import Reader
@@ -50,8 +51,12 @@ class _Structure(Piece):
 class ExactPasses(Passes):
     """Runs structures as the base does, or writes one out: then nothing may be in doubt."""
 
+    comments = True
+
     def __init__(self, runner: Runner, files: Mapping[str, bytes], most: int) -> None:
         super().__init__(runner, files)
+        self.jumps = True
+        """Structures in which a jump runs may be written out."""
         self.most = self.left = most
         """Lines that may be written, and those of them that are left."""
         self.trace: list[Written] = []
@@ -85,6 +90,9 @@ class ExactPasses(Passes):
             state = after or ended
             if exits or state is None or (after is not None and ended is not None):
                 raise LeftAloneError("it ends otherwise than by its end", node.line.number)
+            self.jumped |= self._broken and not kept[0]
+            if self.jumped and not self.jumps:
+                raise LeftAloneError(JUMPED, node.line.number)
         except (LeftAloneError, TooLongError) as error:
             self._broken, self._continued, self._stale, self._dos, self._lost = kept
             self._depth = 0
@@ -97,13 +105,20 @@ class ExactPasses(Passes):
         self.left -= len(self.trace)
         return self.trace, after is None
 
-    def doubt_jumps(self, node: Node) -> None:
-        """Take what stays as it is for something that leaves jumps behind, if it can."""
+    def doubt(self, node: Node) -> None:
+        """Forget what a structure that stays may set, and take for run what jumps it has."""
+        state, dialect = self.runner.state, self.runner.dialect
         if node.kind in ("call", "return", "break", "continue"):
             self._broken = self._continued = True
+        names = {variable_name(name.encode("latin-1")) for name in node.line.block.assigns}
+        codes = {word.value for word in node.line.block.words if word.letter == "M"}
+        groups = {dialect.m_groups.get(int(code), "user") for code in codes if code is not None}
+        if node.kind == "call" or "" in names or "user" in groups or codes & {6.0, None, *_FANUC}:
+            state.forget_variables()
+        state.forget_variables([name for name in state.variables if name not in names])
         for _, body in node.branches:
             for inner in body:
-                self.doubt_jumps(inner)
+                self.doubt(inner)
 
     def _leave(self) -> None:
         raise LeftAloneError("a program runs that is not followed", self._at)
@@ -141,6 +156,8 @@ class ExactPasses(Passes):
         self._at = node.line.number
         if node.kind in ("return", "break", "continue"):
             self.jumped = True
+            if not self.jumps:
+                raise LeftAloneError(JUMPED, self._at)
             if node.kind != "return" and node.name not in self._loops:
                 raise LeftAloneError(f"{node.kind} leads out of no while or do", self._at)
         loop = node.kind in ("while", "do")
@@ -234,10 +251,11 @@ class OWordUnroller(Reader):
     """Reads a program, and writes its structures out on the way."""
 
     def __init__(
-        self, name: str, dialect: Dialect, start: Start, most: int, comments: bool
+        self, name: str, dialect: Dialect, start: Start, most: int, comments: bool, *, jumps: bool
     ) -> None:
         super().__init__(name, dialect, start)
         self.passes: ExactPasses = ExactPasses(self.runner, start.subprograms, most)
+        self.passes.jumps = jumps
         self.comments = comments
         self.structures = 0
         """Structures and calls of the main program."""
@@ -255,19 +273,17 @@ class OWordUnroller(Reader):
         """Whether nothing stays that leads elsewhere."""
         return not (self.left or self._kept or self.passes.lost)
 
+    @property
+    def jumped(self) -> bool:
+        """Whether jumps were written out, of which LinuxCNC keeps something for what stays."""
+        return not self.straight and any(piece.jumped for piece in self._pieces)
+
     def pieces(self) -> list[Piece]:
         """What is to be replaced, in the order of the file; behind its end."""
-        found: list[Piece] = []
-        stays = not self.straight
-        for piece in self._pieces:
-            if stays and piece.jumped:
-                self.left.append((piece.first.number, LeftAloneError(JUMPED, piece.first.number)))
-            else:
-                found.append(piece)
-        if found and not stays and not self.problem_count:
+        found: list[Piece] = [*self._pieces]
+        if found and self.straight and not self.problem_count:
             # A code that nobody knows may call them: G71 Q100 runs o100.
             found += self._subs
-        self.left.sort(key=lambda each: each[0])
         return sorted(found, key=lambda piece: piece.first.begin)
 
     def _collect(self, line: Line, counted: bool = False) -> None:
@@ -303,7 +319,7 @@ class OWordUnroller(Reader):
             self.left.append((first.number, error))
             self.runner.state = before
             super()._pass(node)
-            self.passes.doubt_jumps(node)
+            self.passes.doubt(node)
             return
         jumped = self.passes.jumped
         self._pieces.append(_Structure(first, last, self._name(first) + lines, jumped))
@@ -316,7 +332,9 @@ class OWordUnroller(Reader):
     def _o_word(self, line: Line, first: bool) -> None:
         told = self.structures
         super()._o_word(line, first)
-        self._kept |= told == self.structures and not (line.block.o_word == "" and first)
+        if told == self.structures and not (line.block.o_word == "" and first):
+            self._kept = True
+            self.state.forget_variables()
 
     def _replay(self) -> None:
         self._kept = True
@@ -324,3 +342,4 @@ class OWordUnroller(Reader):
             reason = "it is not nested as LinuxCNC demands, is too long, or has words beside O"
             self.left.append((self._first.number, LeftAloneError(reason, self._first.number)))
         super()._replay()
+        self.state.forget_variables()

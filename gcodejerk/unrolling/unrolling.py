@@ -109,8 +109,12 @@ def unroll(
     data = source.read(MOST_BYTES + 1)
     source.seek(begin)
     most = start.unrolled_lines or MOST_LINES
-    reader = OWordUnroller(name, chosen, start, most, comments)
-    program = follow(read_chunks(source, name), reader, None, True)
+    for jumps in (True, False):
+        source.seek(begin)
+        reader = OWordUnroller(name, chosen, start, most, comments, jumps=jumps)
+        program = follow(read_chunks(source, name), reader, None, True)
+        if not reader.jumped:
+            break
     pieces = reader.pieces()
     left = reader.left
     if len(data) > MOST_BYTES:

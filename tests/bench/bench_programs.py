@@ -1,7 +1,7 @@
 r"""A folder of real programs: how many of their rapids are certain, and what keeps the others.
 
     python tests/bench/bench_programs.py FOLDER [--dialect NAME] [--machine M.yaml] [--lines REASON]
-        [--subprograms] [--start] [--auto]
+        [--subprograms] [--start] [--auto] [--unroll]
 
 FOLDER holds a folder for each dialect, by its name (``haas-lathe`` and the like count by what
 stands in `READ_AS`), or the programs of the one that `--dialect` names. Each is read from a start
@@ -10,8 +10,9 @@ changes, when M codes run, what the control starts with. Printed is a row for ea
 rapids, those that are certain, those that the second reading confirms or contradicts, and the main
 reasons of the rest. `--lines` prints the blocks that one reason keeps, `--subprograms` follows
 calls into the other files of a collection, `--start` states where the axes stand (which few shops
-can), `--auto` prints how many of the files with rapids `auto`
-reads as their dialect, or as what their dialect reads alike.
+can), `--unroll` writes loops and calls out first (and proves it), so that there are more rapids,
+one for each pass, `--auto` prints how many of the files with rapids `auto` reads as their dialect,
+or as what their dialect reads alike.
 """
 
 import argparse
@@ -32,8 +33,10 @@ from gcodejerk.nc import Start, read_program
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.detect import detect_dialect
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.unrolling.unrolling import unroll
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.unrolling.checking import check_unrolling
 
 READ_AS = {"haas-lathe": "fanuc-lathe-a"}
 ALIKE = {
@@ -121,6 +124,7 @@ def read(path, name, start, given):
     start = lathe_start(start, data, name)
     if given.subprograms:
         start = replace(start, subprograms=folder_of(path, given))
+    data = written_out(path, data, name, start) if given.unroll else data
     rapids = read_program(io.BytesIO(data), dialect=name, start=start).rapids
     certain = np.flatnonzero(rapids.reason == CERTAIN)
     found = Findings(9)
@@ -128,6 +132,19 @@ def read(path, name, start, given):
     if found.violations:
         print(f"CONTRADICTED {path}: {found.violations[0]}", file=sys.stderr)
     return data, rapids, len(certain), confirmed, len(found.violations)
+
+
+def written_out(path, data, name, start):
+    """A program with its loops and calls written out, as far as they can be."""
+    target = io.BytesIO()
+    found = unroll(io.BytesIO(data), target, name=str(path), dialect=name, start=start)
+    if not found.written:
+        return data
+    target.seek(0)
+    checked = check_unrolling(io.BytesIO(data), target, dialect=name, start=start)
+    if not checked.ok:
+        print(f"NOT PROVEN {path}: {checked.violations[0]}", file=sys.stderr)
+    return target.getvalue()
 
 
 def row(folder, files, given):
@@ -206,6 +223,7 @@ def main():
     parser.add_argument("--lines", help="print the blocks of reasons that hold this text")
     parser.add_argument("--subprograms", action="store_true", help="of each collection")
     parser.add_argument("--start", action="store_true", help="the axes stand at zero at first")
+    parser.add_argument("--unroll", action="store_true", help="loops and calls are written out")
     parser.add_argument("--auto", action="store_true")
     parser.add_argument("-v", "--verbose", action="store_true")
     given = parser.parse_args()

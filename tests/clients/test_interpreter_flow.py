@@ -247,6 +247,19 @@ o102 while [#1 LT 2]
 #3=1
 o100 endwhile
 """,
+    "a break that a while passes over ends a later do": """
+#1=0
+o100 while [#1 LT 2]
+#1=[#1+1]
+o101 if [#1 EQ 9]
+o100 break
+o101 endif
+o100 endwhile
+o102 do
+G91 G0 X8
+#1=[#1+1]
+o102 while [#1 LT 5]
+""",
     "a break ends a do of the second pass of the loop around": """
 #1=0
 o100 repeat [2]

@@ -163,7 +163,7 @@ def _called(text: bytes, named: bool) -> set[str]:
 
 
 def find_o_word(
-    name: str, files: Mapping[str, bytes], dialect: Dialect, first: int
+    name: str, files: Mapping[str, bytes], dialect: Dialect, first: int, comments: bool = False
 ) -> tuple[str, Node] | None:
     """The subprogram of LinuxCNC that ``o<name> call`` finds in a file of its name.
 
@@ -177,6 +177,8 @@ def find_o_word(
         LinuxCNC's.
     first : int
         Number of the first line of the file.
+    comments : bool, optional
+        Lines with nothing else are kept, too.
 
     Returns
     -------
@@ -187,7 +189,7 @@ def find_o_word(
     found = [file for file in files if file.rpartition("/")[2] == wanted]
     if not found or any(files[file] != files[found[0]] for file in found):
         return None
-    collector, text = Collector(), files[found[0]].removeprefix(BYTE_ORDER_MARK)
+    collector, text = Collector(comments), files[found[0]].removeprefix(BYTE_ORDER_MARK)
     for k, row in enumerate(text.split(b"\n"), first):
         line = Line(row.rstrip(b"\r"), 0, k, 1, parse_line(row.rstrip(b"\r"), dialect))
         begins = line.block.o_word == "sub" and plain_name(line.block.o_name) == name

@@ -56,8 +56,19 @@ def _add(exits: Exits, more: Exits) -> None:
         exits[way] = joined
 
 
+def _holds_break(loop: Node, inner: Node | None = None) -> bool:
+    """Whether a ``break`` out of a loop stands in it."""
+    node = loop if inner is None else inner
+    return (node.kind == "break" and node.name == loop.name) or any(
+        _holds_break(loop, each) for _, body in node.branches for each in body
+    )
+
+
 class Passes:
     """Runs structures and subprograms; keeps the subprograms of the file."""
+
+    comments = False
+    """Lines with comments alone are run, too."""
 
     def __init__(self, runner: Runner, files: Mapping[str, bytes] | None = None) -> None:
         self.runner, self._files = runner, files or {}
@@ -68,7 +79,8 @@ class Passes:
         self._depth = 0
         self._lost = False
         self._broken = False
-        """A ``break`` has run: LinuxCNC 2.9 then ends a later ``do`` after its first pass."""
+        """A ``break`` has run: LinuxCNC 2.9 then ends a later ``do`` after its first pass. One that
+        a ``while`` passes over on its way to its end counts, too."""
         self._dos: set[str] = set()
         """Labels of the ``do`` that have run."""
         self._continued = False
@@ -263,6 +275,7 @@ class Passes:
             if test_first:
                 value = self._known(node.condition, current)
                 if value == 0.0:
+                    self._broken = self._broken or _holds_break(node)
                     break
                 if value is None:
                     _add(exits, self._settle(node, current, test_first))
@@ -311,6 +324,7 @@ class Passes:
         exits: Exits = {}
         leave: State | None = None
         entry = state.copy()
+        self._broken = self._broken or (node.kind == "while" and _holds_break(node))
         for k in range(PASSES + 6):
             self._count()
             if k == PASSES:
@@ -372,7 +386,7 @@ class Passes:
             return self._subs.get(name)
         runner = self.runner
         first = ELSEWHERE * (1 + len(self.used))
-        found = find_o_word(name, self._files, runner.dialect, first)
+        found = find_o_word(name, self._files, runner.dialect, first, self.comments)
         if found is None:
             return None
         file, sub = found

@@ -188,6 +188,17 @@ class Sides:
         else:
             self.variables.pop(name, None)
 
+    def _lose(self, at: int) -> bool:
+        """Lose what a block may set that nobody follows; False where that may be anything."""
+        code = self.table.code[at]
+        if b"#" not in code and b"M" not in code:
+            return True
+        parts = self.values.parts(code, {})
+        codes = {word.value for word in parts.words if word.name == "M"}
+        for each in parts.sets:
+            self.variables.pop(each.name, None)
+        return parts.understood and not codes - _QUIET_M and all(each.name for each in parts.sets)
+
     def _shown(self, at: int, text: bytes, parts: Parts | None) -> None:
         """The block has to be the next line of the other file, as it is or with its values."""
         own = self._called_now and self._names_own(at, text)

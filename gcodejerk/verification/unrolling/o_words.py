@@ -110,10 +110,14 @@ class FlowProof(Sides):
     def _stay(self, first: int, last: int) -> None:
         """A structure that stays: it may do anything that its lines say, and call others."""
         self.stays = first
-        self._forget()
         words = [self.table.o_word(at) for at in range(first, last + 1)]
         if any(line is not None and line.word in _LEAVES for line in words):
             self._broken = self._continued = True
+        calls = any(line is not None and line.word == b"CALL" for line in words)
+        for at in range(first, last + 1):
+            if calls or (words[at - first] is None and not self._lose(at)):
+                self._forget()
+                break
 
     # --- what is written out ---
 
@@ -204,7 +208,20 @@ class FlowProof(Sides):
         if goes_on:
             return at + 1
         frame.loops.remove(at)
+        # On its way to the end, LinuxCNC takes a break that it passes over for one that it runs.
+        passed = (
+            inner
+            for inner, begins in table.around.items()
+            if at in begins and self._is_break(inner, line.label)
+        )
+        if (inner := next(passed, None)) is not None and not self._broken:
+            self._broken = True
+            self.jumped = inner if self.jumped is None else self.jumped
         return table.end[at] + 1
+
+    def _is_break(self, at: int, label: bytes) -> bool:
+        line = self.table.o_word(at)
+        return line is not None and line.word == b"BREAK" and line.label == label
 
     def _repeat(self, at: int, line: OWord) -> int:
         """Begin to count."""
