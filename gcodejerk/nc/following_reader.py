@@ -125,16 +125,23 @@ class FollowingReader(Reader):
             lost = any(first <= line.number <= last for first, last in spoiled)
             observe(line, State() if lost else state)
 
+    def script(self) -> Script:
+        """The file with what it calls in others, as a script.
+
+        Raises
+        ------
+        NotFollowedError
+        """
+        lines, more = [line for line, _ in self._kept], self._elsewhere.lines
+        if self.dialect.text.names:
+            return named_script([*lines, *more])
+        own = [line for line in lines if not line.block.percent]
+        return macro_script([*own, *more], self.dialect)
+
     def _follow(self) -> list[tuple[int, int]]:
         """Run the file as a script; lines of which not every pass is known."""
         lines = [line for line, _ in self._kept]
-        more = self._elsewhere.lines
-        if self.dialect.text.names:
-            script: Script = named_script([*lines, *more])
-        else:
-            own = [line for line in lines if not line.block.percent]
-            script = macro_script([*own, *more], self.dialect)
-        runner = self.runner
+        script, runner = self.script(), self.runner
         follower = Follower(runner, script)
         follower.follow()
         if follower.ended is not None:

@@ -30,7 +30,7 @@ from gcodejerk.start import Start
 from gcodejerk.unrolling.unrolling import Unrolling, unroll
 from gcodejerk.verification import Verification, Violation, verify_files
 from gcodejerk.verification.cycles.expansion import check_expansion
-from gcodejerk.verification.unrolling.checking import check_unrolling
+from gcodejerk.verification.unrolling.checking import NotFollowedError, check_unrolling
 
 SPOOL = 8 << 20
 """A program with blocks written out is held in memory up to this size, then on disk. [bytes]"""
@@ -169,7 +169,10 @@ def written_out(
             )
             unrolling = unroll(used, between, **chosen.options())
             if unrolling.written and prove is not None:
-                prove(_proven(check_unrolling, used, between, machine, names, dialect, most))
+                try:
+                    prove(_proven(check_unrolling, used, between, machine, names, dialect, most))
+                except NotFollowedError:
+                    unrolling = unrolling.undone("a second reading does not follow its flow")
             used = between if unrolling.written else used
             used.seek(0)
         if front.cycles:

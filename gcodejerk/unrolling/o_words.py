@@ -286,6 +286,10 @@ class OWordUnroller(Reader):
             found += self._subs
         return sorted(found, key=lambda piece: piece.first.begin)
 
+    def written(self, pieces: list[Piece]) -> int:
+        """How many of these stand for structures, and not for definitions of subprograms."""
+        return sum(isinstance(piece, _Structure) for piece in pieces)
+
     def _collect(self, line: Line, counted: bool = False) -> None:
         if not counted:
             self._count(line)

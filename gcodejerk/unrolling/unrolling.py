@@ -7,19 +7,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import BinaryIO
+
+import numpy as np
 
 from gcodejerk.errors import EmitError, ProgramError
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.flow.elsewhere import find_elsewhere
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.line_map import LineMap
 from gcodejerk.nc.program import follow
 from gcodejerk.nc.text.chunks import read_chunks
 from gcodejerk.start import NOTHING_KNOWN, Start
 from gcodejerk.unrolling.o_words import OWordUnroller
-from gcodejerk.unrolling.pieces import LeftAloneError, Piece, put_together
+from gcodejerk.unrolling.pieces import LeftAloneError, put_together
+from gcodejerk.unrolling.scripts import ScriptUnroller
 
 MOST_LINES = 100_000
 """Lines that are written, where the machine file says nothing else."""
@@ -49,6 +53,12 @@ class Unrolling:
     map: LineMap
     used: tuple[str, ...] = ()
     """Files in which subprograms were found."""
+
+    def undone(self, reason: str) -> Unrolling:
+        """The same where nothing is written out after all."""
+        told = Finding(None, f"loops and calls not written out: {reason}")
+        none = LineMap(*np.zeros((8, 0), dtype=np.int64))
+        return replace(self, written=0, lines=0, whole=False, findings=(told,), map=none, used=())
 
 
 def unroll(
@@ -100,18 +110,11 @@ def unroll(
     ['#1=0', 'G0 X#1', '#1=[#1+1]', 'G0 X#1', '#1=[#1+1]', 'M2']
     """
     chosen = find_dialect(dialect)
-    if chosen.text.o_word != "flow":
-        raise ProgramError(
-            f"loops and calls of dialect '{chosen.name}' cannot be written out",
-            "leave --unroll out; it knows those of: linuxcnc",
-        )
     begin = source.tell()
     data = source.read(MOST_BYTES + 1)
-    source.seek(begin)
-    most = start.unrolled_lines or MOST_LINES
     for jumps in (True, False):
         source.seek(begin)
-        reader = OWordUnroller(name, chosen, start, most, comments, jumps=jumps)
+        reader = _reader(name, chosen, start, comments, data, jumps=jumps)
         program = follow(read_chunks(source, name), reader, None, True)
         if not reader.jumped:
             break
@@ -119,7 +122,9 @@ def unroll(
     left = reader.left
     if len(data) > MOST_BYTES:
         pieces, left = [], [(1, LeftAloneError(f"more than {MOST_BYTES // 10**6} MB", 1))]
-    elif match := _PLACE.search(data.translate(None, b" \t").lower()):
+    elif chosen.text.o_word == "flow" and (
+        match := _PLACE.search(data.translate(None, b" \t").lower())
+    ):
         read = match[0].decode()
         pieces, left = [], [(1, LeftAloneError(f"the program reads #{read}", 1))]
     again = target if pieces else None
@@ -134,7 +139,7 @@ def unroll(
     return Unrolling(
         program.blocks,
         reader.structures,
-        _written(pieces),
+        reader.written(pieces),
         sum(len(piece.lines) for piece in pieces),
         not left and reader.straight,
         _findings(left),
@@ -143,9 +148,20 @@ def unroll(
     )
 
 
-def _written(pieces: Sequence[Piece]) -> int:
-    """How many structures were written out, definitions of subprograms not among them."""
-    return sum(hasattr(piece, "jumped") for piece in pieces)
+def _reader(
+    name: str, dialect: Dialect, start: Start, comments: bool, data: bytes, *, jumps: bool
+) -> OWordUnroller | ScriptUnroller:
+    """Who reads a program of this language, and writes it out on the way."""
+    rules, most = dialect.text, start.unrolled_lines or MOST_LINES
+    if rules.o_word == "flow":
+        return OWordUnroller(name, dialect, start, most, comments, jumps=jumps)
+    if (rules.names and rules.variables == "R") or (rules.keywords and rules.o_word == "program"):
+        elsewhere = find_elsewhere(data, start.subprograms, dialect)
+        return ScriptUnroller(name, dialect, start, elsewhere, most, comments)
+    raise ProgramError(
+        f"loops and calls of dialect '{dialect.name}' cannot be written out",
+        "leave --unroll out; it knows those of LinuxCNC, Siemens, and of Fanuc, Haas and their kin",
+    )
 
 
 def _findings(left: Sequence[tuple[int, LeftAloneError]]) -> tuple[Finding, ...]:

@@ -79,6 +79,7 @@ class Follower:
 
     def __init__(self, runner: Runner, script: Script) -> None:
         self.runner, self.script = runner, script
+        self.most_steps = MOST_STEPS + len(script.lines)
         self._steps = 0
         self._lost = False
         """Programs have run that are not followed, which may call those of the file."""
@@ -162,7 +163,7 @@ class Follower:
     def _line(self, unit: Unit, at: int, state: State, ways: Ways) -> None:
         """Run one line, and see where it leads."""
         self._steps += 1
-        if self._steps > MOST_STEPS + len(self.script.lines):
+        if self._steps > self.most_steps:
             raise NotFollowedError
         line, op = self.script.lines[at], self.script.ops.get(at)
         block = line.block
@@ -195,6 +196,10 @@ class Follower:
             self._call(unit, at, op, state, ways)
         else:
             self._return(unit, at, state, ways)
+
+    def _same(self, before: State, behind: State) -> bool:
+        """Whether a pass has changed nothing, so that every further pass is the same."""
+        return agree(before, behind)
 
     def _split(self, ways: Ways, at: int, state: State) -> None:
         """Open another way."""
@@ -285,7 +290,7 @@ class Follower:
                 current, other = other, current
             if other is not None:
                 raise NotFollowedError
-            if current is not None and agree(before, current):
+            if current is not None and self._same(before, current):
                 break  # every further pass is the same
         self._calls.pop()
         if current is not None:
@@ -331,7 +336,7 @@ class Follower:
                 if sub.saves:
                     current.forget_modes()
                     current.forget_positions()
-                if agree(before, current):
+                if self._same(before, current):
                     break
         self._calls.pop()
         executor.declared = declared

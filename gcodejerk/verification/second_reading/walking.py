@@ -27,6 +27,7 @@ MOST = 100_000
 _DEEPEST = 9
 _RETURNS = re.compile(rb"(?<![A-Z])M[ \t]*0*(?:99|17)(?![0-9])")
 _ALONE = re.compile(rb"[ \t\0]*(?:N[ \t]*[0-9]+)?[ \t\0]*M[ \t]*0*(?:99|17)[ \t\0;]*")
+_DECLARES = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?DEF[ \t]", re.IGNORECASE)
 _LABEL = re.compile(rb"([ \t]*(?:N[0-9]+[ \t]*)?)[A-Za-z_][A-Za-z_][A-Za-z0-9_]*[ \t]*:(?!=)")
 
 
@@ -50,7 +51,8 @@ class Stepper:
         """
         text, variables = self.text, tracker.variables
         named = self.computer.named
-        if not self._computes or not (b"#" in bare or b"[" in bare or (named and b"=" in bare)):
+        says = b"=" in bare or _DECLARES.match(bare) is not None if named else b"#" in bare
+        if not self._computes or not (says or b"[" in bare):
             return tracker.follow(text.read(bare, not tracker.begun))
         upper = self.upper(bare)
         settings = self.computer.settings(upper, variables)

@@ -6,7 +6,13 @@ from typing import BinaryIO
 
 from gcodejerk.nc import Dialect, Start, find_dialect
 from gcodejerk.verification.findings import Findings, Verification
+from gcodejerk.verification.second_reading.agreement import begin_tracker
+from gcodejerk.verification.second_reading.reading import Text
+from gcodejerk.verification.second_reading.tracking import Tracker
 from gcodejerk.verification.unrolling.o_words import FlowProof
+from gcodejerk.verification.unrolling.scripts import NotFollowedError, check_script
+
+__all__ = ["NotFollowedError", "check_unrolling"]
 
 
 def check_unrolling(
@@ -36,7 +42,12 @@ def check_unrolling(
     Returns
     -------
     Verification
-        `rewritten` are structures that are written out.
+        `rewritten` are structures that are written out, or 1 for a program as a whole.
+
+    Raises
+    ------
+    NotFollowedError
+        The second reading does not follow the program.
 
     Examples
     --------
@@ -51,7 +62,15 @@ def check_unrolling(
     (4, "expected 'G0 X#1' as the original runs, found 'M2'")
     """
     start = Start() if start is None else start
-    found = Findings(most)
-    proof = FlowProof(original.read(), other.read(), find_dialect(dialect), start, found)
-    proof.run()
-    return Verification(0, proof.written, proof.kept, found.sorted(), names)
+    found, chosen = Findings(most), find_dialect(dialect)
+    data, result = original.read(), other.read()
+    if chosen.text.o_word == "flow":
+        proof = FlowProof(data, result, chosen, start, found)
+        proof.run()
+        return Verification(0, proof.written, proof.kept, found.sorted(), names)
+
+    def begin(text: Text) -> Tracker:
+        return begin_tracker(text, chosen.set_up(start), start)
+
+    kept = check_script(data, result, chosen, start, begin, found)
+    return Verification(0, 1, kept, found.sorted(), names)

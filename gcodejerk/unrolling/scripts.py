@@ -1,0 +1,286 @@
+"""Programs of macro B and Siemens written out: the blocks of the main program as they run.
+
+Rule 1: a program is written out whole or not at all, for a jump may lead anywhere in it. Up to its
+first line of flow it stays as it is.
+Rule 2: a block is written as it stands; where it names variables of a subprogram's own, `wording`
+writes their numbers. A label is left out, and an N that has stood already: nothing leads to them
+any more.
+Rule 3: what a counting loop sets, an assignment sets in its place.
+"""
+
+from __future__ import annotations
+
+import re
+
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.flow.elsewhere import Elsewhere
+from gcodejerk.nc.flow.following import Follower, Ways
+from gcodejerk.nc.flow.macro_b import NotFollowedError
+from gcodejerk.nc.flow.script import LOST, Op, Script, Unit
+from gcodejerk.nc.flow.subprograms import Calls
+from gcodejerk.nc.following_reader import FollowingReader
+from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.runner import Runner
+from gcodejerk.nc.interpreter.variables import is_local
+from gcodejerk.nc.text.block import ELSEWHERE, Line
+from gcodejerk.start import Start
+from gcodejerk.unrolling.pieces import LeftAloneError, Piece, Written, named
+from gcodejerk.unrolling.spelling import number_text
+from gcodejerk.unrolling.wording import worded
+
+ROOM = 16
+"""Characters by which a line may become longer afterwards."""
+_STEPS = 10
+"""Lines that may run, for each that may be written."""
+NOT_KNOWN = "how it goes on depends on what is not known"
+NOT_FOLLOWED = "it jumps, loops or calls in a way that is not followed (docs/flow.md)"
+_LABEL = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*[ \t]*:(?!=)[ \t]*")
+_RETURNS = (17.0, 99.0)
+_MODAL_MACROS = frozenset((660, 661))
+
+
+class ExactFollower(Follower):
+    """Runs the main program of a file, and writes its blocks down; nothing may be in doubt."""
+
+    def __init__(self, runner: Runner, script: Script, most: int) -> None:
+        super().__init__(runner, script)
+        self.most = most
+        self.most_steps = _STEPS * most + len(script.lines)
+        self.trace: list[Written] = []
+        self._at = 1
+        self._scopes = 0
+        """Calls that run whose subprograms have variables of their own."""
+        self._origin: Line | None = None
+        self.reached: set[int] = set()
+        """Lines of flow that have run."""
+        self._seen: set[float] = set()
+        """N that stand already."""
+
+    @property
+    def lost(self) -> bool:
+        """Whether programs run that are not followed."""
+        return self._lost
+
+    def write(self) -> Unit:
+        """Write the main program down, in `trace`.
+
+        Raises
+        ------
+        LeftAloneError
+            Something is not certain.
+        """
+        mains = [unit for unit in self.script.units if unit.main and unit.runs]
+        if len(mains) != 1:
+            raise LeftAloneError("the file holds more than one main program, or none", 1)
+        runner, unit = self.runner, mains[0]
+        runner.executor.jumps_known = True
+        runner.left = self._leave
+        try:
+            self._run(unit, unit.first, unit.last, runner.state.copy())
+        except NotFollowedError:
+            raise LeftAloneError(NOT_FOLLOWED, self._at) from None
+        return unit
+
+    def _same(self, before: State, behind: State) -> bool:
+        return False
+
+    def _split(self, ways: Ways, at: int, state: State) -> None:
+        raise LeftAloneError(NOT_KNOWN, self._at)
+
+    def _line(self, unit: Unit, at: int, state: State, ways: Ways) -> None:
+        line = self.script.lines[at]
+        self._at = line.number if line.number < ELSEWHERE else self._at
+        if self._steps >= self.most_steps:
+            raise LeftAloneError(f"it runs more than {self.most_steps} lines", self._at)
+        if at in self.script.ops:
+            self.reached.add(at)
+        super()._line(unit, at, state, ways)
+
+    def _go(self, at: int, target: int, state: State, ways: Ways) -> None:
+        if target == LOST:
+            raise NotFollowedError
+        ways.go(target, state)
+
+    def _set(self, at: int, op: Op, state: State, ways: Ways) -> None:
+        value = self._value(op.condition, state)
+        if value != value:
+            raise LeftAloneError(NOT_KNOWN, self._at)
+        if value != 0.0:
+            assert op.line is not None
+            block = op.line.block
+            pairs = zip(block.assigns, block.assigned, strict=True)
+            text = b" ".join(b"#" + name.encode() + b"=" + value for name, value in pairs)
+            self._take(Line(text, op.line.begin, op.line.number, op.line.terminator, block), state)
+        super()._set(at, op, state, ways)
+
+    def _count(self, at: int, op: Op, state: State, ways: Ways) -> None:
+        super()._count(at, op, state, ways)
+        value = state.variables.get(op.name)
+        if value is None:
+            raise LeftAloneError(NOT_KNOWN, self._at)
+        if not (self._scopes and is_local(op.name, self.runner.dialect.arithmetic)):
+            self._write(op.name.encode() + b"=" + number_text(value), self.script.lines[at])
+
+    def _call(self, unit: Unit, at: int, op: Op, state: State, ways: Ways) -> None:
+        line, sub = self.script.lines[at], self.script.called(op.name)
+        if sub is not None and sub.saves:
+            raise LeftAloneError("a subprogram gives back modes (SAVE)", self._at)
+        before, scopes = self._origin, self._scopes
+        if line.number < ELSEWHERE:
+            self._origin = line
+        self._scopes += op.scoped
+        super()._call(unit, at, op, state, ways)
+        self._origin, self._scopes = before, scopes
+
+    def _block(self, unit: Unit, at: int, line: Line, state: State, ways: Ways) -> None:
+        block, dialect = line.block, self.runner.dialect
+        if block.problem is not None:
+            raise LeftAloneError("a line is not understood", self._at)
+        codes = {round((w.value or 0.0) * 10) for w in block.words if w.letter == "G"}
+        if codes & _MODAL_MACROS:
+            raise LeftAloneError("G66 calls a macro behind every move", self._at)
+        if codes & dialect.contours:
+            raise LeftAloneError("a cycle refers to blocks by their N", self._at)
+        ends = self._is_named and not self._calls
+        if any(w.letter == "M" and w.value in _RETURNS for w in block.words) and not ends:
+            beside = any(word.letter not in "NM" for word in block.words)
+            if beside or block.assigns or block.block_delete:
+                raise LeftAloneError("words stand beside a return", self._at)
+        else:
+            self._take(line, state)
+        super()._block(unit, at, line, state, ways)
+
+    def _return(self, unit: Unit, at: int, state: State, ways: Ways) -> None:
+        if not self._calls and not self._is_named:
+            raise LeftAloneError("M99 begins the program again", self._at)
+        if not self._calls and at in self.script.ops:
+            self._take(self.script.lines[at], state)
+        super()._return(unit, at, state, ways)
+
+    def _take(self, line: Line, state: State) -> None:
+        """Write a block."""
+        text: bytes | None = line.text
+        if self._scopes:
+            if self.script.called(self._called(line)) is None and self._calls_elsewhere(line):
+                raise LeftAloneError("a macro calls a program that is not here", self._at)
+            text = worded(line, state, self.runner.dialect, self.runner.executor.declared)
+        if text is not None:
+            self._write(self._unnumbered(line, text), line)
+
+    def _calls_elsewhere(self, line: Line) -> bool:
+        """Whether a block calls a program, which may share the macro's variables."""
+        codes = {(word.letter, word.value) for word in line.block.words}
+        return bool(codes & {("M", 98.0), ("G", 65.0), ("M", 97.0)})
+
+    def _called(self, line: Line) -> str:
+        return next((f"{w.value:.0f}" for w in line.block.words if w.letter == "P" and w.value), "")
+
+    def _unnumbered(self, line: Line, text: bytes) -> bytes:
+        """Without what jumps have led to: its label, and its N where that has stood already."""
+        lead, block = 0, line.block
+        if block.words and block.words[0].letter == "N" and text.startswith(line.text[:1]):
+            lead = len(text) - len(text.lstrip(b" \t/")) if text is not line.text else 0
+            begin = text.upper().find(b"N")
+            lead = begin + len(block.words[0].text)
+            number = block.words[0].value or 0.0
+            if number in self._seen:
+                text = text[:begin] + text[lead:].lstrip(b" \t")
+                lead = begin
+            self._seen.add(number)
+        if any(not name.name for name in block.names):
+            at = lead + len(text[lead:]) - len(text[lead:].lstrip(b" \t"))
+            match = _LABEL.match(text, at)
+            text = text[:at] + text[match.end() :] if match else text
+        return text
+
+    def _write(self, text: bytes, line: Line) -> None:
+        """Write a line."""
+        if not text.strip(b" \t"):
+            return
+        if text is not line.text and len(text) > self.runner.dialect.text.line_limit - ROOM:
+            raise LeftAloneError("with its numbers a block is too long", self._at)
+        if len(self.trace) >= self.most:
+            reason = f"more than {self.most} lines (program.unrolled_lines of the machine file)"
+            raise LeftAloneError(reason, self._at)
+        origin = line if line.number < ELSEWHERE or self._origin is None else self._origin
+        self.trace.append(Written(text, origin))
+
+
+class ScriptUnroller(FollowingReader):
+    """Collects a program, and writes it out."""
+
+    def __init__(
+        self,
+        name: str,
+        dialect: Dialect,
+        start: Start,
+        elsewhere: Elsewhere,
+        most: int,
+        comments: bool,
+    ) -> None:
+        super().__init__(name, dialect, start, _no_calls, elsewhere)
+        self.most, self.comments = most, comments
+        self.left: list[tuple[int, LeftAloneError]] = []
+        self.structures = 0
+        self.jumped = False
+        self._piece: Piece | None = None
+
+    @property
+    def straight(self) -> bool:
+        """Whether nothing stays that leads elsewhere."""
+        return not self.left
+
+    def pieces(self) -> list[Piece]:
+        """What is to be replaced; behind the file's end."""
+        return [] if self._piece is None else [self._piece]
+
+    def written(self, pieces: list[Piece]) -> int:
+        """How many loops, branches, jumps and calls these pieces stand for."""
+        return self.structures if pieces else 0
+
+    def finish(self) -> None:
+        """Write everything out."""
+        self.runner.elsewhere = self._elsewhere.places
+        try:
+            script = self.script()
+            self.structures = sum(_decides(op) for op in script.ops.values())
+            exact = ExactFollower(self.runner, script, self.most)
+            if self.structures:
+                self._piece = self._made(script, exact.write(), exact)
+                self.structures = sum(_decides(script.ops[at]) for at in exact.reached)
+        except NotFollowedError:
+            self.left.append((1, LeftAloneError(NOT_FOLLOWED, 1)))
+        except LeftAloneError as error:
+            self.left.append((error.line, error))
+        self._finish_log()
+
+    def _made(self, script: Script, unit: Unit, exact: ExactFollower) -> Piece | None:
+        """What stands in the place of the program behind its first blocks."""
+        done = 0
+        for at in range(unit.first, unit.last):
+            line = script.lines[at]
+            head = line.block.percent or line.block.o_word is not None
+            if at not in script.ops and head:
+                continue
+            same = at not in script.ops and done < len(exact.trace)
+            if not (same and exact.trace[done].text is line.text):
+                break
+            done += 1
+        else:
+            return None
+        end = unit.last if exact.lost else len(script.lines)
+        last = [each for each in script.lines[at:end] if each.number < ELSEWHERE][-1]
+        writing = self.dialect.writing
+        marks = (b"(", b")") if writing is None else writing.comment
+        note = [Written(named(line.text, marks), line)] if self.comments else []
+        return Piece(line, last, note + exact.trace[done:])
+
+
+def _decides(op: Op) -> bool:
+    """Whether a line of flow is one that a user would count: a loop, a branch, a jump, a call."""
+    return op.kind not in ("jump", "endfor") or op.condition is not None or op.name == "goto"
+
+
+def _no_calls(runner: Runner) -> Calls:
+    """Nothing is read line after line here."""
+    raise NotFollowedError
