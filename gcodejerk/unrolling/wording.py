@@ -70,6 +70,8 @@ def worded(line: Line, state: State, dialect: Dialect, declared: Mapping[str, st
 
     if not own(code):
         return text
+    if block.block_delete:
+        raise LeftAloneError("the operator may skip a line of a macro", line.number)
     parts, inch = [], state.unit == MM_PER_INCH
     for word in block.words:
         if word.value is not None:
@@ -95,7 +97,7 @@ def worded(line: Line, state: State, dialect: Dialect, declared: Mapping[str, st
     parts += comments
     if not parts:
         return None
-    return (b"/" if block.block_delete else b"") + b" ".join(parts)
+    return b" ".join(parts)
 
 
 def _short(value: float, line: Line) -> bytes:

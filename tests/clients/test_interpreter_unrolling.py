@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_interpreter_flow import FLOW, flows
 
-from gcodejerk.start import Start
+from gcodejerk.start import NOTHING_KNOWN, Start
 from gcodejerk.unrolling.unrolling import unroll
 from gcodejerk.verification.unrolling.checking import check_unrolling
 
@@ -42,7 +42,7 @@ def canon(folder, name):
     return [(NUMBER.sub("", line), [*map(float, NUMBER.findall(line))]) for line in told], refused
 
 
-def unrolled(data, start=Start(), comments=True):
+def unrolled(data, start=NOTHING_KNOWN, comments=True):
     """The program written out, the proof of which is good; None where nothing was."""
     target = io.BytesIO()
     found = unroll(io.BytesIO(data), target, start=start, comments=comments)
@@ -200,14 +200,15 @@ def test_the_interpreter_runs_both_alike(tmp_path, name, comments):
 def test_subprograms_of_other_files_stand_in_the_program(tmp_path):
     files = {
         "spot.ngc": b"o<spot> sub\nG0 X#1 Y#2\no<deep> call [#1]\no<spot> endsub\nG0 X888\nM2\n",
-        "deep.ngc": b"(text)\no<deep> sub\no1 if [#1 gt 3]\nG1 Z-#1 F100\no1 endif\no<deep> endsub\n",
+        "deep.ngc": b"(text)\no<deep> sub\n(in it)\no1 if [#1 gt 3]\nG1 Z-#1 F100\no1 endif\n"
+        b"o<deep> endsub\n",
     }
     for name, text in files.items():
         (tmp_path / name).write_bytes(text)
     data = b"G21 G90\no<spot> call [3] [4]\no<spot> call [2*3] [7]\nG0 Z5\nM2\n"
     result, found = unrolled(data, Start(subprograms=files))
     assert found.used == ("spot.ngc", "deep.ngc")
-    assert result.count(b"\n") == 8
+    assert result.count(b"\n") == 10
     assert same(tmp_path, data, result)
 
 

@@ -103,7 +103,7 @@ class Sides:
         if bare.startswith(b"(gcodejerk: "):
             if not (bare.endswith(b")") and bare.count(b"(") == bare.count(b")") == 1):
                 raise StopError(Kind.COMMENT, "not one closed comment", self.size - 1)
-            self.k += 1
+            self._take(self.size - 1)
 
     @property
     def _called_now(self) -> bool:

@@ -62,6 +62,14 @@ class FlowWalker(Walker):
         self.remarks = {line.strip(b" \t") for at, line in enumerate(lines) if not self._code(at)}
         """Lines of the original that say nothing to the control."""
 
+    @property
+    def closing(self) -> int:
+        """Line of the original that closes the program."""
+        named, lines = self.routes.named, self.routes.lines
+        first = next((part.begin for part in self.routes.parts if part.main), 0) + 1
+        marks = (at for at in range(first, len(lines)) if self._code(at) == b"%")
+        return len(lines) if named else next(marks, len(lines))
+
     def _code(self, at: int) -> bytes:
         """A line without comments and blanks, in upper case."""
         return self.routes.lines[at].translate(None, b" \t\0;")
@@ -216,6 +224,8 @@ class FlowWalker(Walker):
 
     def _expect_numbers(self, line: bytes, state: Tracker) -> None:
         """The same for a block with variables of a subprogram's own: word by word."""
+        if b"/" in line[:4]:
+            raise self._doubt("the operator may skip a block that is written otherwise")
         upper = self.stepper.upper(line).replace(b"\0", b" ")
         upper = _NUMBER.sub(rb"\1", upper, count=1) if _NUMBER.match(upper) else upper
         inch = state.unit is not None and state.unit != 1.0
@@ -266,7 +276,7 @@ def _same_number(text: bytes, value: float) -> bool:
 
 def _words(text: bytes) -> list[tuple[bytes, float]] | None:
     """Letters and numbers of a line; None where it says something else."""
-    flat = text.translate(None, b" \t\0;/")
+    flat = text.translate(None, b" \t\0;")
     found = _WORD.findall(flat)
     whole = b"".join(letter + number for letter, number in found) == flat
     return [(letter, round(float(number), 9)) for letter, number in found] if whole else None
@@ -308,6 +318,8 @@ def check_script(
     if rest != tail:
         told = "what stands behind the end is not that of the original"
         found.add(Kind.ADDED, walker.k + 1, len(mine), told)
+    elif len(rest) < len(mine) - walker.closing:
+        found.add(Kind.MISSING, walker.k + 1, walker.closing + 1, "the closing % is missing")
     elif walker.lost and len(rest) < len(mine) - mains[0].end:
         told = "a subprogram is left out that may still be called"
         found.add(Kind.FLOW, walker.k + 1, mains[0].end + 1, told)
