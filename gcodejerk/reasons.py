@@ -79,9 +79,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.SUBPROGRAM: Explanation(
         "it is not the same rapid on every pass, never runs, or not every pass could be followed",
-        "post the moves in full, without subprograms, loops and branches; or begin every pass at "
-        "the same place; where a call of another file is in the way, give its text "
-        "(`--subprograms`)",
+        "`--unroll` writes loops, branches and calls out, every pass by itself; or post the moves "
+        "in full; where a call of another file is in the way, give its text (`--subprograms`)",
     ),
     Reason.NOT_UNDERSTOOD: Explanation(
         "the control would refuse it, or it holds a code that the dialect's table does not know; "

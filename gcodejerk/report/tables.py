@@ -86,7 +86,8 @@ def summary_line(name: str, summary: Record) -> str:
     if summary.get("structures"):
         done, among = summary["structures_unrolled"], summary["structures"]
         of = f" of {among}" if done != among else ""
-        parts.append(f"{done}{of} loops and calls written out")
+        what = "loop or call" if among == 1 else "loops and calls"
+        parts.append(f"{done}{of} {what} written out")
     if summary["planned"] and summary["worst_conventional_residual"]:
         unit = _Unit.of(summary)
         now, then = (

@@ -99,7 +99,10 @@ class WrittenOut:
     def told(self) -> str:
         """Words for it, in front of what else was done."""
         loops, cycles = self.unrolling, self.expansion
-        text = "" if loops is None else f"{loops.written} loops and calls written out, "
+        text = ""
+        if loops is not None:
+            what = "loop or call" if loops.written == 1 else "loops and calls"
+            text = f"{loops.written} {what} written out, "
         return text + ("" if cycles is None else f"{cycles.written} cycles written out, ")
 
     @property

@@ -83,7 +83,8 @@ class ExactPasses(Passes):
         """
         kept = self._broken, self._continued, set(self._stale), set(self._dos), self._lost
         self.trace, self.jumped, self._exactly, self._steps = [], False, True, 0
-        self._loops, self._origin, self.runner.left = [], None, self._leave
+        self._loops, self._origin = [], None
+        left, self.runner.left = self.runner.left, self._leave
         try:
             exits = self._node(node, self.runner.state)
             after, ended = exits.pop(NEXT, None), exits.pop(END, None)
@@ -100,7 +101,7 @@ class ExactPasses(Passes):
                 raise LeftAloneError("calls within calls, or M99", node.line.number) from None
             raise
         finally:
-            self._exactly = False
+            self._exactly, self.runner.left = False, left
         self.runner.state = state
         self.left -= len(self.trace)
         return self.trace, after is None

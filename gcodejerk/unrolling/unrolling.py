@@ -34,6 +34,9 @@ _SHOWN = 20
 _PLACE = re.compile(rb"<_(?:value|value_returned|call_level|remap_level|line)>")
 """Variables of LinuxCNC that say where in the flow it is."""
 
+_FUNCTIONS = re.compile(rb"(?:A?(?:SIN|COS|TAN)|EXP|LN)\[|\*\*")
+"""Of which two libraries may not give the same last digit."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unrolling:
@@ -154,6 +157,9 @@ def _reader(
     """Who reads a program of this language, and writes it out on the way."""
     rules, most = dialect.text, start.unrolled_lines or MOST_LINES
     if rules.o_word == "flow":
+        if _FUNCTIONS.search(data.translate(None, b" \t").upper()):
+            arithmetic = replace(dialect.arithmetic, careful=True)
+            dialect = replace(dialect, arithmetic=arithmetic)
         return OWordUnroller(name, dialect, start, most, comments, jumps=jumps)
     if (rules.names and rules.variables == "R") or (rules.keywords and rules.o_word == "program"):
         elsewhere = find_elsewhere(data, start.subprograms, dialect)

@@ -39,6 +39,7 @@ def made(case):
             form=form_of(case),
             name=f"{case}/in.ngc",
             expand_cycles=case.startswith("cycles_"),
+            unroll=case.startswith("unroll_"),
         ),
     )
 

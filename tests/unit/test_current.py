@@ -31,7 +31,8 @@ def test_what_is_current_is_left_as_it_is(command, made):
 
 @pytest.mark.parametrize(
     "more",
-    [["--profile", "optimal"], ["--expand-cycles"], ["--dialect", "mach"], ["--no-comments"],
+    [["--profile", "optimal"], ["--expand-cycles"], ["--unroll"], ["--dialect", "mach"],
+     ["--no-comments"],
      ["--controller", "fanuc"], ["--no-verify"], ["--report", "r.json"],
      ["--rapid-feed", "5000", "--rapid-clearance", "2"]],
     ids=lambda more: more[0],

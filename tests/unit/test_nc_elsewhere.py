@@ -199,3 +199,22 @@ def test_cycles_are_not_written_out_beside_other_files(shop, command):
     code, said = run("process", "part.nc", "-m", "own.yaml", "--expand-cycles", "-o", "-")
     assert code == 1
     assert "--expand-cycles and subprograms of other files" in said
+
+
+def test_cycles_are_written_out_where_all_calls_are(shop, command):
+    (shop / "own.ngc").write_text(
+        "G21 G90 G94 G64 G17 G98 F100\nG0 X0 Y0 Z5\no<row> call [3]\nM2\n"
+    )
+    (shop / "lib").mkdir()
+    (shop / "lib" / "row.ngc").write_text(
+        "o<row> sub\nG81 X#1 Z-3 R2\nX[#1*2]\nG80\no<row> endsub\nM2\n"
+    )
+    options = ("own.ngc", "-m", "vmc", "--subprograms", "lib", "--expand-cycles")
+    code, said = command("process", *options)
+    assert code == 1
+    assert "add --unroll" in said
+    code, said = command("process", *options, "--unroll")
+    assert (code, "2 cycles written out; 1 loop or call written out" in said) == (0, True), said
+    assert "followed into 1 file of lib (row.ngc)" in said
+    code, said = command("verify", "own.ngc", "own.jerk.ngc", *options[1:5])
+    assert (code, "1 loop or call written out, 2 cycles written out" in said) == (0, True), said

@@ -18,6 +18,8 @@ OPTIONS = [
     ["--profile", "cascade", "--no-comments"],
     ["--expand-cycles"],
     ["--expand-cycles", "--profile", "shortest", "--no-comments"],
+    ["--unroll"],
+    ["--unroll", "--expand-cycles", "--no-comments"],
     ["--controller", "mach"],
     ["--controller", "grbl", "--no-comments", "--profile", "condition2"],
     ["--dialect", "linuxcnc", "--profile", "shortest"],

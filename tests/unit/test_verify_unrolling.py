@@ -2,6 +2,7 @@
 
 import io
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -217,10 +218,11 @@ def test_a_processed_program_is_held_to_its_original(dialect, controller):
     data = PROGRAMS[dialect]
     result = process(data, VMC, dialect=dialect, controller=controller, unroll=True)
     assert result.planned > 2
-    front = Front(unroll=True)
+    front, machine = Front(unroll=True), replace(VMC, controller=controller)
 
     def judge(output):
-        return verify_written(io.BytesIO(data), io.BytesIO(output), VMC, front, dialect=dialect)[0]
+        files = io.BytesIO(data), io.BytesIO(output)
+        return verify_written(*files, machine, front, dialect=dialect)[0]
 
     assert judge(result.output).ok
     line = b"G91 G0 Z1\n" if dialect == "linuxcnc" else b"G1 Z-1. F100.\n"

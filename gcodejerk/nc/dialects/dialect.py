@@ -183,6 +183,8 @@ class Arithmetic:
     """All numbers of a line are read before any variable of it is set."""
     exact: bool = False
     """A computed position is taken as it is; otherwise it is rounded to the least increment."""
+    careful: bool = False
+    """A comparison that the last digits of a function decide is not known, nor what is rounded."""
     local: int = 0
     """Variables up to this number belong to the program alone: no other sets them behind a call
     of a tool change."""

@@ -26,6 +26,8 @@ LARGEST_TANGENT = 1e9
 """Beyond it the last digit of pi decides, at 90 degrees even the sign."""
 LARGEST_ANGLE = 1e6
 """Degrees beyond which the last digits of an angle, which rounding decides, are too many turns."""
+LAST = 1e-11
+"""Relative difference that the last digits of a function can make."""
 NEARLY_ZERO = 1e-9
 """What a zero may be after errors of rounding, on one side or the other."""
 LARGEST_DIVIDED = 1e8
@@ -79,6 +81,13 @@ def _compare(operator: str, a: float, b: float, rules: Arithmetic) -> float:
             return float((a == b) == (operator == "EQ"))
         a, b = (0.0 if x == VACANT else x for x in (a, b))
     if rules.compared == "near":
+        apart = abs(a - b)
+        if (
+            rules.careful
+            and operator not in ("EQ", "NE")
+            and 0.0 < apart <= LAST * max(abs(a), abs(b))
+        ):
+            return NAN
         return float(_NEAR[operator](a, b))
     larger = max(abs(a), abs(b))
     if a != b and abs(a - b) <= DIGITS * larger:
@@ -92,6 +101,8 @@ def call(name: str, x: float, rules: Arithmetic) -> float:
     """Compute a function of one argument."""
     if x == VACANT:
         x = 0.0
+    if name in _WHOLE and rules.careful and x != round(x) and _is_edge(name, x):
+        return NAN
     if name in _WHOLE and not rules.exact:
         edge = x + 0.5 if name == "ROUND" else x
         close = abs(edge - round(edge)) < NEARLY_ZERO * max(1.0, abs(x))
@@ -103,6 +114,12 @@ def call(name: str, x: float, rules: Arithmetic) -> float:
     if name in ("FIX", "FUP") and rules.floor:
         value = float(math.floor(x) if name == "FIX" else math.ceil(x))
     return value if math.isfinite(value) else NAN
+
+
+def _is_edge(name: str, x: float) -> bool:
+    """Whether the last digits of a number decide what it is rounded to."""
+    edge = x + 0.5 if name == "ROUND" else x
+    return abs(edge - round(edge)) <= LAST * max(1.0, abs(x))
 
 
 def arc_tangent(y: float, x: float) -> float:

@@ -89,6 +89,7 @@ class Walker:
         self.seen: dict[int, Observation] = {}
         self._unsaid: list[tuple[int, int]] = []
         """Lines of which nothing is said."""
+        self.most = MOST
         self._steps = 0
         self._calls: list[Part] = []
         self.lost = False
@@ -128,7 +129,7 @@ class Walker:
             if not first <= at < last:
                 raise LostError
             self._steps += 1
-            if self._steps > MOST:
+            if self._steps > self.most:
                 raise LostError
             for target, after in self._line(part, at, state, back, unsure):
                 waiting[target] = _joined(waiting.get(target), after)

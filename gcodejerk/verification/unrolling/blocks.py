@@ -19,6 +19,7 @@ _ACTIVE = re.compile(rb"[(;][ \t]*PY", re.IGNORECASE)
 _SHOWS = re.compile(rb"[(;][ \t]*(?:PRINT|DEBUG|LOG)[ \t]*,", re.IGNORECASE)
 _SHOWN = re.compile(rb"#([0-9]+|<[^<>]*>)")
 _CODE = re.compile(rb"([GM])([0-9]+(?:\.[0-9]*)?)")
+_LIBRARY = re.compile(rb"(?:SIN|COS|TAN|EXP|LN)\[|\*\*")
 _SAVES = frozenset((70.0, 71.0, 72.0, 73.0))
 _QUIET_M = frozenset((*range(6), *range(7, 10), 19, 30, *range(48, 54), 60, 61, *range(62, 74)))
 """M codes behind which variables are what they were."""
@@ -57,6 +58,7 @@ class Sides:
         self.theirs = other.split(b"\n")
         self.table = Table()
         self.table.add(self.mine)
+        self.values.careful = any(_LIBRARY.search(code) for code in self.table.code)
         self.size = len(self.mine)
         self.crlf = self.mine[0].endswith(b"\r") and self.size > 1
         self.k = 0

@@ -52,6 +52,7 @@ class FlowWalker(Walker):
     ) -> None:
         super().__init__(stepper, begin, lines)
         self.theirs = theirs
+        self.most += 20 * len(theirs)
         self.k = 0
         """Line of the other file that comes next."""
         self.here = 0

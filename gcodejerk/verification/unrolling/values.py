@@ -32,6 +32,8 @@ _OPERATOR = re.compile(rb"\*\*|[-+*/]|MOD|EQ|NE|GT|GE|LT|LE|AND|OR|XOR")
 _OWN = re.compile(rb"#(?:([0-9]+)|(<[^<>]*>)|[#\[{])")
 CLOSE = 1e-12
 """Relative difference of two spellings of one number."""
+_ORDERS = (b"LT", b"LE", b"GT", b"GE")
+_ROUNDS = (b"FIX", b"FUP", b"ROUND")
 _EQUAL = 1e-4
 """How far two numbers may be apart for EQ."""
 
@@ -98,6 +100,8 @@ class Values:
     def __init__(self, dialect: Dialect) -> None:
         rules = dialect.arithmetic
         self.local_count, self.system = rules.local, rules.system
+        self.careful = False
+        """Last digits decide nothing: they come from functions of another library."""
         self._levels = [tuple(name.encode() for name in level) for level in rules.levels]
 
     def is_local(self, name: str) -> bool:
@@ -199,10 +203,23 @@ class Values:
             k = 0
             while k < len(operators):
                 if operators[k] in level:
-                    numbers[k : k + 2] = [_binary(operators.pop(k), numbers[k], numbers[k + 1])]
+                    numbers[k : k + 2] = [self._binary(operators.pop(k), *numbers[k : k + 2])]
                 else:
                     k += 1
         return numbers[0]
+
+    def _binary(self, operator: bytes, a: float, b: float) -> float:
+        apart = abs(a - b)
+        if self.careful and operator in _ORDERS and 0.0 < apart < 1e-12 * max(abs(a), abs(b)):
+            return NAN
+        return _binary(operator, a, b)
+
+    def _function(self, name: bytes, given: list[float]) -> float:
+        if self.careful and name in _ROUNDS and len(given) == 1 and given[0] == given[0]:
+            twice = 2.0 * given[0]
+            if 0.0 < abs(twice - round(twice)) < 1e-12 * max(1.0, abs(twice)):
+                return NAN
+        return _function(name, given)
 
     def _operand(self, text: bytes, variables: Mapping[str, float], held: _Held) -> float:
         sign = -1.0 if text[:1] == b"-" else 1.0
@@ -214,7 +231,7 @@ class Values:
         elif text[:1].isalpha():
             name, _, rest = text.partition(b"{")
             given = [held.numbers[int(k)] for k in re.findall(rb"[0-9]+", rest)]
-            number = _function(name, given)
+            number = self._function(name, given)
         else:
             number = float(text)
         return sign * number
