@@ -240,7 +240,8 @@ class Reader:
         block = line.block
         assert block.o_word is not None
         calls = block.o_word == "call" and not self.state.ended
-        beside = block.words or block.assigns or block.block_delete
+        words = any(word.letter != "N" for word in block.words)
+        beside = words or block.assigns or block.block_delete
         if calls and not beside and not self.flow.inside and not self.passes.exhausted:
             self._pass(Node("call", "", line))
             return

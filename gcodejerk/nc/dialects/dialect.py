@@ -184,15 +184,13 @@ class Arithmetic:
     exact: bool = False
     """A computed position is taken as it is; otherwise it is rounded to the least increment."""
     careful: bool = False
-    """A comparison that the last digits of a function decide is not known, nor what is rounded."""
+    """What the last digits of a function decide is not known."""
     local: int = 0
-    """Variables up to this number belong to the program alone: no other sets them behind a call
-    of a tool change."""
+    """Variables up to this number belong to the program alone: no tool change sets them."""
     system: int = 0
     """From this number on variables belong to the control."""
     offsets: int = 0
-    """From this number on a variable may hold offsets or other data of the control, so that who
-    sets it may rename where the axes stand; 0: no variable does."""
+    """From this number on a variable may hold data that rename where the axes stand; 0: none."""
     timers: frozenset[int] = frozenset()
     """Those of them that hold no such thing."""
     at_selection: bool = False

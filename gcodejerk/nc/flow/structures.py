@@ -88,7 +88,8 @@ class Collector:
                 self._append(Node("line", "", line))
             return None
         name = plain_name(block.o_name)
-        beside = block.words or block.assigns or block.names or block.block_delete
+        words = any(word.letter != "N" for word in block.words)
+        beside = words or block.assigns or block.names or block.block_delete
         arguments = block.o_arguments
         if name is None or beside or block.problem is not None:
             raise ValueError
