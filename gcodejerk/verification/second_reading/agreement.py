@@ -238,14 +238,14 @@ def observations(
     if len(whole) <= MOST_BYTES:
         more = _elsewhere(whole, dialect, start)
         for rest in ([more] if more else []) + ([[]] if walks or calls(whole, dialect) else []):
-            walked = _walked(whole, stepper, lambda: begin_tracker(text, dialect, start), rest)
+            walked = _walked(whole, stepper, lambda: _begin(text, dialect, start), rest)
             if walked is not None:
                 break
     if walked is not None or walks:
         seen = walked or {}
         yield from ((k, seen.get(line - 1, Observation())) for k, line in enumerate(lines))
         return
-    tracker = begin_tracker(text, dialect, start)
+    tracker = _begin(text, dialect, start)
     tracker.doubt = doubt
     if dialect.dark_rapids and start.spindle == "mill" and lines:
         tracker.dark = _behaves_like_a_laser(original, dialect, start)
@@ -312,14 +312,14 @@ def _walked(
 def _behaves_like_a_laser(original: BinaryIO, dialect: Dialect, start: Start) -> bool:
     """Whether any line of the program does what only programs for lasers do."""
     text = Text(dialect, False)
-    tracker = begin_tracker(text, dialect, start)
+    tracker = _begin(text, dialect, start)
     for data in pieces(original):
         for line in data.split(b"\n"):
             tracker.follow(text.read(line.rstrip(b"\r"), not tracker.begun))
     return tracker.habits
 
 
-def begin_tracker(text: Text, dialect: Dialect, start: Start) -> Tracker:
+def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
     """A tracker in the state that programs start in."""
     fed = start.rapid_feed
     tracker = Tracker(
@@ -427,3 +427,7 @@ def _is_known(seen: Observation, rapids: Rapids, i: int) -> bool:
 
 def _names(axes: int) -> str:
     return ", ".join(axis for k, axis in enumerate(AXES) if axes >> k & 1) or "no axis"
+
+
+begin_tracker = _begin
+"""The same for those who hold a program against another one."""
