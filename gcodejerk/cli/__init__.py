@@ -30,7 +30,8 @@ from gcodejerk.cli.machines import (
 )
 from gcodejerk.cli.moves import compare, map_amplitudes, plan
 from gcodejerk.cli.new_machine import machine_new
-from gcodejerk.cli.programs import inspect, process, verify
+from gcodejerk.cli.programs import inspect, process
+from gcodejerk.cli.proving import verify
 from gcodejerk.cli.simulation import machine_reduce, simulate
 from gcodejerk.cli.tuning import parameters
 from gcodejerk.errors import GcodejerkError

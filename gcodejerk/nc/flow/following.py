@@ -296,6 +296,7 @@ class Follower:
         if current is not None:
             ways.go(op.yes, current)
 
+    # Complex: what a call keeps, gives and gives back is one thing on every pass.
     def _call(self, unit: Unit, at: int, op: Op, state: State, ways: Ways) -> None:
         """Call a subprogram of the file; another one is not followed, and leaves nothing known."""
         line = self.script.lines[at]

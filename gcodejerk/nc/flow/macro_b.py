@@ -81,6 +81,7 @@ def _compile(script: Script, unit: Unit, dialect: Dialect) -> None:
     script.ops.update(checked(ops, structures))
 
 
+# Complex: one case for each form of a line.
 def _op(
     script: Script,
     unit: Unit,
@@ -151,6 +152,7 @@ def _goto(script: Script, unit: Unit, text: bytes, condition: bytes | None, at: 
     raise NotFollowedError
 
 
+# Complex: one case for each of three calls, which share their numbers.
 def _call(script: Script, unit: Unit, at: int, block: Block, dialect: Dialect) -> Op | None:
     """``M98 P1000 L3``, ``M97 P100``, ``G65 P9000 A1.``; None for any other block."""
     codes = {(w.letter, w.value) for w in block.words if w.letter in "GM"}

@@ -127,6 +127,7 @@ class _Compiler:
         """Note a place that jumps may lead to."""
         self.labels[name] = LOST if name in self.labels else at
 
+    # Complex: one case for each form of a line.
     def _op(self, at: int, line: Line) -> Op | None:
         """What a line does."""
         block = line.block

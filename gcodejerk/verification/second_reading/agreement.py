@@ -14,6 +14,7 @@ from array import array
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -229,29 +230,47 @@ def observations(
     doubt = jumps_back(original, dialect)
     original.seek(begin)
     decimals = dialect.whole_numbers == "machine" and start.decimal_point != "calculator"
-    text = Text(dialect, decimals)
-    stepper = Stepper(text, dialect)
-    whole = original.read(MOST_BYTES + 1)
-    original.seek(begin)
-    walks = flows(whole, dialect)
-    walked = None
-    if len(whole) <= MOST_BYTES:
-        more = _elsewhere(whole, dialect, start)
-        for rest in ([more] if more else []) + ([[]] if walks or calls(whole, dialect) else []):
-            walked = _walked(whole, stepper, lambda: _begin(text, dialect, start), rest)
-            if walked is not None:
-                break
-    if walked is not None or walks:
-        seen = walked or {}
+    stepper = Stepper(Text(dialect, decimals), dialect)
+    seen = _as_it_flows(original, dialect, start, stepper)
+    if seen is not None:
         yield from ((k, seen.get(line - 1, Observation())) for k, line in enumerate(lines))
         return
-    tracker = _begin(text, dialect, start)
+    tracker = _begin(stepper.text, dialect, start)
     tracker.doubt = doubt
     if dialect.dark_rapids and start.spindle == "mill" and lines:
         tracker.dark = _behaves_like_a_laser(original, dialect, start)
         original.seek(begin)
-    plain_lines = PlainLines(dialect, decimals)
-    number, following, behind = 1, 0, -1
+    yield from _from_above(original, stepper, tracker, PlainLines(dialect, decimals), lines, plain)
+
+
+def _as_it_flows(
+    original: BinaryIO, dialect: Dialect, start: Start, stepper: Stepper
+) -> dict[int, Observation] | None:
+    """What is seen in the lines, from 0, where jumps and calls are followed; None: without any."""
+    begin = original.tell()
+    whole = original.read(MOST_BYTES + 1)
+    original.seek(begin)
+    walks = flows(whole, dialect)
+    if len(whole) <= MOST_BYTES:
+        more = _elsewhere(whole, dialect, start)
+        new = partial(_begin, stepper.text, dialect, start)
+        for rest in ([more] if more else []) + ([[]] if walks or calls(whole, dialect) else []):
+            walked = _walked(whole, stepper, new, rest)
+            if walked is not None:
+                return walked
+    return {} if walks else None
+
+
+def _from_above(
+    original: BinaryIO,
+    stepper: Stepper,
+    tracker: Tracker,
+    plain_lines: PlainLines,
+    lines: Sequence[int],
+    plain: _Plain | None,
+) -> Iterator[tuple[int, Observation]]:
+    """What is seen in a program that is read from its first line to its last; as `observations`."""
+    text, number, following = stepper.text, 1, 0
     line = lines[0] if lines else math.inf
     for data in pieces(original):
         at, size, behind = 0, len(data), -1
@@ -266,9 +285,8 @@ def observations(
                 line = lines[following] if following < len(lines) else math.inf
                 continue
             behind = behind if taken is None else taken[1]
-            run = None
-            if tracker.may_run:
-                run = text.take_run(data, at, stated=not tracker.feeding)
+            stated = not tracker.feeding
+            run = text.take_run(data, at, stated=stated) if tracker.may_run else None
             if run is not None:
                 tracker.run(run[0])
                 number, at = number + run[0].lines, run[1]
@@ -279,8 +297,7 @@ def observations(
                 continue
             end = data.find(b"\n", at)
             end = size if end < 0 else end
-            bare = data[at:end].rstrip(b"\r")
-            bare = bare.removeprefix(MARK) if number == 1 else bare
+            bare = data[at:end].rstrip(b"\r").removeprefix(MARK if number == 1 else b"")
             found = stepper.step(tracker, bare)
             if number == line:
                 yield following, found

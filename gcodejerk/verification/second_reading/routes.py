@@ -249,6 +249,7 @@ class Routes:
                 if self._around[at][: len(inner)] != inner:
                     raise LostError
 
+    # Complex: one case for each form of a line of macro B that leads somewhere.
     def _macro_way(
         self, part: Part, at: int, text: bytes, opened: list[tuple[str, int, int | None]]
     ) -> None:
@@ -296,6 +297,7 @@ class Routes:
         if _MACRO_WORD.search(text):
             raise LostError
 
+    # Complex: one case for each form of a line of Siemens that leads somewhere.
     def _named_way(
         self, part: Part, at: int, text: bytes, opened: list[tuple[str, int, int | None]]
     ) -> None:

@@ -135,6 +135,7 @@ class Tracker(Drilling):
         self.doubt = self.doubt or keyword == "DO" or self.depth < 0
         self.unknown_call()
 
+    # Complex: one kind of line behind another, in the order in which they are told apart.
     def _execute(self, line: Line) -> Observation:
         """Execute words, the modal ones in front of the motion."""
         dialect = self.dialect

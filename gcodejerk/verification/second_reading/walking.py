@@ -257,6 +257,7 @@ class Walker:
         if len(self._calls) > _DEEPEST:
             raise LostError
 
+    # Complex: what a call keeps, gives and gives back is one thing on every pass.
     def _call(self, at: int, way: Way, state: Tracker) -> list[tuple[int, Tracker]]:
         """Run a subprogram of the file; of another, nothing is known behind it."""
         called = self.routes.called(way.name)

@@ -143,6 +143,7 @@ class FlowWalker(Walker):
         self.here = at
         return found
 
+    # Complex: one case for each line that both files need not have alike.
     def _block(
         self, part: Part, at: int, state: Tracker, back: list[Tracker]
     ) -> list[tuple[int, Tracker]]:
@@ -283,6 +284,7 @@ def _words(text: bytes) -> list[tuple[bytes, float]] | None:
     return [(letter, round(float(number), 9)) for letter, number in found] if whole else None
 
 
+# Complex: one thing that can be wrong behind the walk after another.
 def check_script(
     original: bytes,
     other: bytes,

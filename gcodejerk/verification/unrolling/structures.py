@@ -69,6 +69,7 @@ class Table:
         label = match[1] if match[1][:1] == b"<" else b"%d" % int(match[1])
         return OWord(match[2], label, arguments)
 
+    # Complex: one case for each O-word, which opens, divides or closes what is open.
     def find(self, first: int) -> int | None:
         """Find the last line of the structure that begins here; None where it is none."""
         head = self.o_word(first)
