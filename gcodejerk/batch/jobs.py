@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import tempfile
 import traceback
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -204,7 +204,8 @@ def _lost(job: Job, status: int | None) -> Done:
 
 def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
     _refuse_overwriting(job, machine)
-    if job.if_changed and job.mode == "write":
+    writes = job.mode == "write"
+    if job.if_changed and writes:
         others = [name for name in (job.report, job.beside) if name is not None]
         if is_current(job.input, job.output, others, machine, settings):
             summary = f"{job.called}: {job.output} is up to date"
@@ -212,66 +213,106 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
     with ExitStack() as stack:
         before = version(job.input)
         source = stack.enter_context(open_input(job.input))
-        # The outputs are renamed when the stack closes without an error, the report last.
-        report = None
-        for name in job.new_folders if job.mode == "write" else ():
-            make_folder(name)
-        if job.report is not None and job.mode == "write":
-            report = stack.enter_context(new_file(job.report))
         # In place, the program is replaced only where something has changed.
         keeps = job.in_place and job.beside is None
         done: Done | None = None
-        if job.mode == "write":
-            target: BinaryIO = stack.enter_context(
-                new_file(job.output, job.input, lambda: done is None or done.changed or not keeps)
-            )
-        else:
-            target = stack.enter_context(tempfile.TemporaryFile())
-        beside: BinaryIO | None = None
-        if job.beside is not None and job.mode == "write":
-            # It is in its place before the program, which names it by its sum.
-            beside = stack.enter_context(new_file(job.beside, like=job.input))
-        elif job.beside is not None:
-            beside = stack.enter_context(tempfile.TemporaryFile())
-        result = process_file(source, target, machine, settings, job.called, progress, beside)
-        summary = summary_line(job.called, summary_of(result))
-        if job.strict and (result.unserved or result.read_once):
-            raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
-        if report is not None:
-            if is_page(job.report or ""):
-                written = sum(file.seek(0, 2) for file in (target, beside) if file is not None)
-                write_page(report, result, machine, job.output, source, written)
-            else:
-                packs = (job.report or "").lower().endswith(PACKED)
-                with packed(report) if packs else nullcontext(report) as file:
-                    write_report(file, result, machine, job.output, source, progress)
-            report.flush()  # a full disk shows here, and not when the output is in its place
-        if job.mode == "write" and not (job.in_place or settings.force):
-            _refuse_foreign(job, source, target)
-        if job.mode == "write" and not settings.force:
+        files = _opened(job, stack, lambda: done is None or done.changed or not keeps)
+        result = process_file(
+            source, files.target, machine, settings, job.called, progress, files.beside
+        )
+        _refuse_if_strict(job, result)
+        _write_report(job, files, result, machine, source, progress)
+        if writes and not settings.force:
+            if not job.in_place:
+                _refuse_foreign(job, source, files.target)
             _refuse_foreign_beside(job)
-        diff = difference(source, target, result) if job.mode == "diff" else b""
+        diff = difference(source, files.target, result) if job.mode == "diff" else b""
         if job.in_place and version(job.input) != before:
             raise changed_error(job.input)  # an edit of the user's would be lost
-        steps = (result.expansion, result.unrolling)
-        written = sum(step.written for step in steps if step is not None)
-        places = 0 if result.settings is None else result.settings.places
-        left = result.left if result.settings is None else result.unserved
-        counts = (result.planned, left, written, places)
-        figures = summary_of(result)
-        done = Done(
-            job.called, *counts, summary, result.notes, diff, whole_line(figures),
-            figures=figures, left_at=_left_at(result),
-        )  # fmt: skip
-        if job.backup and job.mode == "write" and done.changed:
+        done = _done(job, result, diff)
+        if job.backup and writes and done.changed:
             keep(job.input, source)
+    return _with_output(job, done, keeps=keeps)
+
+
+@dataclass(frozen=True, slots=True)
+class _Outputs:
+    """Files that a program goes to, open."""
+
+    target: BinaryIO
+    beside: BinaryIO | None
+    report: BinaryIO | None
+
+
+def _opened(job: Job, stack: ExitStack, replaces: Callable[[], bool]) -> _Outputs:
+    """Open the outputs; as the stack closes without an error they get their names, reports last."""
+    beside: BinaryIO | None = None
+    if job.mode != "write":
+        target: BinaryIO = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
+        if job.beside is not None:
+            beside = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
+        return _Outputs(target, beside, None)
+    for name in job.new_folders:
+        make_folder(name)
+    report = None if job.report is None else stack.enter_context(new_file(job.report))
+    target = stack.enter_context(new_file(job.output, job.input, replaces))
+    if job.beside is not None:
+        # It is in its place before the program, which names it by its sum.
+        beside = stack.enter_context(new_file(job.beside, like=job.input))
+    return _Outputs(target, beside, report)
+
+
+def _write_report(
+    job: Job,
+    files: _Outputs,
+    result: Result,
+    machine: Machine,
+    source: BinaryIO,
+    progress: Progress | None,
+) -> None:
+    """Write the report that is asked for, as a page or as JSON."""
+    report, name = files.report, job.report or ""
+    if report is None:
+        return
+    if is_page(name):
+        written = sum(f.seek(0, 2) for f in (files.target, files.beside) if f is not None)
+        write_page(report, result, machine, job.output, source, written)
+    else:
+        packs = name.lower().endswith(PACKED)
+        with packed(report) if packs else nullcontext(report) as file:
+            write_report(file, result, machine, job.output, source, progress)
+    report.flush()  # a full disk shows here, and not when the output is in its place
+
+
+def _done(job: Job, result: Result, diff: bytes) -> Done:
+    """What became of a program."""
+    steps = (result.expansion, result.unrolling)
+    written = sum(step.written for step in steps if step is not None)
+    places = 0 if result.settings is None else result.settings.places
+    left = result.left if result.settings is None else result.unserved
+    figures = summary_of(result)
+    return Done(
+        job.called, result.planned, left, written, places, summary_line(job.called, figures),
+        result.notes, diff, whole_line(figures), figures=figures, left_at=_left_at(result),
+    )  # fmt: skip
+
+
+def _refuse_if_strict(job: Job, result: Result) -> None:
+    """Refuse what --strict does: rapids that were left alone, or that one reading alone knows."""
+    if job.strict and (result.unserved or result.read_once):
+        summary = summary_line(job.called, summary_of(result))
+        raise EmitError(summary, "--strict refuses this; `gcodejerk inspect` shows every rapid")
+
+
+def _with_output(job: Job, done: Done, *, keeps: bool) -> Done:
+    """The same with the name of what was written."""
     if job.mode != "write" or job.output == STANDARD:
         return done
     if keeps and not done.changed:
-        return replace(done, summary=f"{summary}; the file is as it was")
+        return replace(done, summary=f"{done.summary}; the file is as it was")
     to = job.called if job.in_place else job.output
     more = f" and {job.beside}" if job.beside else ""
-    return replace(done, summary=f"{summary} -> {to}{more}", output=to)
+    return replace(done, summary=f"{done.summary} -> {to}{more}", output=to)
 
 
 def _left_at(result: Result) -> tuple[tuple[str, tuple[int, ...], int], ...]:
