@@ -43,6 +43,7 @@ from gcodejerk.nc import Dialect, Program, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.straight import LINEAR, leading_axis
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
@@ -233,7 +234,7 @@ class _Points:
         self.decimals = INCH_DECIMALS if self.inch else DECIMALS
         moving = batch.plans.displacement[move] != 0.0
         self.axes = np.flatnonzero(moving).tolist()
-        self.leading = max(self.axes, key=lambda a: abs(float(batch.plans.displacement[move, a])))
+        self.leading = int(leading_axis(batch.plans.displacement[[move], : len(LINEAR)])[0])
         self.sign = int(np.sign(batch.plans.displacement[move, self.leading]))
         first = int(np.flatnonzero(batch.grid.knots[row] > 0)[0]) - 1
         scale = {a: 2 if rapids.diameter[move] and AXES[a] == "X" else 1 for a in self.axes}

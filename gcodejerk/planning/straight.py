@@ -26,6 +26,8 @@ FEWEST = 2.0
 """Steps that an axis moves at least."""
 BITS = 36
 """Of length, direction and profile in which moves that are alike agree."""
+ALIKE = 1.0 - 1e-9
+"""Share of the farthest axis's way from which on another one goes as far."""
 LINEAR = "XYZ"
 """Axes that are played so: the planner blends no others."""
 
@@ -154,3 +156,22 @@ def _along(limits: Array, direction: Array) -> Array:
     with np.errstate(divide="ignore"):
         out: Array = np.where(direction != 0.0, limits / np.abs(direction), np.inf).min(axis=1)
     return np.where(np.isfinite(out), out, 1.0)
+
+
+def leading_axis(way: Array) -> NDArray[np.int64]:
+    """The axis that goes farthest, which has the begin and the end of a stream to itself.
+
+    Parameters
+    ----------
+    way : ndarray, shape (n, 3)
+        Displacements or directions along X, Y and Z.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        The first of those that are alike but for last bits: who asks with displacements and who
+        asks with directions are told the same.
+    """
+    far = np.abs(way)
+    leading: NDArray[np.int64] = (far >= ALIKE * far.max(axis=1, keepdims=True)).argmax(axis=1)
+    return leading

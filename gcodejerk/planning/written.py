@@ -17,7 +17,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.sampling import Counts
 from gcodejerk.motion.servo.knots import CREEP, HAIR, passed
 from gcodejerk.motion.servo.spline_filter import filtered
-from gcodejerk.planning.straight import LINEAR, StraightMoves
+from gcodejerk.planning.straight import LINEAR, StraightMoves, leading_axis
 
 TAIL = 2e-5
 """Way at the end that is crept, so that the speed at the last period is known and low. [mm]"""
@@ -78,7 +78,7 @@ class Written:
         from_origin = start - np.where(moving, origin, 0.0)
         size = step[:, np.newaxis]
         rows = np.arange(len(step))
-        leading = np.abs(moves.direction).argmax(axis=1)
+        leading = leading_axis(moves.direction)
         sign = np.sign(moves.direction[rows, leading]).astype(np.int64)
 
         # No point before the start or behind the end, wherever these lie between two steps.

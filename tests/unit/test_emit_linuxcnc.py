@@ -423,3 +423,11 @@ def test_the_tail_goes_along_the_line(unit):
         cosine = step @ line / np.linalg.norm(step) / np.linalg.norm(line)
         assert np.linalg.norm(step) * scale == pytest.approx(2e-5, rel=0.1)
         assert np.degrees(np.arccos(min(cosine, 1.0))) < 3.0, (way, tail)
+
+
+def test_axes_that_move_alike_but_for_a_last_bit_have_one_leading_axis():
+    # In mm -38.099999999999994 + 12.7 and -31.75 + 6.35: as directions they are equal.
+    data = b"G20 G90 G94 G17 G40 G64\nG0 X-.5 Y-.25 Z0\nG1 Z-.3 F20\nG0 X-1.5 Y-1.25\nM2\n"
+    result = process(data, Machine.load(find_machine("vmc")), controller="linuxcnc")
+    assert result.planned == 1
+    assert result.verification.ok
