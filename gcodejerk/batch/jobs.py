@@ -48,6 +48,7 @@ from gcodejerk.report.tuning_record import settings_record
 from gcodejerk.rewrite.pipeline import Progress, Settings, process_file, silent
 from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import changed_error
+from gcodejerk.storage import windows
 
 FIRST_LINES = 12
 """Of rapids that were left alone, for each reason."""
@@ -353,9 +354,11 @@ def write_report(
 def _blocks(result: Result, source: BinaryIO) -> Iterator[str]:
     """The text of each rapid's block."""
     rapids = result.program.rapids
-    for begin, end in zip(rapids.begin.tolist(), rapids.end.tolist(), strict=True):
-        source.seek(begin)
-        yield source.read(end - begin).decode("latin-1").strip()
+    for part in windows(len(rapids)):
+        places = zip(rapids.begin[part].tolist(), rapids.end[part].tolist(), strict=True)
+        for begin, end in places:
+            source.seek(begin)
+            yield source.read(end - begin).decode("latin-1").strip()
 
 
 def record_of(

@@ -43,7 +43,7 @@ class CsvController(Controller):
     def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """Multiples of the resolution, whatever the program's unit."""
         step = np.broadcast_to(step_sizes(machine, inch=False), rapids.start.shape)
-        return NumberFormat(rapids.start, step, np.zeros_like(rapids.start))
+        return NumberFormat(rapids.start, step, np.broadcast_to(0.0, rapids.start.shape))
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """Nothing to say."""

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import axis_steps
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Dialect, Program, parse_block
+from gcodejerk.nc import Dialect, Program, Rapids, parse_block
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.storage import windows
 from gcodejerk.units import MM_PER_INCH
 
 AROUND = len(b"G1 G61.1  F") + 15
@@ -57,8 +58,9 @@ def reasons_to_leave(
     rapids = program.rapids
     reason = rapids.reason.copy()
     certain = reason == CERTAIN
-    too_wide = _digits(program, machine, dialect)
-    reason[certain & too_wide] = REASONS.index(Reason.LINE_LIMIT)
+    for part in windows(len(rapids)):
+        too_wide = _digits(rapids.part(part), machine, dialect)
+        reason[part][certain[part] & too_wide] = REASONS.index(Reason.LINE_LIMIT)
     # An axis that counts its turns reads each point as it reads the rapid's own word: a point that
     # is rounded back behind the one before it would send the axis all the way round.
     reason[certain & (rapids.turned != 0)] = REASONS.index(Reason.ROTARY_WAY)
@@ -91,9 +93,8 @@ def _lengths(block: bytes, dialect: Dialect) -> tuple[int, int]:
     return len(block.rstrip()) - axes, point
 
 
-def _digits(program: Program, machine: Machine, dialect: Dialect) -> NDArray[np.bool_]:
+def _digits(rapids: Rapids, machine: Machine, dialect: Dialect) -> NDArray[np.bool_]:
     """Rapids with a point that has more digits than the control reads."""
-    rapids = program.rapids
     writing = dialect.writing
     out = np.zeros(len(rapids), dtype=np.bool_)
     if writing is None:

@@ -41,6 +41,7 @@ from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import FINE_DECIMALS
+from gcodejerk.storage import made
 
 BLOCK_TIME = 0.002
 """Duration of a block, measured as the best; whole intervals, at least one [s]."""
@@ -68,7 +69,9 @@ class GcodeController(Controller):
         mm, inch = (step_sizes(machine, unit, doubles) for unit in (False, True))
         step = np.broadcast_to(mm, rapids.start.shape)
         if rapids.inch.any():
-            step = np.where(rapids.inch[:, np.newaxis], inch, mm)
+            step = made(
+                lambda part: np.where(rapids.inch[part, np.newaxis], inch, mm), rapids.start.shape
+            )
         return NumberFormat(rapids.start, step, origins(rapids), finer=doubles)
 
     def feeds(self, batch: Batch, rapids: Rapids) -> Feeds:
@@ -150,7 +153,11 @@ def origins(rapids: Rapids) -> NDArray[np.float64]:
     """Where points are counted from: 0, or where increments begin, shape (n, 9) [mm] or [deg]."""
     if not rapids.incremental.any():
         return np.broadcast_to(0.0, rapids.start.shape)
-    return np.where(rapids.incremental[:, np.newaxis], rapids.start, 0.0)
+
+    def origin(part: slice) -> NDArray[np.float64]:
+        return np.where(rapids.incremental[part, np.newaxis], rapids.start[part], 0.0)
+
+    return made(origin, rapids.start.shape)
 
 
 def line_ends_of(

@@ -44,6 +44,7 @@ from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.straight import LINEAR, leading_axis
+from gcodejerk.storage import windows
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
@@ -88,8 +89,11 @@ class LinuxcncController(LinuxcncSettings, Controller):
         """Steps of the last decimal, in mm; increments are counted from the start."""
         _check_settings(machine)
         inch = MM_PER_INCH * 10.0**-INCH_DECIMALS
-        step = np.where(rapids.inch[:, np.newaxis], inch, 10.0**-DECIMALS)
-        step = np.broadcast_to(step, rapids.start.shape)
+        shape = rapids.start.shape
+        step = np.broadcast_to(10.0**-DECIMALS, shape)
+        if rapids.inch.any():
+            steps = np.where(rapids.inch, inch, 10.0**-DECIMALS)
+            step = np.broadcast_to(steps[:, np.newaxis], shape)
         return NumberFormat(rapids.start, step, origins(rapids))
 
     def render(
@@ -168,8 +172,12 @@ def _too_slow(plans: Plans) -> list[str]:
         stated = plans.machine.controller_options.max_acceleration
         today, needed = axis.rapid.acceleration, STREAM_HEADROOM * axis.limit.acceleration
         today = stated.get(axis.name, today)
-        moves = plans.planned & (plans.displacement[:, AXES.index(axis.name)] != 0.0)
-        if axis.planner == LINUXCNC and today < needed * (1.0 - 1e-6) and moves.any():
+        k, planned = AXES.index(axis.name), plans.planned
+        moves = any(
+            bool((planned[part] & (plans.displacement[part, k] != 0.0)).any())
+            for part in windows(len(plans))
+        )
+        if axis.planner == LINUXCNC and today < needed * (1.0 - 1e-6) and moves:
             raised.append(f"{axis.name} from {today:g} to {needed:g}")
     if not raised:
         return []

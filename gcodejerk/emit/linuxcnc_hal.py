@@ -49,6 +49,7 @@ from gcodejerk.nc import Dialect, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
+from gcodejerk.storage import made
 from gcodejerk.units import MM_PER_INCH
 
 ADAPTIVE, POSITION = "adaptive-feed", "position"
@@ -124,8 +125,9 @@ class LinuxcncHalController(GcodeController):
     def number_format(self, rapids: Rapids, machine: Machine, dialect: Dialect) -> NumberFormat:
         """As fine as a double, counted from the start."""
         self.check(machine, dialect)
-        step = np.full(rapids.start.shape, FINEST)
-        return NumberFormat(rapids.start, step, np.nan_to_num(rapids.start))
+        shape = rapids.start.shape
+        origin = made(lambda part: np.nan_to_num(rapids.start[part]), shape)
+        return NumberFormat(rapids.start, np.broadcast_to(FINEST, shape), origin)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What has to be installed, and how the form behaves at the machine."""

@@ -23,6 +23,8 @@ FEW = 16
 """Modes of which every exponential is computed."""
 CELLS = 1 << 20
 """Exponentials that are computed at a time, of moments at frequencies: 16 MB."""
+AT_ONCE = 2048
+"""Moves whose steps are worked out together: those of one do not depend on others."""
 GRID_TOLERANCE = 1e-6
 """A time this little above a whole number of intervals is that number [intervals]."""
 
@@ -239,13 +241,16 @@ def knots_steps(values: Array, grid: Grid) -> Array:
         By the time that is left until arrival, so that all moves share the exponentials; 0 where
         nothing changes. [mm/s]
     """
-    duration = np.diff(grid.knots, axis=1) * grid.interval
-    with np.errstate(invalid="ignore", divide="ignore"):
-        velocity = np.where(duration > 0.0, np.diff(values, axis=1) / duration, 0.0)
-    steps = np.diff(velocity, axis=1, prepend=0.0, append=0.0)
     every = np.zeros((len(values), int(grid.counts.max(initial=0)) + 1))
-    left = grid.counts[:, np.newaxis] - grid.knots
-    # Columns before a move has begun have no step.
-    begun = steps != 0.0
-    every[np.nonzero(begun)[0], left[begun]] = steps[begun]
+    for row in range(0, len(values), AT_ONCE):
+        part = slice(row, row + AT_ONCE)
+        knots = grid.knots[part]
+        duration = np.diff(knots, axis=1) * grid.interval
+        with np.errstate(invalid="ignore", divide="ignore"):
+            velocity = np.where(duration > 0.0, np.diff(values[part], axis=1) / duration, 0.0)
+        steps = np.diff(velocity, axis=1, prepend=0.0, append=0.0)
+        left = grid.counts[part, np.newaxis] - knots
+        # Columns before a move has begun have no step.
+        begun = steps != 0.0
+        every[row + np.nonzero(begun)[0], left[begun]] = steps[begun]
     return every

@@ -74,6 +74,7 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         the time is in none of its times. `unplayable` says which moves the control would not play
         as planned.
     """
+    conventional = sampler.conventional_residual()  # first: it needs much room for a moment
     moves = StraightMoves.of(sampler)
     first, like = moves.alike()
     knots, speeds, enough = _followed(moves.take(first), stride)
@@ -103,7 +104,7 @@ def aligned_batch(sampler: Sampler, stride: int) -> Batch:
         fine=np.zeros((len(moves.count), len(AXES)), dtype=np.bool_),
         velocity={a: written.speed * moves.direction[:, [a]] for a in positions},
         residual=residual,
-        conventional_residual=sampler.conventional_residual(),
+        conventional_residual=conventional,
         worst_in_band=worst,
         profiles=sampler.profiles,
         unplayable=~(moves.possible & enough & _within(moves, knots, written.speed[:, :-1]))

@@ -125,9 +125,8 @@ class Batch:
 
     def take(self, rows: NDArray[np.int64]) -> Batch:
         """Some of the streams."""
-        owner = np.repeat(
-            np.arange(len(self)), [len(self.plans.profiles_of(m)) for m in self.moves]
-        )
+        begin, end = (np.searchsorted(self.plans.move, self.moves, side=side) for side in SIDES)
+        owner = np.repeat(np.arange(len(self)), end - begin)
         columns: dict[str, Any] = {
             name: {axis: values[rows] for axis, values in getattr(self, name).items()}
             for name in ("whole", "exact", "written", "velocity")

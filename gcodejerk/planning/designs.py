@@ -34,6 +34,7 @@ from gcodejerk.motion.search.unit_move import Move, Optimum, optimum_profiles
 from gcodejerk.planning.optima import Progress, Question, answers
 from gcodejerk.planning.plans import Plans, same_rows
 from gcodejerk.planning.task import Task, worst_in_band
+from gcodejerk.storage import gathered
 
 ALLOWED = 0.97
 """Share of the tolerance that a profile may use; rounding to the resolution needs some, too."""
@@ -330,7 +331,7 @@ def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0
     if plans.machine.positioning != "linear":
         return least_residuals(plans, progress, band)
     first, like = same_rows(plans.displacement, plans.counts, plans.reason)
-    return least_residuals(plans.repeated(first), progress, band)[like]
+    return gathered(least_residuals(plans.repeated(first), progress, band), like)
 
 
 def _question(

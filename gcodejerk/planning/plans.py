@@ -21,6 +21,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.motion.residual import Complex
 from gcodejerk.reasons import CERTAIN
+from gcodejerk.storage import gathered, kept, windows
 
 STANDSTILL = 1e-9
 """An axis that moves less than this does not move [mm] or [deg]."""
@@ -199,13 +200,13 @@ class Plans:
         """These moves in another order, any of them more than once, or not at all."""
         begin, end = (np.searchsorted(self.move, index, side=side) for side in ("left", "right"))
         count = end - begin
-        move = np.repeat(np.arange(len(index)), count)
-        rows = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(move))
+        move = kept(np.repeat(np.arange(len(index)), count))
+        rows = kept(np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(move)))
         columns = (
             *("reason", "displacement", "length", "conventional_time", "counts"),
             *("worst_in_band", "most_in_band"),
         )
-        taken = {name: getattr(self, name)[index] for name in columns}
+        taken: dict[str, Any] = {name: gathered(getattr(self, name), index) for name in columns}
         return replace(
             self,
             **taken,
@@ -213,8 +214,8 @@ class Plans:
             share=_same_or(self.share, rows, taken["displacement"], move),
             profiles=RepeatedProfiles(self.profiles, rows),
             conventional=RepeatedProfiles(self.conventional, rows),
-            profile_counts=self.profile_counts[rows],
-            lasting=None if self.lasting is None else self.lasting[index],
+            profile_counts=gathered(self.profile_counts, rows),
+            lasting=None if self.lasting is None else gathered(self.lasting, index),
         )
 
 
@@ -224,9 +225,9 @@ def _same_or(
     """Some rows of the shares: a part of the displacements, where they are just that."""
     if len(move) and move[-1] - move[0] + 1 == len(move):
         part = displacement[move[0] : move[-1] + 1]
-        if all((share[rows, k] == part[:, k]).all() for k in range(part.shape[1])):
+        if all((share[rows[w]] == part[w]).all() for w in windows(len(rows))):
             return part
-    return share[rows]
+    return gathered(share, rows)
 
 
 def same_rows(*columns: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -275,10 +276,15 @@ def sorted_rows(
 
 def _words(column: NDArray[np.generic]) -> Iterator[NDArray[np.unsignedinteger[Any]]]:
     """The bits of rows, as whole numbers of up to 64 of them, one column at a time."""
+    if not any(column.strides):
+        return
     flat = column.reshape(len(column), -1)
     kind = np.dtype(f"u{flat.dtype.itemsize}")
     for k in range(flat.shape[1]):
-        yield np.ascontiguousarray(flat[:, k]).view(kind)
+        values = np.empty(len(flat), dtype=flat.dtype)
+        for part in windows(len(flat)):
+            values[part] = flat[part, k]
+        yield values.view(kind)
 
 
 def path_length(displacement: Array, machine: Machine) -> Array:

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.errors import PlanError
 from gcodejerk.machine import Machine
+from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plan import PROFILES, plan_moves, rule_out
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length, same_rows
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.storage import column, windows
 
 FARTHEST = 1e8
 """Where no axis ever is [mm] or [deg]; what is farther away could not be written exactly."""
@@ -64,6 +66,26 @@ def plan_rapids(
             f"profile {profile!r} adds time to every rapid: it is there for comparison only",
             f"choose one of {', '.join(p for p in PROFILES if p not in SHAPERS)}",
         )
+    reason = np.empty(len(rapids), dtype=np.uint8)
+    displacement = column((len(rapids), len(AXES)), 0.0)
+    # These keep the profile or save time; all others do nothing but keep modes still.
+    saves = profile in ("conventional", "shortest")
+    gains = not only_gains or saves or bool(Modes.of(machine).modes)
+    for part in windows(len(rapids)):
+        reason[part], displacement[part] = _moves(rapids.part(part), machine, unblended, gains)
+    # Moves that agree in every bit of what planning looks at are planned once.
+    first, like = same_rows(displacement, rapids.speed, reason, rapids.lone)
+    plans = plan_moves(
+        displacement[first], machine, profile, reason=reason[first], progress=progress,
+        speed=rapids.speed[first], lone=rapids.lone[first],
+    )  # fmt: skip
+    return plans if len(first) == len(rapids) else plans.repeated(like)
+
+
+def _moves(
+    rapids: Rapids, machine: Machine, unblended: str, gains: bool
+) -> tuple[NDArray[np.uint8], Array]:
+    """Why rapids are no moves for the planner, and the displacements of those that are."""
     reason = rapids.reason.copy()
     known = sum(1 << AXES.index(name) for name in machine.axis_names)
     foreign = (rapids.words & ~np.uint16(known)) != 0
@@ -98,13 +120,6 @@ def plan_rapids(
     stops: NDArray[np.bool_] = moves & np.array([axis in unblended for axis in AXES])
     rule_out(reason, np.asarray(stops.any(axis=1)), Reason.NO_BLENDING)
     rule_out(reason, length < machine.design.minimum_length * (1.0 - 1e-9), Reason.TOO_SHORT)
-    if only_gains and profile not in ("conventional", "shortest") and not Modes.of(machine).modes:
-        # Those keep the profile or save time; all others do nothing but keep modes still.
+    if not gains:
         rule_out(reason, length > 0.0, Reason.NO_MODE)
-    # Moves that agree in every bit of what planning looks at are planned once.
-    first, like = same_rows(displacement, rapids.speed, reason, rapids.lone)
-    plans = plan_moves(
-        displacement[first], machine, profile, reason=reason[first], progress=progress,
-        speed=rapids.speed[first], lone=rapids.lone[first],
-    )  # fmt: skip
-    return plans if len(first) == len(rapids) else plans.repeated(like)
+    return reason, displacement

@@ -24,6 +24,7 @@ from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, same_rows
 from gcodejerk.planning.task import Task
 from gcodejerk.reasons import REASONS, Reason
+from gcodejerk.storage import Growing, column, windows
 
 KNOWN = tuple(
     REASONS.index(reason)
@@ -74,22 +75,27 @@ def left_alone(rapids: Rapids, plans: Plans) -> Left:
     """
     modes = plans.modes
     residual: Array = np.broadcast_to(np.nan, (len(plans), len(modes.poles)))
-    time = np.zeros(len(plans))
-    others = np.flatnonzero(~plans.planned)
-    moved = _known(rapids, plans, others)
-    certain = np.isfinite(moved).all(axis=1)
-    rows, moved = others[certain], moved[certain]
+    time: Array = np.broadcast_to(0.0, len(plans))
+    unknown = np.zeros(len(plans), dtype=np.bool_)
+    rows_, moved_ = Growing(np.int64), Growing(np.float64, width=len(AXES))
+    for part in windows(len(plans)):
+        others = part.start + np.flatnonzero(~plans.planned[part])
+        ways = known_moves(rapids, plans, others)
+        certain = np.isfinite(ways).all(axis=1)
+        unknown[others] = ~np.isin(plans.reason[others], NOTHING) & ~certain
+        rows_.extend(others[certain])
+        moved_.extend(ways[certain])
+    rows, moved = rows_.finish(), moved_.finish()
     if len(rows):
-        residual = residual.copy()
+        residual, time = column(residual.shape, np.nan), column(len(plans), 0.0)
         first, like = same_rows(moved, rapids.lone[rows])
         left, lasts = _today(plans, moved[first], rapids.lone[rows[first]])
-        residual[rows], time[rows] = left[like], lasts[like]
-    unknown = np.zeros(len(plans), dtype=np.bool_)
-    unknown[others] = ~np.isin(plans.reason[others], NOTHING) & ~certain
+        for part in windows(len(rows)):
+            residual[rows[part]], time[rows[part]] = left[like[part]], lasts[like[part]]
     return Left(residual, time, unknown)
 
 
-def known_moves(rapids: Rapids, plans: Plans) -> Array:
+def known_moves(rapids: Rapids, plans: Plans, rows: NDArray[np.int64]) -> Array:
     """What each axis moves in the rapids that are left alone, as far as all of it is known.
 
     Parameters
@@ -98,17 +104,14 @@ def known_moves(rapids: Rapids, plans: Plans) -> Array:
         Of the program.
     plans : Plans
         Row i is rapid i.
+    rows : ndarray of int, shape (r,)
+        Which rapids.
 
     Returns
     -------
-    ndarray, shape (n, 9)
+    ndarray, shape (r, 9)
         NaN in every column of a rapid of which not all is known, or that does not move. [mm], [deg]
     """
-    return _known(rapids, plans, np.arange(len(plans)))
-
-
-def _known(rapids: Rapids, plans: Plans, rows: NDArray[np.int64]) -> Array:
-    """The same of some of them."""
     moved = rapids.target[rows] - rapids.start[rows]
     named = (rapids.words[rows, np.newaxis] >> np.arange(len(AXES)) & 1).astype(bool)
     has = np.array([axis in plans.machine.axis_names for axis in AXES])

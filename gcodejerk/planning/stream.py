@@ -33,6 +33,7 @@ from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.pvt import Rows
 from gcodejerk.planning.records import without_pauses
 from gcodejerk.reasons import REASONS, Reason
+from gcodejerk.storage import column, gathered, kept
 
 BATCH_SAMPLES = 400_000
 """Samples of a batch, about; each needs some 100 bytes while it is worked on."""
@@ -74,10 +75,26 @@ def make_streams(
         matrix as wide as its longest move, so those of a window hold moves of like duration. Moves
         whose stream is not better than today's rapid are in none, and `plans.reason` says so.
     """
+    for window in stream_windows(plans, number_format, stride, play, like):
+        if batches := list(window):
+            yield batches
+
+
+def stream_windows(
+    plans: Plans,
+    number_format: NumberFormat,
+    stride: int,
+    play: Play = Play.TABLE,
+    like: NDArray[np.int64] | None = None,
+) -> Iterator[Iterator[Batch]]:
+    """The same, each batch made when it is asked for, so that few of them are in memory at a time.
+
+    Batches have to be taken before the next window is; a window may have none.
+    """
     planned = np.nonzero(plans.planned)[0]
     if like is not None:
         planned = planned[like[planned] == planned]
-    samples = np.cumsum(plans.counts[planned])
+    planned, samples = kept(planned), kept(np.cumsum(plans.counts[planned]))
     begin = 0
     while begin < len(planned):
         before = samples[begin - 1] if begin else 0
@@ -89,8 +106,7 @@ def make_streams(
             _make_batch(plans, moves, number_format, stride, play, like)
             for moves in (window[octave == k] for k in np.unique(octave))
         )
-        if batches := [batch for batch in made if len(batch)]:
-            yield batches
+        yield (batch for batch in made if len(batch))
         begin = end
 
 
@@ -228,8 +244,8 @@ class Residuals:
 
     def __init__(self, plans: Plans) -> None:
         shape = (len(plans), len(plans.modes.poles))
-        self.residual = np.full(shape, np.nan)
-        self.conventional = np.full(shape, np.nan)
+        self.residual = column(shape, np.nan)
+        self.conventional = column(shape, np.nan)
 
     def add(self, batch: Batch | Rows) -> None:
         """Note one batch."""
@@ -238,5 +254,5 @@ class Residuals:
 
     def repeat(self, like: NDArray[np.int64]) -> None:
         """Note of all moves what was found of those that have the very streams."""
-        self.residual = self.residual[like]
-        self.conventional = self.conventional[like]
+        self.residual = gathered(self.residual, like)
+        self.conventional = gathered(self.conventional, like)

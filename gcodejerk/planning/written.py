@@ -23,6 +23,8 @@ TAIL = 2e-5
 """Way at the end that is crept, so that the speed at the last period is known and low. [mm]"""
 FEEDBACK = 0.2
 """Share of the way by which rounding is behind that each block makes good."""
+AT_ONCE = 2048
+"""Moves whose every period is looked at together: what is made of one does not depend on others."""
 LONGEST_TAIL = 0.0099
 """Of the tail. [s]"""
 ON_STEP = 1e-4
@@ -172,19 +174,22 @@ class Written:
         h = np.diff(knots, axis=1)
         total = self.grid.counts
         width = int(total.max(initial=1))
-        block = np.repeat(np.arange(h.size), h.ravel())
-        begin = np.cumsum(h.ravel()) - h.ravel()
-        tau = (np.arange(len(block)) - begin[block] + 1.0) * interval
         before, behind = self.speed[:, :-1].copy(), self.speed[:, 1:].copy()
         # The tail takes its whole periods at one speed.
         before[:, -1] = behind[:, -1] = np.diff(self.way[:, -2:], axis=1)[:, 0] / (
             h[:, -1] * interval
         )
         rise = 0.5 * (behind - before) / (np.maximum(h, 1) * interval)
-        x = self.way[:, :-1].ravel()[block]
-        x = x + (before.ravel()[block] + rise.ravel()[block] * tau) * tau
         every = np.zeros((len(total), width + 4))
-        inside = np.arange(width) >= (width - total)[:, np.newaxis]
-        every[:, 2:-2][inside] = x
+        for row in range(0, len(total), AT_ONCE):
+            part = slice(row, row + AT_ONCE)
+            lasts = h[part].ravel()
+            block = np.repeat(np.arange(len(lasts)), lasts)
+            begin = np.cumsum(lasts) - lasts
+            tau = (np.arange(len(block)) - begin[block] + 1.0) * interval
+            x = self.way[part, :-1].ravel()[block]
+            x = x + (before[part].ravel()[block] + rise[part].ravel()[block] * tau) * tau
+            inside = np.arange(width) >= (width - total[part])[:, np.newaxis]
+            every[part, 2:-2][inside] = x
         every[:, -2:] = self.way[:, -1:]
         return filtered(every)[:, :-1], Grid.every(total + 2, 1, interval)

@@ -24,6 +24,7 @@ from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.planning.plans import Plans
 from gcodejerk.report.records import Record, Records, place_record, process_head
 from gcodejerk.rewrite.result import Result
+from gcodejerk.storage import release
 
 FEW = 2000
 """Rapids up to which a report is written with blanks and line ends."""
@@ -78,6 +79,7 @@ def write_rapids(
             lines.append(place[:-1] + b"," + motion[1:])
         file.write((b",\n" if begin else b"\n") + b",\n".join(lines))
         progress(begin + len(rows), count)
+        release()
     file.write(b"]}\n")
 
 

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
@@ -24,13 +23,12 @@ from gcodejerk.nc import Rapids
 from gcodejerk.planning.independent_axes import arrivals
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left, settling_times
-from gcodejerk.reasons import REASONS
+from gcodejerk.reasons import CERTAIN, REASONS
 from gcodejerk.rewrite.control_settings import ControlSettings
 from gcodejerk.rewrite.result import Result
+from gcodejerk.storage import windows
 
 Record = dict[str, Any]
-AT_ONCE = 1 << 16
-"""Rapids whose amplitudes are looked at together."""
 DIGITS = 10
 """Significant digits of a number in a report."""
 
@@ -50,19 +48,25 @@ class Records:
         self.plans, self.profiles = plans, plans.profiles
         self.deviation = np.zeros(len(plans)) if deviation is None else deviation
         self.limit = np.full(len(plans), np.nan) if limit is None else limit
-        modes = plans.modes
-        self.residual, self.conventional = modes.grouped(residual), modes.grouped(conventional)
-        interval = plans.machine.interval
-        usual = whole_intervals(plans.conventional_time, interval)
-        extra = np.where(plans.planned, np.maximum(plans.counts - usual, 0), 0)
-        self.extension = extra * interval
-        if plans.lasting is not None:
-            more = plans.times - usual * interval
-            self.extension = np.where(plans.planned & (more > 1e-9), more, 0.0)
         self.rest = rest
         self.oscillators = (residual, conventional)
 
     # The summary of a large program needs none of these.
+
+    @cached_property
+    def residual(self) -> Array:
+        """Displacement amplitudes of the entries of modes, shape (n, g) [mm]."""
+        return self.plans.modes.grouped(self.oscillators[0])
+
+    @cached_property
+    def conventional(self) -> Array:
+        """The same of the control's own rapids."""
+        return self.plans.modes.grouped(self.oscillators[1])
+
+    @cached_property
+    def extension(self) -> Array:
+        """What each takes longer than the control's own, shape (n,) [s]."""
+        return _extension(self.plans, slice(0, len(self.plans)))
 
     @cached_property
     def acceleration(self) -> Array:
@@ -83,6 +87,7 @@ class Records:
     def summary(self) -> Record:
         """The counts and totals of all moves."""
         plans, planned = self.plans, self.plans.planned
+        now, today = self.oscillators
         codes, counts = np.unique(plans.reason[~planned], return_counts=True)
         order = np.argsort(-counts, kind="stable")
         return {
@@ -92,11 +97,23 @@ class Records:
             "left_by_reason": {str(REASONS[codes[k]]): int(counts[k]) for k in order},
             "rapid_time": number(_sum(plans)),
             "conventional_time": number(float(plans.conventional_time[planned].sum())),
-            "extended": int(np.count_nonzero(self.extension)),
-            "worst_residual": _largest(self.residual, planned),
-            "worst_conventional_residual": _largest(self.conventional, planned),
+            "extended": sum(
+                int(np.count_nonzero(_extension(plans, part))) for part in windows(len(plans))
+            ),
+            "worst_residual": _known(self._worst(now, np.fmax, np.nan)),
+            "worst_conventional_residual": _known(self._worst(today, np.fmax, np.nan)),
             **self._everything(),
         }
+
+    def _worst(self, amplitude: Array, larger: np.ufunc, initial: float) -> float:
+        """The largest amplitude of an entry of modes that a planned move leaves [mm]."""
+        found = initial
+        for part in windows(len(self.plans)):
+            each = self.plans.modes.grouped(amplitude[part])
+            planned = (self.plans.reason[part] == CERTAIN)[:, np.newaxis]
+            worst = larger.reduce(each, axis=None, where=planned, initial=initial)
+            found = float(larger(found, worst))
+        return found
 
     def _everything(self) -> Record:
         """What the whole program leaves and lasts, rapids left alone included; today beside it."""
@@ -104,8 +121,9 @@ class Records:
         same = 0.0 if rest is None else float(rest.time.sum())
         modes, tolerance = plans.modes, plans.machine.design.tolerance
         motion, today = _sum(plans), float(plans.conventional_time[planned].sum())
+        now, then = (self._worst(each, np.maximum, 0.0) for each in self.oscillators)
         out: Record = {
-            "worst_residual_share": _share(self.residual, self.conventional, planned),
+            "worst_residual_share": number(now / then) if then else None,
             **dict.fromkeys(("worst_residual_all", "worst_conventional_residual_all")),
             "left_unknown": 0 if rest is None else int(np.count_nonzero(rest.unknown)),
             "rapid_time_all": number(motion + same),
@@ -113,13 +131,12 @@ class Records:
         }
         for amplitude, name in zip(self.oscillators, ("", "conventional_"), strict=True):
             waiting, worst = np.zeros(len(plans)), [np.nan]
-            for begin in range(0, len(plans), AT_ONCE):
-                part = slice(begin, begin + AT_ONCE)
+            for part in windows(len(plans)):
                 left = np.nan if rest is None else rest.residual[part]
                 each = np.where(planned[part, np.newaxis], amplitude[part], left)
                 worst.append(float(np.fmax.reduce(modes.grouped(each), axis=None, initial=np.nan)))
                 waiting[part] = settling_times(each, modes, tolerance)
-            out[f"worst_{name}residual_all"] = _largest(np.array([worst]), np.ones(1, dtype=bool))
+            out[f"worst_{name}residual_all"] = _known(float(np.fmax.reduce(worst)))
             out[f"{name}settling_time"] = number(float(np.nansum(waiting)))
         return out | {"tolerance": number(tolerance)}
 
@@ -380,15 +397,18 @@ def _sum(plans: Plans) -> float:
     return float(plans.counts.sum()) * plans.machine.interval
 
 
-def _largest(residual: Array, where: NDArray[np.bool_]) -> float | None:
-    """The largest residual of some rapids and all modes, as far as they are known [mm]."""
-    found = float(np.fmax.reduce(residual, axis=None, where=where[:, np.newaxis], initial=np.nan))
-    return None if np.isnan(found) else number(found)
+def _known(value: float) -> float | None:
+    """A number, None for NaN."""
+    return None if math.isnan(value) else number(value)
 
 
-def _share(planned: Array, today: Array, where: NDArray[np.bool_]) -> float | None:
-    """The worst residual of some rapids as a share of the worst today [-]."""
-    now, then = (
-        float(np.max(each, where=where[:, np.newaxis], initial=0.0)) for each in (planned, today)
-    )
-    return number(now / then) if then else None
+def _extension(plans: Plans, rows: slice) -> Array:
+    """What some moves take longer than the control's own [s]."""
+    interval, planned = plans.machine.interval, plans.reason[rows] == CERTAIN
+    usual = whole_intervals(plans.conventional_time[rows], interval)
+    if plans.lasting is not None:
+        more = np.where(planned, plans.lasting[rows], 0.0) - usual * interval
+        return np.where(planned & (more > 1e-9), more, 0.0)
+    extra = np.where(planned, np.maximum(plans.counts[rows] - usual, 0), 0)
+    extension: Array = extra * interval
+    return extension

@@ -27,6 +27,7 @@ from gcodejerk.nc import Program, Rapids
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.line_map import Chain, Lines
 from gcodejerk.start import Start
+from gcodejerk.storage import made
 from gcodejerk.unrolling.unrolling import Unrolling, unroll
 from gcodejerk.verification import Verification, Violation, verify_files
 from gcodejerk.verification.cycles.expansion import check_expansion
@@ -373,21 +374,12 @@ def hunks(
     ndarray of int, shape (n, 5)
         Begin and end in the output [bytes]; line, begin and end in the original [bytes].
     """
+    if lines is None or not len(lines):
+        return made(lambda part: _hunks(edits[part], rapids, insert_at), (len(edits), 5), np.int64)
     row = edits[:, 2]
     stamp = row < 0
     at = np.where(stamp, 0, row)
-    if len(rapids):
-        size = rapids.end + TERMINATOR_LENGTH[rapids.terminator] - rapids.begin
-        begin = np.where(stamp, insert_at, rapids.begin[at])
-        end = begin + np.where(stamp, 0, size[at])
-    else:
-        begin = end = np.full(len(edits), insert_at)
-    first = 1 if insert_at else 0
-    if lines is None or not len(lines):
-        line = (
-            np.where(stamp, first, rapids.line[at]) if len(rapids) else np.full(len(edits), first)
-        )
-        return np.stack([edits[:, 0], edits[:, 1], line, begin, end], axis=1)
+    _, _, _, begin, end = _hunks(edits, rapids, insert_at).T
     spans = lines.replaced
     grown = np.concatenate([[0], np.cumsum(edits[:, 1] - edits[:, 0] - (end - begin))])
     out = [
@@ -400,9 +392,25 @@ def hunks(
     alone = stamp | (k < 0) | (begin >= spans.end[k])
     mapped = lines.rapids_of(rapids)
     original = np.where(stamp, insert_at, mapped.begin[at])
-    line = np.where(stamp, first, mapped.line[at])
+    line = np.where(stamp, 1 if insert_at else 0, mapped.line[at])
     rest = [edits[:, 0], edits[:, 1], line, original, original + end - begin]
     table = np.concatenate([np.stack(blocks, axis=1), np.stack(rest, axis=1)[alone]]).astype(
         np.int64
     )
     return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
+
+
+def _hunks(edits: NDArray[np.int64], rapids: Rapids, insert_at: int) -> NDArray[np.int64]:
+    """The same where nothing was written out."""
+    row = edits[:, 2]
+    stamp = row < 0
+    first = np.full(len(edits), 1 if insert_at else 0)
+    if not len(rapids):
+        at = np.full(len(edits), insert_at)
+        return np.stack([edits[:, 0], edits[:, 1], first, at, at], axis=1)
+    at = np.where(stamp, 0, row)
+    size = rapids.end[at] + TERMINATOR_LENGTH[rapids.terminator[at]] - rapids.begin[at]
+    begin = np.where(stamp, insert_at, rapids.begin[at])
+    end = begin + np.where(stamp, 0, size)
+    line = np.where(stamp, first, rapids.line[at])
+    return np.stack([edits[:, 0], edits[:, 1], line, begin, end], axis=1)

@@ -10,7 +10,9 @@ from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.nc import Program
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Residuals
+from gcodejerk.reasons import CERTAIN
 from gcodejerk.rewrite.expanded import WrittenOut
+from gcodejerk.storage import windows
 
 _NAMED = 8
 """Files that are named."""
@@ -72,13 +74,14 @@ def band_notes(plans: Plans, residuals: Residuals) -> list[str]:
     """That some rapids leave more at the file's own frequencies, where today's are lucky there."""
     if not plans.has_to_gain:
         return []
-    own, today = (
-        plans.modes.grouped(each).max(axis=1, initial=0.0)
-        for each in (residuals.residual, residuals.conventional)
-    )
-    with np.errstate(invalid="ignore"):
-        more = plans.planned & (own > today)
-    count = int(np.count_nonzero(more))
+    count = 0
+    for part in windows(len(plans)):
+        own, today = (
+            plans.modes.grouped(each[part]).max(axis=1, initial=0.0)
+            for each in (residuals.residual, residuals.conventional)
+        )
+        with np.errstate(invalid="ignore"):
+            count += int(np.count_nonzero((plans.reason[part] == CERTAIN) & (own > today)))
     if not count:
         return []
     rapids = "1 rapid leaves" if count == 1 else f"{count} rapids leave"

@@ -260,7 +260,7 @@ def _process(
         )
         report("verifying", 1, 1)
     what_if = entry_notes(source, program, machine.program_start())
-    edits = np.array(writer.edits, dtype=np.int64).reshape(-1, 3)
+    edits = writer.edits.finish()
     differences = hunks(edits, program.rapids, program.insert_at, lines)
     program = in_original(program, written)
     return Result(

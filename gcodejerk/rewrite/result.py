@@ -18,6 +18,7 @@ from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.control_settings import ControlSettings
+from gcodejerk.storage import Growing, windows
 from gcodejerk.unrolling.unrolling import Unrolling
 from gcodejerk.verification import Verification
 
@@ -102,17 +103,20 @@ class ReportedProfiles(Mapping[int, Array]):
     """
 
     def __init__(self, program: Program, plans: Plans) -> None:
-        planned = np.flatnonzero(plans.planned)
-        begin, end = (np.searchsorted(plans.move, planned, side=side) for side in SIDES)
-        single = end - begin == 1
-        self.moves = planned[single]
-        self.lines = program.rapids.line[self.moves]
         # Moves of one length along one profile have one array.
         own = plans.profiles
         like = own.like if isinstance(own, RepeatedProfiles) else np.arange(len(own))
         self.profiles = own.distinct if isinstance(own, RepeatedProfiles) else own
-        self.length = plans.length[self.moves]
-        self.row = like[begin[single]]
+        lines, lengths, rows = Growing(np.int64), Growing(np.float64), Growing(np.int64)
+        for part in windows(len(plans)):
+            planned = part.start + np.flatnonzero(plans.reason[part] == CERTAIN)
+            begin, end = (np.searchsorted(plans.move, planned, side=side) for side in SIDES)
+            single = end - begin == 1
+            moves = planned[single]
+            lines.extend(program.rapids.line[moves])
+            lengths.extend(plans.length[moves])
+            rows.extend(like[begin[single]])
+        self.lines, self.length, self.row = lines.finish(), lengths.finish(), rows.finish()
         self.made: dict[tuple[int, float], Array] = {}
 
     def __len__(self) -> int:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import BinaryIO
 
 import numpy as np
@@ -25,10 +24,11 @@ from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.pvt import Rows
 from gcodejerk.rewrite.expanded import TERMINATOR_LENGTH
 from gcodejerk.rewrite.stamp import SUM_DIGITS, SUM_MARK, SUM_UNKNOWN, SUM_WITHIN
+from gcodejerk.storage import Growing, windows
 
 COPY_SIZE = 1 << 20
-AT_ONCE = 8192
-"""Rapids of which plain lists are made."""
+AT_ONCE = 2048
+"""Streams whose texts are made together."""
 
 
 def digest_of(source: BinaryIO) -> bytes:
@@ -98,7 +98,9 @@ class Rewriter:
         self.sum_at: int | None = None
         self.at = 0
         self.between = b""
-        self.edits = array("q")
+        self.edits = Growing(np.int64, width=3)
+        self.noted: list[tuple[int, int, int]] = []
+        """Edits that are still to be added."""
         self.size = 0
         """Of the output so far."""
         self.pieces: list[bytes] = []
@@ -108,16 +110,23 @@ class Rewriter:
         self.copies: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self.kept: dict[int, bytes] = {}
         """Texts of moves that stand in other places, too."""
-        self.uses: dict[int, int] = {}
-        """In how many they still stand."""
+        self.texts: dict[int, bytes] = {}
+        """Of the window, by move; and what belongs beside the program."""
+        self.aside: dict[int, bytes] = {}
+        self.uses: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
+        """In how many they still stand, of each move."""
         source.seek(0)
 
     def repeat(self, like: NDArray[np.int64]) -> None:
         """Write streams that are the same again, where they come (`same_streams`)."""
         self.like = like
-        self.copies = np.flatnonzero(like != np.arange(len(like)))
-        firsts, counts = np.unique(like[self.copies], return_counts=True)
-        self.uses = dict(zip(firsts.tolist(), counts.tolist(), strict=True))
+        copies = Growing(np.int64)
+        self.uses = np.zeros(len(like), dtype=np.int32)
+        for part in windows(len(like)):
+            rows = part.start + np.flatnonzero(like[part] != np.arange(part.start, part.stop))
+            copies.extend(rows)
+            np.add.at(self.uses, like[rows], 1)
+        self.copies = copies.finish()
 
     def write_header(self, machine: Machine) -> None:
         """Write the first lines of a file of its own."""
@@ -125,55 +134,76 @@ class Rewriter:
             self._sign(self.emitter.header(machine))
         self._put_beside(self.emitter.beside_header(machine))
 
-    def write(self, window: Sequence[Batch | Rows]) -> None:
-        """Write the streams of a window; windows come in the order of the file."""
+    def add(self, batch: Batch | Rows) -> None:
+        """Make the texts of a batch; those of one window are written together."""
         if self.target is None:
             return
-        self.source.seek(self.at)
-        if self.emitter.in_place and not self.edits:
+        if self.emitter.in_place and not (self.noted or len(self.edits)):
+            self.source.seek(self.at)
             self._copy(self.program.insert_at)
             self._put_stamp()
-        texts: dict[int, bytes] = {}
-        aside: dict[int, bytes] = {}
         rapids = self.program.rapids
-        for batch in window:
-            blocks = [self._block(move) for move in batch.moves]
-            if isinstance(batch, Rows):
-                new = self.emitter.render_rows(batch, rapids, blocks)
-            else:
-                new = self.emitter.render(batch, rapids, blocks, self.program.newline, self.options)
-            texts.update(zip(batch.moves.tolist(), new, strict=True))
-            if self.beside is not None and isinstance(batch, Batch):
-                samples = self.emitter.render_beside(batch, rapids)
-                aside.update(zip(batch.moves.tolist(), samples, strict=True))
+        if isinstance(batch, Rows):
+            self._made(batch, self.emitter.render_rows(batch, rapids, self._blocks(batch)))
+            return
+        # The text of one stream does not depend on others, and what it is made of takes much room.
+        few: Iterable[Batch] = [batch]
+        if len(batch) > AT_ONCE:
+            begins = range(0, len(batch), AT_ONCE)
+            rows = np.arange(len(batch))
+            few = (batch.take(rows[k : k + AT_ONCE]) for k in begins)
+        for part in few:
+            blocks, newline = self._blocks(part), self.program.newline
+            self._made(part, self.emitter.render(part, rapids, blocks, newline, self.options))
+            if self.beside is not None:
+                samples = self.emitter.render_beside(part, rapids)
+                self.aside.update(zip(part.moves.tolist(), samples, strict=True))
+
+    def _made(self, batch: Batch | Rows, texts: list[bytes]) -> None:
+        """Take texts."""
+        self.texts.update(zip(batch.moves.tolist(), texts, strict=True))
+
+    def write(self) -> None:
+        """Write the streams of a window; windows come in the order of the file."""
+        texts, aside, self.texts, self.aside = self.texts, self.aside, {}, {}
         if texts:
             self._write_texts(texts, aside, max(texts))
 
     def _write_texts(self, texts: dict[int, bytes], aside: dict[int, bytes], last: int) -> None:
         """Write texts, and those that were written before and come in front of the last."""
         moves = np.array(sorted(texts), dtype=np.int64)
+        between = self.copies[:0]
         if self.like is not None:
-            self.kept.update((move, text) for move, text in texts.items() if move in self.uses)
+            self.kept.update((move, text) for move, text in texts.items() if self.uses[move])
             count = int(np.searchsorted(self.copies, last))
             between, self.copies = self.copies[:count], self.copies[count:]
-            moves = np.sort(np.concatenate([moves, between]))
-        rapids = self.program.rapids
         self.source.seek(self.at)
-        for begin in range(0, len(moves), AT_ONCE):
-            rows = moves[begin : begin + AT_ONCE]
-            firsts = rows if self.like is None else self.like[rows]
-            ends = rapids.end[rows] + TERMINATOR_LENGTH[rapids.terminator[rows]]
-            columns = (rows, firsts, rapids.begin[rows], ends)
-            for move, first, at, end in zip(*(c.tolist() for c in columns), strict=True):
-                text = texts.get(move) or self._text_again(first)
-                if text is None:
-                    continue
-                self._copy(at)
-                self._read(end)
-                self._put(self.between + text, move)
-                self.between = self.emitter.between
-                if aside:
-                    self._put_beside(aside[move])
+        for part in windows(len(between)):
+            again = between[part]
+            before = int(np.searchsorted(moves, again[-1]))
+            self._write_rows(np.sort(np.concatenate([moves[:before], again])), texts, aside)
+            moves = moves[before:]
+        for part in windows(len(moves)):
+            self._write_rows(moves[part], texts, aside)
+
+    def _write_rows(
+        self, rows: NDArray[np.int64], texts: dict[int, bytes], aside: dict[int, bytes]
+    ) -> None:
+        """Write the texts of some rapids, in the order of the file."""
+        rapids = self.program.rapids
+        firsts = rows if self.like is None else self.like[rows]
+        ends = rapids.end[rows] + TERMINATOR_LENGTH[rapids.terminator[rows]]
+        columns = (rows, firsts, rapids.begin[rows], ends)
+        for move, first, at, end in zip(*(c.tolist() for c in columns), strict=True):
+            text = texts.get(move) or self._text_again(first)
+            if text is None:
+                continue
+            self._copy(at)
+            self._read(end)
+            self._put(self.between + text, move)
+            self.between = self.emitter.between
+            if aside:
+                self._put_beside(aside[move])
 
     def _text_again(self, first: int) -> bytes | None:
         """The text of a move once more; it is forgotten when it comes no more."""
@@ -190,16 +220,19 @@ class Rewriter:
             self.beside.write(text)
             self.sums.update(text)
 
-    def _block(self, move: int) -> bytes:
-        """The block of a rapid."""
-        begin, end = int(self.program.rapids.begin[move]), int(self.program.rapids.end[move])
-        self.source.seek(begin)
-        return self.source.read(end - begin)
+    def _blocks(self, batch: Batch | Rows) -> list[bytes]:
+        """The blocks of rapids."""
+        rapids, blocks = self.program.rapids, []
+        begins, ends = rapids.begin[batch.moves].tolist(), rapids.end[batch.moves].tolist()
+        for begin, end in zip(begins, ends, strict=True):
+            self.source.seek(begin)
+            blocks.append(self.source.read(end - begin))
+        return blocks
 
     def _put(self, text: bytes, move: int) -> None:
         """Write what is not the source's, and note where."""
         if self.emitter.in_place:
-            self.edits.extend((self.size, self.size + len(text), move))
+            self.noted.append((self.size, self.size + len(text), move))
         self._sign(text)
 
     def _sign(self, text: bytes) -> None:
@@ -217,6 +250,8 @@ class Rewriter:
         self.pieces, self.waiting = [], 0
         self.target.write(text)
         self.written.update(text)
+        self.edits.extend(np.array(self.noted, dtype=np.int64).reshape(-1, 3))
+        self.noted = []
 
     def _put_stamp(self) -> None:
         """Write the stamp, its sum to be filled in at the end."""

@@ -13,7 +13,7 @@ import hashlib
 import heapq
 from collections.abc import Iterator
 from dataclasses import fields
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,12 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.plans import Plans, sorted_rows
+from gcodejerk.storage import column, gathered, kept, windows
 
 PLACES = ("line", "begin", "end", "start", "target", "offset", "reason")
 """Columns of rapids that the text of a stream does not depend on, or on some axes of them only."""
 KEPT_BYTES = 1 << 24
 """Text that is kept for the streams that are still to come, about."""
-AT_ONCE = 8192
-"""Blocks that are read at a time."""
 POINT_BYTES = 40
 """Of a point, about."""
 
@@ -56,19 +55,22 @@ def same_streams(
     ndarray of int, shape (n,), or None
         A move itself where it has a stream of its own, or none. None where all are so.
     """
-    moves = np.flatnonzero(plans.planned)
+    moves = kept(np.flatnonzero(plans.planned))
     first, like = _ways(plans, rapids, number_format, moves)
     if len(first) == len(moves):
         return None
     # Whether a machine rests in front of a stream depends on whether one stands right there.
-    before = np.searchsorted(moves, moves - 1)
-    follows = (moves[before] == moves - 1) & (rapids.line[moves - 1] + 1 == rapids.line[moves])
-    behind = np.where(follows, like[before], -1)
+    behind = column(len(moves), -1, np.int64)
+    for part in windows(len(moves)):
+        here = moves[part]
+        before = np.searchsorted(moves, here - 1)
+        follows = (moves[before] == here - 1) & (rapids.line[here - 1] + 1 == rapids.line[here])
+        behind[part] = np.where(follows, like[before], -1)
     blocks = _digests(rapids, moves, source)
     first, like = sorted_rows((like, behind, blocks), len(moves))
     own = np.arange(len(plans))
-    own[moves] = moves[_kept(first, like, plans.counts[moves] // stride)]
-    return own if (own[moves] != moves).any() else None
+    own[moves] = moves[_kept(first, like, gathered(plans.counts, moves) // stride)]
+    return kept(own) if (own[moves] != moves).any() else None
 
 
 def _ways(
@@ -83,30 +85,41 @@ def _columns(
 ) -> Iterator[NDArray[np.generic]]:
     """What they have in common, one column at a time: all together are half a kB a move."""
     for name in ("counts", "length", "conventional_time", "worst_in_band", "most_in_band"):
-        yield getattr(plans, name)[moves]
+        yield _taken(getattr(plans, name), moves)
     for each in fields(rapids):
         if each.name not in PLACES:
-            yield getattr(rapids, each.name)[moves]
+            yield _taken(getattr(rapids, each.name), moves)
     for k in range(len(AXES)):
-        way = plans.displacement[moves, k]
+        way = _taken(plans.displacement, moves, k)
         yield way
-        named = (rapids.words[moves] >> k & 1) != 0
+        named = (_taken(rapids.words, moves) >> k & 1) != 0
         for place in (rapids.start, rapids.target):
-            yield np.where(named | (way != 0.0), place[moves, k], 0.0)
+            yield np.where(named | (way != 0.0), _taken(place, moves, k), 0.0)
         for numbers in (number_format.start, number_format.step, number_format.origin):
-            yield np.where(way != 0.0, numbers[moves, k], 0.0)
+            yield np.where(way != 0.0, _taken(numbers, moves, k), 0.0)
+
+
+def _taken(values: NDArray[Any], moves: NDArray[np.int64], axis: int | None = None) -> NDArray[Any]:
+    """Rows of a column, of one axis if it has several; of one value, that value once."""
+    values = values if axis is None else values[:, axis]
+    if not any(values.strides) and len(values):
+        return np.broadcast_to(values[0], len(moves))
+    out = np.empty(len(moves), dtype=values.dtype)
+    for part in windows(len(moves)):
+        out[part] = values[moves[part]]
+    return out
 
 
 def _digests(rapids: Rapids, moves: NDArray[np.int64], source: BinaryIO) -> NDArray[np.uint64]:
     """A digest of the block of each move, shape (n, 2)."""
-    out = np.empty((len(moves), 2), dtype=np.uint64)
-    for k in range(0, len(moves), AT_ONCE):
-        part = moves[k : k + AT_ONCE]
+    out = column((len(moves), 2), 0, np.uint64)
+    for rows in windows(len(moves)):
+        part = moves[rows]
         digests = []
         for at, behind in zip(rapids.begin[part].tolist(), rapids.end[part].tolist(), strict=True):
             source.seek(at)
             digests.append(hashlib.blake2b(source.read(behind - at), digest_size=16).digest())
-        out[k : k + AT_ONCE] = np.frombuffer(b"".join(digests), np.uint64).reshape(-1, 2)
+        out[rows] = np.frombuffer(b"".join(digests), np.uint64).reshape(-1, 2)
     return out
 
 
@@ -115,7 +128,8 @@ def _kept(
 ) -> NDArray[np.int64]:
     """The move whose text each takes, if texts are kept in the room that there is."""
     last = np.zeros(len(first), dtype=np.int64)
-    np.maximum.at(last, like, np.arange(len(like)))
+    for part in windows(len(like)):
+        np.maximum.at(last, like[part], np.arange(part.start, part.stop))
     size = points[first] * POINT_BYTES
     again = last > first
     if int(size[again].sum()) <= KEPT_BYTES:

@@ -16,10 +16,11 @@ from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.independent_axes import path_deviation
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.pvt import Rows, make_rows
-from gcodejerk.planning.stream import Residuals, make_streams
+from gcodejerk.planning.stream import Residuals, stream_windows
 from gcodejerk.planning.told import RowFormat
 from gcodejerk.rewrite.rewriter import Rewriter
 from gcodejerk.rewrite.same_streams import same_streams
+from gcodejerk.storage import column, gathered, kept, release
 
 
 def write_streams(
@@ -56,10 +57,10 @@ def write_streams(
     """
     emitter, dialect = writer.emitter, writer.options.dialect
     collected = Residuals(plans)
-    deviation = np.zeros(len(plans))
+    deviation = column(len(plans), 0.0)
     writer.write_header(machine)
-    planned, like = np.flatnonzero(plans.planned), None
-    windows: Iterator[list[Batch]] | Iterator[list[Rows]]
+    planned, like = kept(np.flatnonzero(plans.planned)), None
+    windows: Iterator[Iterator[Batch]] | Iterator[list[Rows]]
     if form is not None:
         windows = make_rows(plans, writer.program.rapids, form, peaks)
     else:
@@ -67,21 +68,25 @@ def write_streams(
         stride = emitter.stride(machine.interval)
         if emitter.repeats and not machine.controller_options.override_guard:
             like = same_streams(plans, writer.program.rapids, spelled, writer.source, stride)
-        windows = make_streams(plans, spelled, stride, emitter.play, like)
+        windows = stream_windows(plans, spelled, stride, emitter.play, like)
         if like is not None:
             writer.repeat(like)
     for window in windows:
+        last = -1
         for batch in window:
             collected.add(batch)
             deviation[batch.moves] = (
                 batch.deviation() if isinstance(batch, Rows) else path_deviation(batch)
             )
-        writer.write(window)
-        last = max(int(batch.moves[-1]) for batch in window)
-        report("writing", int(np.searchsorted(planned, last)) + 1, len(planned))
+            writer.add(batch)
+            last = max(last, int(batch.moves[-1]))
+            del batch  # or it would stay while the next one is made
+        writer.write()
+        report("writing", int(np.searchsorted(planned, last, side="right")), len(planned))
+        release()
     writer.finish()
     report("writing", len(planned), len(planned))
     if like is not None:
         collected.repeat(like)
-        deviation = deviation[like]
+        deviation = gathered(deviation, like)
     return collected, deviation

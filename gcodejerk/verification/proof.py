@@ -19,6 +19,7 @@ import numpy as np
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, read_program
+from gcodejerk.storage import release
 from gcodejerk.verification.bytes.alignment import Alignment, Progress
 from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.bytes.guarded_form import check_guarded
@@ -254,6 +255,7 @@ def _judge_program(
             paths = in_own_steps(paths)
         check_rapids(paths, program.rapids, machine, found)
         alignment.judged(alike.judge(paths, judge, found))
+        release()
     if alignment.guarded and alignment.aligned:
         lines = program.rapids.line[np.array(alignment.replaced)].tolist()
         check_guarded(original, program.dialect, lines, found)

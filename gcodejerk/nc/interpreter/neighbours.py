@@ -17,7 +17,7 @@ keep.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import BinaryIO
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.nc.interpreter.rapids import Rapids
 from gcodejerk.reasons import CERTAIN
+from gcodejerk.storage import alike, windows
 from gcodejerk.units import MM_PER_INCH
 
 WINDOW = 512
@@ -74,20 +75,26 @@ def with_neighbours(file: BinaryIO, origin: int, rapids: Rapids) -> Rapids:
     """
     lone: NDArray[np.bool_] = rapids.lone.copy()
     queued: NDArray[np.bool_] = rapids.queued.copy()
-    unit = np.where(rapids.inch, MM_PER_INCH, 1.0)
-    for i in np.flatnonzero(rapids.reason == CERTAIN).tolist():
+    for i in _certain(rapids):
+        unit = MM_PER_INCH if rapids.inch[i] else 1.0
         begin, end = origin + int(rapids.begin[i]), origin + int(rapids.end[i])
         file.seek(max(begin - IN_FRONT, origin))
         text = file.read(end - file.tell())
         before, block = text[: len(text) - (end - begin)], text[len(text) - (end - begin) :]
         whole = len(before) < IN_FRONT
         lines = before.split(b"\n")[0 if whole else 1 : -1]
-        feed = float(rapids.feed[i]) * unit[i] if rapids.feed_mode[i] == 94 else np.nan
+        feed = float(rapids.feed[i]) * unit if rapids.feed_mode[i] == 94 else np.nan
         if _kind(block):
-            queued[i] = _long_motion(lines, bool(rapids.incremental[i]), float(unit[i]), feed)
+            queued[i] = _long_motion(lines, bool(rapids.incremental[i]), unit, feed)
         if lone[i]:
             lone[i] = not _followed(file, begin, end)
-    return replace(rapids, lone=lone, queued=queued)
+    return replace(rapids, lone=alike(lone), queued=alike(queued))
+
+
+def _certain(rapids: Rapids) -> Iterator[int]:
+    """Indices of the certain rapids."""
+    for part in windows(len(rapids)):
+        yield from (part.start + np.flatnonzero(rapids.reason[part] == CERTAIN)).tolist()
 
 
 def _long_motion(lines: list[bytes], incremental: bool, unit: float, feed: float) -> bool:

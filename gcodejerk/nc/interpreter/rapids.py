@@ -16,6 +16,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.interpreter.visits import Row, Visits
 from gcodejerk.nc.text.block import ELSEWHERE
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.storage import Growing, alike, kept
 
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
 FEED_UNKNOWN = _INDEX[Reason.FEED_UNKNOWN]
@@ -82,6 +83,10 @@ class Rapids:
     def __len__(self) -> int:
         return len(self.line)
 
+    def part(self, rows: slice) -> Rapids:
+        """Some of the rapids."""
+        return Rapids(**{column.name: getattr(self, column.name)[rows] for column in fields(self)})
+
     def freeze(self) -> None:
         """Let nobody write to the columns any more: planning and proof may both read them."""
         for column in fields(self):
@@ -111,21 +116,15 @@ def _column(rows: list[Row], name: str, dtype: type) -> NDArray[Any]:
     return np.array([getattr(row, name) for row in rows], dtype=dtype)
 
 
-def _once(column: NDArray[Any]) -> NDArray[Any]:
-    """A column whose rows are the same to the bit: the row, and no memory for the others."""
-    if len(column) < 2:
-        return column
-    bits = column.view(f"u{column.itemsize}")
-    return np.broadcast_to(column[0].copy(), column.shape) if (bits == bits[0]).all() else column
-
-
 class RapidLog:
     """Collects rapids in the order of the file."""
 
     def __init__(self) -> None:
-        self._parts: dict[str, list[NDArray[np.generic]]] = {name: [] for name in _TYPES}
+        self._parts = {
+            name: Growing(dtype, width, once=name not in DIFFER)
+            for name, (dtype, width) in _TYPES.items()
+        }
         self._rows: list[Row] = []
-        self._needed: list[NDArray[np.bool_]] = []
         self._waiting = 0
         self.count = 0
         self.habits = self.outputs = False
@@ -140,7 +139,8 @@ class RapidLog:
         if event:
             self.visits.feed_event(event == USES_FEED)
         if event and self._waiting:
-            self._needed.append(np.full(self._waiting, event == USES_FEED))
+            needed = np.broadcast_to(np.bool_(event == USES_FEED), self._waiting)
+            self._parts["feed_needed"].extend(needed)
             self._waiting = 0
 
     def add(self, reason: Reason | None, row: Row) -> None:
@@ -176,7 +176,7 @@ class RapidLog:
             self.feed_event(int(events[at[0]]))
             following = np.searchsorted(at, lines, side="right")
             settled = following[following < len(at)]
-            self._needed.append(events[at[settled]] == USES_FEED)
+            self._parts["feed_needed"].extend(events[at[settled]] == USES_FEED)
             self._waiting = len(lines) - len(settled)
         else:
             self._waiting += len(lines)
@@ -187,7 +187,7 @@ class RapidLog:
         for name, value in columns.items():
             dtype, width = _TYPES[name]
             shape = (len(lines), width) if width else (len(lines),)
-            self._parts[name].append(np.broadcast_to(np.asarray(value, dtype=dtype), shape))
+            self._parts[name].extend(np.broadcast_to(np.asarray(value, dtype=dtype), shape))
 
     def _flush(self) -> None:
         if not self._rows:
@@ -195,7 +195,7 @@ class RapidLog:
         for name in self._parts:
             if name != "feed_needed":
                 dtype, _ = _TYPES[name]
-                self._parts[name].append(_column(self._rows, name, dtype))
+                self._parts[name].extend(_column(self._rows, name, dtype))
         self._rows = []
 
     def _merge_visits(self, columns: dict[str, NDArray[Any]]) -> None:
@@ -216,13 +216,8 @@ class RapidLog:
     def finish(self) -> Rapids:
         """All rapids, with what only the whole program tells."""
         self._flush()
-        self._needed.append(np.zeros(self._waiting, dtype=np.bool_))
-        self._parts["feed_needed"] = list(self._needed)
-        columns: dict[str, NDArray[Any]] = {}
-        for name, (dtype, width) in _TYPES.items():
-            parts = self._parts.pop(name)
-            empty: NDArray[np.generic] = np.empty((0, width) if width else 0, dtype=dtype)
-            columns[name] = np.concatenate([empty, *parts]).astype(dtype, copy=False)
+        self._parts["feed_needed"].extend(np.zeros(self._waiting, dtype=np.bool_))
+        columns = {name: self._parts.pop(name).finish() for name in _TYPES}
         self._merge_visits(columns)
         own = columns["line"] < ELSEWHERE
         if not own.all():
@@ -236,6 +231,7 @@ class RapidLog:
             burns = columns["beam"] | (self.dark == "always")
             reason[(reason == CERTAIN) & burns] = _INDEX[Reason.BEAM]
         for name in columns.keys() - DIFFER:
-            columns[name] = _once(columns[name])
+            columns[name] = alike(columns[name])
+        columns = {name: kept(column) for name, column in columns.items()}
         assert set(columns) == {f.name for f in fields(Rapids)}
         return Rapids(**columns)

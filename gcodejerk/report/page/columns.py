@@ -10,7 +10,7 @@ Rule: bounded. A page has `MOST_RAPIDS` at most, those that leave the most; curv
 from __future__ import annotations
 
 import base64
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.motion import Profiles
 from gcodejerk.motion.profiles.profile import Array, joined
+from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.settling import known_moves, settling_times, todays_rapids
-from gcodejerk.reasons import REASONS
+from gcodejerk.reasons import CERTAIN, REASONS
 from gcodejerk.report.page.text import visible
 from gcodejerk.rewrite.result import Result
+from gcodejerk.storage import Growing, windows
 
 Record = dict[str, Any]
 Rows = NDArray[np.int64]
@@ -78,28 +80,41 @@ class Figures:
     @classmethod
     def of(cls, result: Result) -> Figures:
         """The figures of a result."""
-        plans, rest = result.plans, result.rest
-        planned = plans.planned
-        each = planned[:, np.newaxis]
-        now = np.where(each, result.conventional_residual, rest.residual)
-        then = np.where(each, result.residual, rest.residual)
+        parts = [Growing(np.int64 if f.name == "mode" else np.float64) for f in fields(cls)]
+        for rows in windows(len(result.plans)):
+            of_rows = cls._of(result, rows)
+            for part, f in zip(parts, fields(cls), strict=True):
+                part.extend(getattr(of_rows, f.name))
+        return cls(*(part.finish() for part in parts))
+
+    @classmethod
+    def _of(cls, result: Result, rows: slice) -> Figures:
+        """Those of some rapids."""
+        plans, rest, rest_time = result.plans, result.rest, result.rest.time[rows]
+        planned = plans.reason[rows] == CERTAIN
+        each, left = planned[:, np.newaxis], rest.residual[rows]
+        now = np.where(each, result.conventional_residual[rows], left)
+        then = np.where(each, result.residual[rows], left)
+        times = plans.counts[rows] * plans.machine.interval
+        if plans.lasting is not None:
+            times = np.where(planned, plans.lasting[rows], 0.0)
         tolerance, modes = plans.machine.design.tolerance, plans.modes
         before, after = modes.grouped(now), modes.grouped(then)
-        known = np.isfinite(before).all(axis=1) & (planned | (rest.time > 0.0))
-        usual = np.where(planned, plans.conventional_time, rest.time)
+        known = np.isfinite(before).all(axis=1) & (planned | (rest_time > 0.0))
+        usual = np.where(planned, plans.conventional_time[rows], rest_time)
         set_anew = result.settings is not None and bool(result.settings.changed)
         unknown = ~known | (set_anew & ~planned)
-        nothing = np.full(len(plans), np.nan)
+        nothing = np.full(len(planned), np.nan)
         if not len(modes.modes):
-            return cls(nothing, nothing, nothing, nothing, np.zeros(len(plans), np.int64),
-                       np.where(planned, plans.times, usual), usual)  # fmt: skip
+            return cls(nothing, nothing, nothing, nothing, np.zeros(len(planned), np.int64),
+                       np.where(planned, times, usual), usual)  # fmt: skip
         return cls(
             before=np.where(known, before.max(axis=1), np.nan),
             after=np.where(unknown, np.nan, after.max(axis=1)),
             waited=np.where(known, settling_times(now, modes, tolerance), np.nan),
             waits=np.where(unknown, np.nan, settling_times(then, modes, tolerance)),
             mode=np.nan_to_num(np.fmax(before, after)).argmax(axis=1).astype(np.int64),
-            time=np.where(planned, plans.times, np.where(unknown, np.nan, rest.time)),
+            time=np.where(planned, times, np.where(unknown, np.nan, rest_time)),
             usual=np.where(usual > 0.0, usual, np.nan),
         )
 
@@ -171,7 +186,7 @@ def _curves(result: Result, rows: Rows, order: Rows) -> Record:
     `axis`: one, or under independent positioning one for each axis that moves.
     """
     plans, rapids = result.plans, result.program.rapids
-    moved = known_moves(rapids, plans)[rows]
+    moved = known_moves(rapids, plans, rows)
     planned = plans.planned[rows]
     left = np.flatnonzero(~planned & np.isfinite(moved).all(axis=1))
     own, of_left, share = todays_rapids(plans, moved[left], rapids.lone[rows[left]])
@@ -179,7 +194,7 @@ def _curves(result: Result, rows: Rows, order: Rows) -> Record:
     counts = np.where(planned, end - begin, 0)
     ends = np.cumsum(counts)
     used = np.repeat(begin - (ends - counts), counts) + np.arange(counts.sum())
-    store = _Store(joined([plans.profiles.take(used), plans.conventional.take(used), own]))
+    store = _Store([_few(plans.profiles, used), _few(plans.conventional, used), own])
     designed, beside = len(used), 2 * len(used)
     entries: list[list[tuple[int, int, int]]] = [[] for _ in rows]
     independent = plans.machine.positioning != "linear"
@@ -212,11 +227,24 @@ def _curves(result: Result, rows: Rows, order: Rows) -> Record:
 _SIDES: tuple[Any, ...] = ("left", "right")
 
 
+def _few(profiles: Profiles, rows: Rows) -> RepeatedProfiles:
+    """Some profiles, each different one once."""
+    like = profiles.like[rows] if isinstance(profiles, RepeatedProfiles) else rows
+    distinct = profiles.distinct if isinstance(profiles, RepeatedProfiles) else profiles
+    used, of_used = np.unique(like, return_inverse=True)
+    return RepeatedProfiles(distinct.take(used), of_used.reshape(-1))
+
+
 class _Store:
     """Different profiles, as many as there is room for."""
 
-    def __init__(self, profiles: Profiles) -> None:
-        self.profiles = profiles
+    def __init__(self, parts: list[Profiles]) -> None:
+        """Begin; profiles are counted through all parts."""
+        distinct = [p.distinct if isinstance(p, RepeatedProfiles) else p for p in parts]
+        before = np.cumsum([0, *map(len, distinct)])
+        like = [p.like if isinstance(p, RepeatedProfiles) else np.arange(len(p)) for p in parts]
+        self.like = np.concatenate([own + k for own, k in zip(like, before[:-1], strict=True)])
+        self.profiles = joined(distinct)
         self.taken: list[int] = []
         self.known: dict[bytes, int] = {}
         self.segments = 0
@@ -224,6 +252,7 @@ class _Store:
 
     def index(self, profile: int) -> int:
         """Where a profile is kept; -1 where there is no room."""
+        profile = int(self.like[profile])
         first, last = self.profiles.first[profile : profile + 2].tolist()
         columns = (self.profiles.duration, self.profiles.acceleration, self.profiles.jerk)
         key = b"".join(column[first:last].tobytes() for column in columns)

@@ -15,6 +15,7 @@ import numpy as np
 from gcodejerk.advice import STAMP_NOTES
 from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, REASONS, Dialect, Program, Rapids
+from gcodejerk.storage import kept, release
 from gcodejerk.verification.bytes.aligned_form import AlignedReader
 from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
 from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
@@ -107,13 +108,14 @@ class Alignment:
     def _certain(self) -> Iterator[tuple[int, int, int, int]]:
         """Index, begin, end and terminator of each rapid that may be replaced."""
         rapids = self.program.rapids
-        certain = np.flatnonzero(rapids.reason == CERTAIN)
+        certain = kept(np.flatnonzero(rapids.reason == CERTAIN))
         for k in range(0, len(certain), AT_ONCE):
             if self.progress is not None:
                 self.progress(k, len(certain))
             rows = certain[k : k + AT_ONCE]
             columns = (rows, rapids.begin[rows], rapids.end[rows], rapids.terminator[rows])
             yield from zip(*(column.tolist() for column in columns), strict=True)
+            release()
 
     def _proven(self, i: int, block: bytes) -> bool:
         """Pass a replacement that was proven before; whether one stands here."""

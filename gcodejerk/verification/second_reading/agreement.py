@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
+from gcodejerk.storage import AT_ONCE, gathered, kept, release
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.elsewhere import lines_elsewhere
@@ -68,12 +69,12 @@ def confirm(
     int
         How many of them the second reading confirms.
     """
-    index = np.fromiter(rewritten, dtype=np.int64)
+    index = kept(np.fromiter(rewritten, dtype=np.int64))
     if not len(index):
         return 0
     confirmed = 0
-    lines = array("q", rapids.line[index].tobytes())
     plain = _Plain(rapids, index)
+    lines = array("q", plain.line.tobytes())
     for k, seen in observations(original, find_dialect(dialect), start, lines, plain):
         i = int(index[k])
         problem = _disagreement(seen, rapids, i)
@@ -90,8 +91,8 @@ class _Plain:
 
     def __init__(self, rapids: Rapids, index: NDArray[np.int64]) -> None:
         self.rapids, self.index = rapids, index
-        self.line = rapids.line[index]
-        self.confirmed = 0
+        self.line = gathered(rapids.line, index)
+        self.confirmed = self.released = 0
 
     def agrees(self, run: Straight, number: int, tracker: Tracker) -> bool:
         """Compare those of some lines; whether the two readings agree in every one of them.
@@ -136,6 +137,9 @@ class _Plain:
         if not good.all():
             return False
         self.confirmed += int(np.count_nonzero(known))
+        if last - self.released >= AT_ONCE:
+            self.released = int(last)
+            release()
         return True
 
 
