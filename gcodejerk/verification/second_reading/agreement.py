@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
-from gcodejerk.storage import AT_ONCE, gathered, kept, release
+from gcodejerk.storage import gathered, kept, release
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.elsewhere import lines_elsewhere
@@ -81,8 +81,7 @@ def confirm(
         if problem:
             advice = "leave this rapid alone, and report the program: one of two readings is wrong"
             _differ(found, int(rapids.line[i]), problem, advice)
-        else:
-            confirmed += _is_known(seen, rapids, i)
+        confirmed += not problem and _is_known(seen, rapids, i)
     return confirmed + plain.confirmed
 
 
@@ -92,7 +91,7 @@ class _Plain:
     def __init__(self, rapids: Rapids, index: NDArray[np.int64]) -> None:
         self.rapids, self.index = rapids, index
         self.line = gathered(rapids.line, index)
-        self.confirmed = self.released = 0
+        self.confirmed = 0
 
     def agrees(self, run: Straight, number: int, tracker: Tracker) -> bool:
         """Compare those of some lines; whether the two readings agree in every one of them.
@@ -137,9 +136,6 @@ class _Plain:
         if not good.all():
             return False
         self.confirmed += int(np.count_nonzero(known))
-        if last - self.released >= AT_ONCE:
-            self.released = int(last)
-            release()
         return True
 
 
@@ -277,11 +273,11 @@ def _from_above(
     text, number, following = stepper.text, 1, 0
     line = lines[0] if lines else math.inf
     for data in pieces(original):
+        release()
         at, size, behind = 0, len(data), -1
         while at < size:
-            taken = None
-            if plain is not None and at >= behind and plain_lines.ready(tracker):
-                taken = plain_lines.take(data, at, tracker)
+            ready = plain is not None and at >= behind and plain_lines.ready(tracker)
+            taken = plain_lines.take(data, at, tracker) if ready else None
             if taken is not None and plain is not None and plain.agrees(taken[0], number, tracker):
                 follow(tracker, taken[0])
                 number, at = number + len(taken[0]), taken[1]
