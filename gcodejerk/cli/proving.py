@@ -65,6 +65,9 @@ def verify(
     front = Front(unroll, expand_cycles)
     if report is not None and front:
         raise typer.BadParameter("--report: its lines are the original's, as it was")
+    in_table = f"{front.options}: a table of streams has no {front.what} written out"
+    if processed.lower().endswith(".csv") and front:
+        raise typer.BadParameter(in_table)
     reported = None if report is None else read_reported(report)
     told = ""
     with ExitStack() as files:
@@ -72,9 +75,7 @@ def verify(
         names = (original, processed)
         table = processed.lower().endswith(".csv") or rows_format(other) is not None
         if table and front:
-            raise typer.BadParameter(
-                f"{front.options}: a table of streams has no {front.what} written out"
-            )
+            raise typer.BadParameter(in_table)
         described, dialect, front = _said(
             other, processed, described, profile, dialect, controller, front
         )
