@@ -10,9 +10,10 @@ from gcodejerk.machine import DIALECT_OF_CONTROLLER, Machine
 from gcodejerk.nc import Program
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import Residuals
-from gcodejerk.reasons import CERTAIN
+from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.rewrite.expanded import WrittenOut
 from gcodejerk.storage import windows
+from gcodejerk.unrolling.unrolling import has_flow
 
 _NAMED = 8
 """Files that are named."""
@@ -54,6 +55,20 @@ def subprogram_notes(program: Program, machine: Machine) -> list[str]:
     ]
 
 
+def loop_notes(program: Program, written: WrittenOut | None) -> list[str]:
+    """That rapids stand in loops and subprograms which could be written out."""
+    asked = written is not None and written.unrolling is not None
+    inside = program.rapids.reason == REASONS.index(Reason.SUBPROGRAM)
+    count = int(np.count_nonzero(inside))
+    if asked or not count or not has_flow(program.language):
+        return []
+    rapids = "1 rapid left alone stands" if count == 1 else f"{count} rapids left alone stand"
+    return [
+        f"{rapids} in loops, branches or subprograms: --unroll writes out those "
+        "whose way is known (docs/unroll.md)"
+    ]
+
+
 def program_notes(
     program: Program, written: WrittenOut | None, emitter: Controller, machine: Machine
 ) -> list[str]:
@@ -61,6 +76,7 @@ def program_notes(
     findings = (*program.findings, *(() if written is None else written.findings))
     notes = [_finding(finding.line, finding.message) for finding in findings]
     notes += subprogram_notes(program, machine)
+    notes += loop_notes(program, written)
     home = DIALECT_OF_CONTROLLER.get(emitter.name)
     if emitter.in_place and home is not None and not program.dialect.startswith(home):
         notes.append(

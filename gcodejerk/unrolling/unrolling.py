@@ -151,17 +151,29 @@ def unroll(
     )
 
 
+def has_flow(dialect: Dialect) -> bool:
+    """Whether loops and calls of the language can be written out."""
+    return dialect.text.o_word == "flow" or _has_scripts(dialect)
+
+
+def _has_scripts(dialect: Dialect) -> bool:
+    """Whether whole programs of the language are followed: Siemens, and macro B and its kin."""
+    rules = dialect.text
+    siemens = rules.names and rules.variables == "R"
+    return siemens or (bool(rules.keywords) and rules.o_word == "program")
+
+
 def _reader(
     name: str, dialect: Dialect, start: Start, comments: bool, data: bytes, *, jumps: bool
 ) -> OWordUnroller | ScriptUnroller:
     """Who reads a program of this language, and writes it out on the way."""
-    rules, most = dialect.text, start.unrolled_lines or MOST_LINES
-    if rules.o_word == "flow":
+    most = start.unrolled_lines or MOST_LINES
+    if dialect.text.o_word == "flow":
         if _FUNCTIONS.search(data.translate(None, b" \t").upper()):
             arithmetic = replace(dialect.arithmetic, careful=True)
             dialect = replace(dialect, arithmetic=arithmetic)
         return OWordUnroller(name, dialect, start, most, comments, jumps=jumps)
-    if (rules.names and rules.variables == "R") or (rules.keywords and rules.o_word == "program"):
+    if _has_scripts(dialect):
         elsewhere = find_elsewhere(data, start.subprograms, dialect)
         return ScriptUnroller(name, dialect, start, elsewhere, most, comments)
     raise ProgramError(

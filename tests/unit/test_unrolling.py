@@ -226,3 +226,11 @@ def test_the_command_line_writes_and_proves(command, tmp_path):
     assert (code, said.count("inside a subprogram")) == (0, 0)
     code, said = command("verify", "grid.ngc", "grid.csv", "-m", "vmc", "--unroll")
     assert (code, "no loops" in said) == (2, True)
+
+
+@pytest.mark.parametrize("front", [False, True])
+def test_who_leaves_loops_as_they_are_is_told_what_writes_them_out(front):
+    notes = process(GRID, VMC, unroll=front).notes
+    assert any("--unroll writes out" in note for note in notes) is not front
+    # Lines of a subprogram are read by themselves first: nothing is unknown since the call.
+    assert not any("is unknown since" in note for note in notes)

@@ -142,7 +142,7 @@ class Runner:
     def _rapid(self, step: Step, line: Line, *, uncertain: bool, visit: bool) -> None:
         """Enter a rapid."""
         state, reason = self.state, step.reason
-        if step.since is not None:
+        if step.since is not None and not uncertain:
             self._lost[step.since.number] = (
                 step.since,
                 self._lost.get(step.since.number, (0, 0))[1] + 1,
