@@ -21,7 +21,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.parameters.judge import FILTER, Judge, Rows
 from gcodejerk.parameters.moves import Moves
-from gcodejerk.parameters.search import SAME, Found, Goal, goal_value, representatives, search
+from gcodejerk.parameters.search import SAME, Found, Search, goal_value, representatives
 from gcodejerk.parameters.settings import ALL, PATH, Scheme
 
 CYCLES, GAINED = 3, 0.01
@@ -138,7 +138,8 @@ class Groups:
             some = index[representatives(self.judge.moves.take(index))[0]]
             part = self.judge.take(some)
             today = float(self.times[some] @ part.moves.count)
-            found = [self._search(part, self.start, group, t * today) for t in TIMES.tolist()]
+            search = self._searched(part, self.start, group)
+            found = [self._within(search, t * today) for t in TIMES.tolist()]
             fronts.append([one for one in found if one is not None])
         return fronts
 
@@ -199,29 +200,46 @@ class Groups:
         self, judge: Judge, start: Array, group: tuple[int, ...], budget: float
     ) -> Found | None:
         """The best of one group in a time."""
-        goal = Goal(self.goal, budget)
-        found = search(judge, start, group, self.ranges, goal, self._allowed)
+        return self._within(self._searched(judge, start, group), budget)
+
+    def _searched(self, judge: Judge, start: Array, group: tuple[int, ...]) -> Search:
+        """All that one group can be set to, in any time."""
+        return Search(judge, start, group, self.ranges, self.goal, self._allowed)
+
+    def _within(self, search: Search, budget: float) -> Found | None:
+        """The best of a search in a time."""
+        found = search.within(budget)
         self.judged += 0 if found is None else found.judged
         return found
 
     def _allowed(self, written: Array) -> NDArray[np.bool_]:
         """Settings that keep the machine's limits, or pass them no more than today's numbers do."""
         acceleration, jerk = self._peaks(written)
-        now = self._peaks(self.start[np.newaxis])
-        most = [
-            np.maximum([getattr(axis.limit, name) for axis in self.machine.axes], today[0])
-            for name, today in zip(("acceleration", "jerk"), now, strict=True)
-        ]
+        most = self._most
         within = (acceleration <= most[0] * HELD) & (jerk <= most[1] * HELD)
         return np.asarray(within.all(axis=1))
 
-    def _peaks(self, written: Array) -> tuple[Array, Array]:
-        """Peak acceleration and jerk of each axis at full speed, shape (k, axes); steps aside."""
+    @cached_property
+    def _most(self) -> list[Array]:
+        """Largest acceleration and jerk of each axis: its limit's, or today's if that is more."""
+        now = self._peaks(self.start[np.newaxis])
+        return [
+            np.maximum([getattr(axis.limit, name) for axis in self.machine.axes], today[0])
+            for name, today in zip(("acceleration", "jerk"), now, strict=True)
+        ]
+
+    @cached_property
+    def _alone(self) -> tuple[Judge, Array]:
+        """Each axis alone at full speed, and how far it goes [mm or degrees]."""
         share = np.zeros((len(self.machine.axes), len(AXES)))
         for row, axis in enumerate(self.machine.axes):
             share[row, AXES.index(axis.name)] = FULL_SPEED * axis.rapid.velocity
         one_each = np.ones(len(share))
         moves = Moves(share, one_each, one_each, np.full(len(share), np.inf))
-        one = Judge(self.judge.scheme, Rows.of(moves, self.machine))
-        peaks = one.peaks(written)
-        return peaks[0] * share.sum(axis=1), peaks[1] * share.sum(axis=1)
+        return Judge(self.judge.scheme, Rows.of(moves, self.machine)), share.sum(axis=1)
+
+    def _peaks(self, written: Array) -> tuple[Array, Array]:
+        """Peak acceleration and jerk of each axis at full speed, shape (k, axes); steps aside."""
+        judge, length = self._alone
+        acceleration, jerk = judge.peaks(written)
+        return acceleration * length, jerk * length

@@ -97,7 +97,10 @@ class Found:
 
 
 class Candidates:
-    """Settings side by side, what bounds them, and which of them may still be best."""
+    """Settings side by side, what bounds them, and which of them may still be best.
+
+    What was learned of them for one budget is used for the next.
+    """
 
     def __init__(self, judge: Judge, rows: Array, start: Array) -> None:
         self.judge, self.rows = judge, rows
@@ -111,8 +114,10 @@ class Candidates:
             one = start[np.newaxis]
             whole = float(judge.times(one)[0] @ self.moves.count)
             self.estimated *= whole / float(sample.times(one)[0] @ weight)
+        self.nobody = np.zeros(len(rows), dtype=bool)
         self.bound = np.zeros(len(rows))
-        self.cuts: set[tuple[int, int]] = set()
+        self.cuts: dict[tuple[int, int], NDArray[np.bool_]] = {}
+        """Candidates that each move at each frequency has bounded."""
         self.needed = np.flatnonzero(needs(self.moves) > 0.0)
         self.sample = np.intersect1d(index, self.needed)
         if not len(self.sample):
@@ -156,12 +161,13 @@ class Candidates:
 
     def cut(self, move: int, groups: set[int], alive: NDArray[np.bool_]) -> None:
         """Bound all candidates that are alive by what one move leaves at some frequencies."""
-        new = groups - {group for own, group in self.cuts if own == move}
-        if not new or not alive.any():
+        done = {group: self.cuts.get((move, group), self.nobody) for group in groups}
+        new = {group for group in groups if (alive & ~done[group]).any()}
+        if not new:
             return
-        self.cuts |= {(move, group) for group in new}
+        index = np.flatnonzero(alive & ~np.logical_and.reduce([done[group] for group in new]))
+        self.cuts |= {(move, group): done[group] | alive for group in new}
         one = self.judge.take(np.array([move])).at(np.array(sorted(new)))
-        index = np.flatnonzero(alive)
         self.bound[index] = np.maximum(self.bound[index], one.worst(self.rows[index])[:, 0])
 
     def worst_of(self, goal: Goal, start: int) -> Found | None:
@@ -263,15 +269,8 @@ def representatives(moves: Moves, weight: Array | None = None) -> tuple[NDArray[
     return np.array(index)[rising], out if weight is None else out / out.sum()
 
 
-def search(
-    judge: Judge,
-    start: Array,
-    group: tuple[int, ...],
-    ranges: Array,
-    goal: Goal,
-    allowed: Callable[[Array], NDArray[np.bool_]],
-) -> Found | None:
-    """The best numbers of one group of settings, all others as they are.
+class Search:
+    """The best numbers of one group of settings, all others as they are, in one time or several.
 
     Parameters
     ----------
@@ -283,51 +282,64 @@ def search(
         Those that are chosen.
     ranges : ndarray, shape (s, 2)
         Between which numbers.
-    goal : Goal
-        What is made small.
+    kind : str
+        One of `GOALS`.
     allowed : callable
         Settings (k, s) -> which of them the machine allows.
-
-    Returns
-    -------
-    Found or None
-        None: nothing that is allowed is fast enough.
     """
-    settings = [judge.scheme.settings[s] for s in group]
-    most = MOST if goal.kind == WORST else MOST_MEAN
-    whole = [max(len(s.names), 1) for s in settings]
-    free = max(sum(1 for s in settings if not s.names), 1)
-    each = min(max(int((most / np.prod(whole)) ** (1.0 / free)), 3), MOST_OF_ONE)
-    choices = [
-        np.arange(len(s.names), dtype=float)
-        if s.names
-        else s.choices(float(ranges[k, 0]), float(ranges[k, 1]), each)
-        for s, k in zip(settings, group, strict=True)
-    ]
-    found = _best(judge, _allowed(_mesh(start, group, choices), allowed), goal, start)
-    for _ in range(FINER):
-        if found is None or all(
-            _complete(s, c, found.written[k])
-            for s, c, k in zip(settings, choices, group, strict=True)
-        ):
-            break
-        parts, merged = [found.written[np.newaxis]], choices
-        for near in (found.written, *found.runners_up):
-            own = [
-                _between(s, c, near[k], max(each // 4, 5))
-                for s, c, k in zip(settings, choices, group, strict=True)
-            ]
-            parts.append(_mesh(start, group, own))
-            merged = [np.union1d(m, o) for m, o in zip(merged, own, strict=True)]
-        choices = merged
-        rows = _allowed(np.unique(np.concatenate(parts), axis=0), allowed)
-        found = _better(found, _best(judge, rows, goal, found.written))
-    return found
 
+    def __init__(
+        self,
+        judge: Judge,
+        start: Array,
+        group: tuple[int, ...],
+        ranges: Array,
+        kind: str,
+        allowed: Callable[[Array], NDArray[np.bool_]],
+    ) -> None:
+        self.judge, self.start, self.group, self.kind = judge, start, group, kind
+        self.allowed = allowed
+        self.settings = [judge.scheme.settings[s] for s in group]
+        most = MOST if kind == WORST else MOST_MEAN
+        whole = [max(len(s.names), 1) for s in self.settings]
+        free = max(sum(1 for s in self.settings if not s.names), 1)
+        self.each = min(max(int((most / np.prod(whole)) ** (1.0 / free)), 3), MOST_OF_ONE)
+        self.choices = [
+            np.arange(len(s.names), dtype=float)
+            if s.names
+            else s.choices(float(ranges[k, 0]), float(ranges[k, 1]), self.each)
+            for s, k in zip(self.settings, group, strict=True)
+        ]
+        self.first = self._candidates(_mesh(start, group, self.choices), start)
 
-def _allowed(rows: Array, allowed: Callable[[Array], NDArray[np.bool_]]) -> Array:
-    """The settings that the machine allows."""
-    return np.asarray(rows[allowed(rows)])
+    def within(self, budget: float) -> Found | None:
+        """The best whose moves take no longer [s]; None: nothing that is allowed is fast enough."""
+        goal = Goal(self.kind, budget)
+        choices, found = self.choices, _best(self.first, goal, self.start)
+        for _ in range(FINER):
+            if found is None or all(
+                _complete(s, c, found.written[k])
+                for s, c, k in zip(self.settings, choices, self.group, strict=True)
+            ):
+                break
+            parts, merged = [found.written[np.newaxis]], choices
+            for near in (found.written, *found.runners_up):
+                own = [
+                    _between(s, c, near[k], max(self.each // 4, 5))
+                    for s, c, k in zip(self.settings, choices, self.group, strict=True)
+                ]
+                parts.append(_mesh(self.start, self.group, own))
+                merged = [np.union1d(m, o) for m, o in zip(merged, own, strict=True)]
+            choices = merged
+            rows = np.unique(np.concatenate(parts), axis=0)
+            closer = self._candidates(rows, found.written)
+            found = _better(found, _best(closer, goal, found.written))
+        return found
+
+    def _candidates(self, rows: Array, start: Array) -> Candidates | None:
+        """Those settings that the machine allows; None: it allows none."""
+        rows = rows[self.allowed(rows)]
+        return Candidates(self.judge, rows, start) if len(rows) else None
 
 
 def _better(found: Found, again: Found | None) -> Found:
@@ -337,14 +349,13 @@ def _better(found: Found, again: Found | None) -> Found:
     return replace(again, proven=again.proven and found.proven, judged=again.judged + found.judged)
 
 
-def _best(judge: Judge, rows: Array, goal: Goal, start: Array) -> Found | None:
+def _best(candidates: Candidates | None, goal: Goal, start: Array) -> Found | None:
     """The best of candidates."""
-    if not len(rows):
+    if candidates is None:
         return None
-    candidates = Candidates(judge, rows, start)
     if goal.kind == MEAN:
         return candidates.mean_of(goal)
-    same = np.flatnonzero((rows == start).all(axis=1))
+    same = np.flatnonzero((candidates.rows == start).all(axis=1))
     return candidates.worst_of(goal, int(same[0]) if len(same) else -1)
 
 

@@ -25,7 +25,7 @@ from gcodejerk.parameters import (
     tune,
 )
 from gcodejerk.parameters.judge import Judge, Rows
-from gcodejerk.parameters.search import Goal, goal_value, needs, representatives, search
+from gcodejerk.parameters.search import Search, goal_value, needs, representatives
 
 MACHINE = """
 interval: 0.001
@@ -197,7 +197,7 @@ def test_the_worst_in_a_band_is_that_of_many_frequencies():
     assert (judged >= want * (1.0 - 0.006)).all()
 
 
-def brute_force(judge, ranges, goal, allowed):
+def brute_force(judge, ranges, kind, budget, allowed):
     """Every candidate, one by one."""
     scheme = judge.scheme
     choices = [
@@ -207,9 +207,9 @@ def brute_force(judge, ranges, goal, allowed):
     best = (np.inf, None)
     for numbers in itertools.product(*choices):
         one = np.array([numbers])
-        if not allowed(one)[0] or judge.times(one)[0] @ judge.moves.count > goal.budget:
+        if not allowed(one)[0] or judge.times(one)[0] @ judge.moves.count > budget:
             continue
-        value = float(goal_value(judge.worst(one), judge.moves, goal.kind)[0])
+        value = float(goal_value(judge.worst(one), judge.moves, kind)[0])
         best = min(best, (value, numbers))
     return best
 
@@ -233,13 +233,14 @@ def test_the_search_finds_what_brute_force_finds(seed, kind):
     start = scheme.today()
     ranges = np.array([[40.0, 75.0], [0.0, 30.0]])
     budget = float(judge.times(start[np.newaxis])[0] @ moves.count) * rng.uniform(0.95, 1.3)
-    goal = Goal(kind, budget)
 
     def allowed(rows):
         return rows[:, 0] + rows[:, 1] != 60.0
 
-    found = search(judge, start, (0, 1), ranges, goal, allowed)
-    value, numbers = brute_force(judge, ranges, goal, allowed)
+    search = Search(judge, start, (0, 1), ranges, kind, allowed)
+    search.within(rng.uniform(0.8, 1.2) * budget)  # what it learns there is of use, or of no harm
+    found = search.within(budget)
+    value, numbers = brute_force(judge, ranges, kind, budget, allowed)
     if numbers is None:
         assert found is None
         return
