@@ -4,6 +4,7 @@ import os
 import shutil
 import tempfile
 import zlib
+from collections import Counter
 
 from hypothesis import settings
 
@@ -32,6 +33,7 @@ def pytest_configure(config):
         none = providers.Constants()
         providers._get_local_constants = lambda: none
     # No test reads or fills the user's own cache of solutions.
+    config.cases = Counter()
     config.cache_folder = tempfile.mkdtemp(prefix="gcodejerk-cache-")
     os.environ["GCODEJERK_CACHE"] = config.cache_folder
     # The first command that tests start compiles our modules; hundreds after it need not.
@@ -83,11 +85,134 @@ QUICK = (
 NOT_QUICK = ("test_what_does_not_end", "test_measured_spectra", "test_a_series_runs_on_over_chunks")
 """Beginnings of names of their tests that take seconds."""
 
+REPEATS = {
+    "golden/test_sheets.py": {
+        "test_sheet_is_the_golden_one": 2,
+    },
+    "clients/test_interpreter_processing.py": {
+        "test_interpreter_finds_the_same_end_points_before_and_after": 2,
+    },
+    "clients/test_interpreter_reading.py": {
+        "test_every_real_file_reads_as_the_interpreter_runs_it": 2,
+    },
+    "corpus/test_corpus.py": {
+        "test_every_real_program_is_processed_and_verified": 2,
+    },
+    "property/test_families.py": {
+        "test_a_stepped_simulation_leaves_as_much": 3,
+    },
+    "property/test_never_worse.py": {
+        "test_no_written_rapid_is_worse_than_the_control_s_own": 3,
+    },
+    "property/test_profiles.py": {
+        "test_every_profile_keeps_what_it_promises": 2,
+    },
+    "property/test_rows_damage.py": {
+        "test_a_file_that_ends_behind_any_line_is_found": 3,
+        "test_any_changed_byte_is_found": 3,
+    },
+    "property/test_second_reading.py": {
+        "test_the_second_reading_agrees_with_the_first": 3,
+        "test_the_second_reading_agrees_on_real_files": 3,
+    },
+    "property/test_verify_damage.py": {
+        "test_every_damage_is_noticed": 3,
+    },
+    "property/test_verify_profiles.py": {
+        "test_damage_is_noticed_on_every_profile": 5,
+        "test_most_feeds_changed_by_one_percent_are_noticed": 3,
+        "test_outputs_on_drawn_machines_are_accepted": 5,
+    },
+    "unit/test_amplitude_map.py": {
+        "test_nothing_within_the_limits_is_much_better_than_the_choice": 4,
+    },
+    "unit/test_batch_jobs.py": {
+        "test_programs_that_freecad_posts_go_through_in_one_run": 2,
+    },
+    "unit/test_cli_compare.py": {
+        "test_a_picture_shows_something": 2,
+    },
+    "unit/test_cli_map.py": {
+        "test_a_picture_is_a_png_that_shows_something": 2,
+        "test_the_maps_of_all_conditions_are_one_picture": 3,
+    },
+    "unit/test_comparison.py": {
+        "test_settling_is_where_a_simulated_envelope_stays_below_the_tolerance": 4,
+        "test_worst_in_band_is_that_of_a_dense_scan": 3,
+    },
+    "unit/test_designs.py": {
+        "test_measured_spectra_go_through_every_design": 3,
+    },
+    "unit/test_documentation.py": {
+        "test_commands_print_what_the_page_shows": 2,
+    },
+    "unit/test_faults.py": {
+        "test_killed_before_any_call_to_the_system_it_leaves_no_half_file": 3,
+        "test_a_disk_that_fills_up_leaves_the_old_output": 3,
+    },
+    "unit/test_figures.py": {
+        "test_a_comparison_shows_every_axis_with_no_word_over_another_or_over_a_line": 4,
+        "test_no_word_of_a_map_stands_over_another": 3,
+        "test_no_word_of_three_maps_stands_over_another": 3,
+    },
+    "unit/test_filters.py": {
+        "test_a_stepped_simulation_leaves_as_much": 3,
+    },
+    "unit/test_fuzzing.py": {
+        "test_a_harness_finds_nothing_in_a_few_hundred_inputs": 2,
+    },
+    "unit/test_machine_document.py": {
+        "test_a_hostile_text_is_refused_without_being_expanded": 5,
+    },
+    "unit/test_motion_candidates.py": {
+        "test_cascades_of_candidates_leave_what_their_profiles_do": 5,
+        "test_symmetric_candidates_leave_what_their_profiles_do": 5,
+    },
+    "unit/test_motion_ramps.py": {
+        "test_designs_are_near_the_best_that_brute_force_finds": 3,
+        "test_designs_are_legal_and_never_worse_than_the_stretched_conventional_profile": 3,
+    },
+    "unit/test_nc_branches.py": {
+        "test_deep_nesting_takes_linear_time": 3,
+    },
+    "unit/test_nc_common.py": {
+        "test_what_is_certain_is_so_for_each_of_them": 3,
+    },
+    "unit/test_nc_reading_two_ways.py": {
+        "test_both_ways_agree_on_every_real_file": 4,
+        "test_both_ways_agree_on_an_odd_line_anywhere_in_a_run": 3,
+    },
+    "unit/test_parameters.py": {
+        "test_the_search_finds_what_brute_force_finds": 5,
+    },
+    "unit/test_resolution.py": {
+        "test_points_are_whole_steps_that_the_control_keeps": 5,
+    },
+    "unit/test_same_streams.py": {
+        "test_what_is_written_once_or_each_time_is_the_same": 3,
+    },
+    "unit/test_verify_alike.py": {
+        "test_one_damaged_stream_among_hundreds_alike_is_found": 3,
+    },
+    "unit/test_verify_laws.py": {
+        "test_both_have_the_same_rapids": 5,
+        "test_what_is_written_for_such_a_machine_is_proven": 5,
+    },
+}
+"""Tests of many cases of a kind: which one in how many comes before a change lands. CI runs all."""
+
 
 def pytest_itemcollected(item):
     module = item.path.as_posix().rpartition("/tests/")[2]
     if module in QUICK and not item.name.startswith(NOT_QUICK):
         item.add_marker("quick")
+    test = getattr(item, "originalname", item.name)
+    every = REPEATS.get(module, {}).get(test)
+    if every:
+        cases = item.config.cases
+        if cases[module, test] % every:
+            item.add_marker("repeats")
+        cases[module, test] += 1
 
 
 def explores(config):

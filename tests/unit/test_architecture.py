@@ -1,5 +1,6 @@
 """The map and the guide for contributors: every file, name and passage on them is there."""
 
+import ast
 import re
 from importlib import import_module
 from pathlib import Path
@@ -88,3 +89,17 @@ def test_the_guide_and_the_readme_give_the_same_command_for_the_tests():
     readme = (ROOT / "README.md").read_text()
     command = re.search(r"<!-- command: tests -->\n```console\n\$ (.*)\n", readme)[1]
     assert f"`{command}`" in GUIDE
+
+
+def test_tests_that_are_taken_in_strides_are_there():
+    conftest = ast.parse((ROOT / "tests/conftest.py").read_text())
+    (table,) = (
+        ast.literal_eval(node.value)
+        for node in conftest.body
+        if isinstance(node, ast.Assign) and node.targets[0].id == "REPEATS"
+    )
+    assert table
+    for module, tests in table.items():
+        body = ast.parse((ROOT / "tests" / module).read_text()).body
+        assert set(tests) <= {node.name for node in body if isinstance(node, ast.FunctionDef)}
+        assert all(every > 1 for every in tests.values())

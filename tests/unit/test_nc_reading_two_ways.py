@@ -29,7 +29,7 @@ STARTS = {
 
 
 PARTS = 3
-"""Of a folder, for as many cores; where nothing is known, the first of them stands for all."""
+"""Of a folder, for as many cores."""
 
 
 def real_files(folder):
@@ -41,9 +41,7 @@ def real_files(folder):
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("start", STARTS.values(), ids=STARTS)
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
-def test_both_ways_agree_on_every_real_file(folder, start, part, request):
-    if part and start == STARTS["nothing known"] and not request.config.getoption("--long"):
-        pytest.skip("left to the long run")
+def test_both_ways_agree_on_every_real_file(folder, start, part):
     files = real_files(folder) if folder.exists() else []
     if not files:
         pytest.skip(f"no programs in {folder.name}: it is not on this machine")
