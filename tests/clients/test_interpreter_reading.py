@@ -124,7 +124,7 @@ def real_files():
     return sorted(small.values())  # each content once
 
 
-PARTS = 4
+PARTS = 3
 """Of the real files, for as many cores."""
 MANY = 3_000
 """Moves of a program that is read from one start alone."""

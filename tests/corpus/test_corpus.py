@@ -113,7 +113,7 @@ def row_of(path, dialect):
 
 
 HEAD = ["| file | dialect | rapids | rewritten | left alone |", "|---|---|---|---|---|"]
-PARTS = 6
+PARTS = 3
 """Of the programs, for as many cores."""
 ABSENT = pytest.mark.skipif(
     not programs(), reason="../shared is not here: no real programs to read"

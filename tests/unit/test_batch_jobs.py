@@ -61,7 +61,7 @@ def test_a_folder_is_processed_into_another_one_with_its_tree(shop, jobs):
 
 def test_a_second_run_over_a_folder_does_not_take_outputs_for_programs(shop):
     for _ in range(2):
-        done = process("shop", "--jobs", 2)
+        done = process("shop")
         assert done.returncode == 0
         assert done.stdout.splitlines()[-1].startswith("4 programs")
     assert len(files(shop)) == 8

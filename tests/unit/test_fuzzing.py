@@ -17,7 +17,7 @@ def load(name):
     return module
 
 
-PARTS = 2
+PARTS = 4
 """Of the inputs, for as many cores."""
 
 
