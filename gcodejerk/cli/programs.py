@@ -258,7 +258,7 @@ def inspect(
 ) -> None:
     """Show all rapids of a program: planned, or left alone and why."""
     from gcodejerk.batch.files import open_input
-    from gcodejerk.batch.jobs import record_of
+    from gcodejerk.batch.reports import record_of
     from gcodejerk.report.tables import rapids_table, summary_line, whole_line
     from gcodejerk.rewrite.pipeline import Settings, process_file
 

@@ -64,6 +64,7 @@ class LinuxcncController(LinuxcncSettings, Controller):
 
     name = "linuxcnc"
     play = Play.ALIGNED
+    joins = False
     unblended = "ABCUVW"
     forms = (
         Form(

@@ -36,7 +36,7 @@ def order(picture):
 
 ROOMS = {
     "": order("""
-    _version axes errors units reasons start advice storage
+    _version axes errors units reasons start advice storage spread
  <- nc | machine | motion
  <- cycles | unrolling | planning
  <- studies | parameters | verification | testing | identification | simulation
