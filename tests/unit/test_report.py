@@ -98,7 +98,7 @@ def test_report_of_a_large_program_says_the_same_line_by_line(machine, monkeypat
     )
     result, source = process(program, machine), io.BytesIO(program)
     whole = dump(reports.record_of(result, machine, "out", source))
-    monkeypatch.setattr(jobs, "FEW", 10)
+    monkeypatch.setattr(reports, "FEW", 10)
     monkeypatch.setattr(columns, "AT_ONCE", 17)
     monkeypatch.setattr(columns, "REMEMBERED", 5)
     plain, squeezed = io.BytesIO(), io.BytesIO()
