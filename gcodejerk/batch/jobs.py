@@ -152,7 +152,8 @@ def run_jobs(
     """
     if len(jobs) == 1:
         with Crew(workers) as crew:
-            yield run_job(jobs[0], machine, settings, progress, crew.map)
+            spread = here if workers == 1 else crew.map
+            yield run_job(jobs[0], machine, settings, progress, spread)
     elif workers == 1:
         for job in jobs:
             yield _run_whatever_happens(job, machine, settings, progress)

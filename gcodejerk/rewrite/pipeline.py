@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
@@ -259,15 +260,16 @@ def _process(
     design = replace(machine.design, profile=settings.profile or machine.design.profile)
     designed = replace(machine, design=design)
     collected, deviation = write_streams(writer, plans, designed, report, form, peaks, spread)
+    edits = writer.edits.finish()
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
         verification = _verified(
-            source, target, machine, settings, program, plans, emitter, lines, beside, report
-        )
+            source, target, machine, settings, program, plans, emitter, lines, beside, report,
+            spread, edits,
+        )  # fmt: skip
         report("verifying", 1, 1)
     what_if = entry_notes(source, program, machine.program_start())
-    edits = writer.edits.finish()
     differences = hunks(edits, program.rapids, program.insert_at, lines)
     program = in_original(program, written)
     return Result(
@@ -412,6 +414,8 @@ def _verified(
     lines: Lines | None,
     beside: BinaryIO | None,
     report: Progress,
+    spread: Spread = here,
+    edits: NDArray[np.int64] | None = None,
 ) -> Verification:
     """Read an output back; whatever is wrong with it is raised, in lines of the original."""
     source.seek(0)
@@ -429,6 +433,9 @@ def _verified(
             beside=beside if emitter.beside else None,
             program=program,
             progress=lambda done, total: report("verifying", done, total),
+            # One process reads the files as a whole: that is the plainer proof.
+            spread=None if spread is here else spread,
+            edits=edits,
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):

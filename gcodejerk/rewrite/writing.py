@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.threads import one_thread
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.pvt import make_rows
 from gcodejerk.planning.stream import Residuals, moves_of_windows
@@ -67,7 +68,8 @@ def write_streams(
     writer.write_header(machine)
     if form is None:
         streams = _Streams(writer, plans, machine, report)
-        streams.write(spread)
+        with one_thread():  # matrices are small
+            streams.write(spread)
         return streams.collected, streams.deviation
     collected, deviation = Residuals(plans), column(len(plans), 0.0)
     planned, rapids = kept(np.flatnonzero(plans.planned)), writer.program.rapids

@@ -74,7 +74,8 @@ ROOMS = {
     findings
  <- bytes
  <- physics | second_reading
- <- cycles unrolling | table samples settings | rows | reported
+ <- cycles unrolling | table samples settings | rows | reported | streams
+ <- sections
  <- proof
 """),
 }
