@@ -20,6 +20,7 @@ from gcodejerk.rewrite import pieces
 from gcodejerk.rewrite.pipeline import Settings, process_file
 from gcodejerk.spread import here
 from gcodejerk.verification import proof, sections
+from gcodejerk.verification.bytes.source import Window
 
 VMC = Machine.load(find_machine("vmc"))
 ROUTER = Machine.load(find_machine("router"))
@@ -128,6 +129,13 @@ def edited(data, controller="linuxcnc"):
     return target.getvalue(), result.edits
 
 
+def summed(output):
+    """An output with the sum that is its own."""
+    window = Window(io.BytesIO(output))
+    window.take(len(output))
+    return output.replace(window.claimed.encode(), window.sum.encode(), 1)
+
+
 def judged(data, output, edits, controller="linuxcnc"):
     machine = replace(VMC, controller=controller)
     files = io.BytesIO(data), io.BytesIO(output)
@@ -153,13 +161,15 @@ def test_sections_find_what_the_whole_does(controller, small, monkeypatch):
     assert said.pop() is not None
     # A digit of any place, a line taken out, one put in twice, text behind the end.
     rng = np.random.default_rng(3)
+    at = output.index(b"sum:") + 4
     damages = [output + b"G0 X1\n", output[:-3]]
+    damages.append(output[:at] + (b"1" if output[at] == ord("0") else b"0") + output[at + 1 :])
     for at in rng.integers(0, len(output), 4).tolist():
         line = slice(output.rfind(b"\n", 0, at) + 1, output.find(b"\n", at) + 1)
         text = output[line]
         digit = re.sub(rb"\d", lambda m: b"%d" % ((int(m[0]) + 1) % 10), text, count=1)
         for new in (b"", text * 2, digit):
-            damages.append(output[: line.start] + new + output[line.stop :])
+            damages.append(summed(output[: line.start] + new + output[line.stop :]))
     for damaged in damages:
         shifted = edits.copy()
         shifted[shifted[:, 0] > len(damaged) // 2, :2] += len(damaged) - len(output)
@@ -176,6 +186,7 @@ def test_wrong_hints_prove_nothing_and_hide_nothing(small):
     # One stream is another's: wherever files are cut, somebody has to see it.
     (a, b, _), (c, d, _) = edits[8], edits[15]
     swapped = output[:a] + output[c:d] + output[b:c] + output[a:b] + output[d:]
+    swapped = summed(swapped)
     expected = judged(data, swapped, None)
     assert not expected.ok
     for _ in range(6):
@@ -184,6 +195,32 @@ def test_wrong_hints_prove_nothing_and_hide_nothing(small):
         hint = hint[rng.random(len(hint)) < 0.8]
         assert judged(data, output, hint) == whole
         assert judged(data, swapped, hint) == expected
+
+
+def test_what_a_section_takes_for_granted_has_to_be_found_in_front_of_it(small, monkeypatch):
+    """Behind a rapid that is left alone a stream has to rest first; a hint may deny that."""
+    hole = b"G0 X%d Y%d\nG1 Z-3\nG0 Z5\nG0 Z4.99\n"
+    data = b"G21 G90 G94 G17 G40 G64\nG0 X0 Y0 Z5\nF100\n"
+    data += b"".join(hole % (-9 * k - k * k, -7 * k) for k in range(40))
+    output, edits = edited(data, "grbl")
+    edits = edits[[output.startswith(b"(gcodejerk: G0 X", at) for at in edits[:, 0]]]
+    cuts_of, cuts, denied = sections._cuts, [], []
+
+    def denying(*given):
+        found = cuts_of(*given)
+        cuts.extend(found[1:, 1].tolist())
+        found[np.isin(found[:, 1], denied), 2] = 1
+        return found
+
+    monkeypatch.setattr(sections, "_cuts", denying)
+    assert judged(data, output, edits, "grbl").ok
+    rests = [at for at in cuts if b"\nG4 P0\n" in output[at : at + 60]]
+    assert rests
+    for at in rests[:3]:
+        denied[:] = [at]
+        without = output[:at] + output[at:].replace(b"G4 P0\n", b"", 1)
+        moved = edits - len(b"G4 P0\n") * (edits > at) * np.array([1, 1, 0])
+        assert not judged(data, summed(without), moved, "grbl").ok
 
 
 def test_the_death_of_one_writes_nothing(tmp_path):
