@@ -2,8 +2,14 @@
 
 import io
 import multiprocessing
+import os
 import re
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -235,3 +241,36 @@ def test_the_death_of_one_writes_nothing(tmp_path):
     done = run_job(job, VMC, Settings(), None, dying)
     assert "the process that worked on it died (signal 9)" in done.error
     assert [path.name for path in tmp_path.iterdir()] == ["part.nc"]
+
+
+def children(pid):
+    """Processes that work for another."""
+    try:
+        found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        return [int(k) for k in found if b"spawn_main" in Path(f"/proc/{k}/cmdline").read_bytes()]
+    except OSError:
+        return []
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="no /proc to see processes in")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_run_that_is_cut_leaves_nothing_half_written_and_nobody_behind(tmp_path, number):
+    (tmp_path / "part.nc").write_bytes(program(500))
+    command = [sys.executable, "-m", "gcodejerk.cli", "process", "part.nc", "-m", "vmc"]
+    run = subprocess.Popen(
+        [*command, "--jobs", "2"], cwd=tmp_path, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while not (mates := children(run.pid)):
+        assert run.poll() is None, "it never took a second process"
+        time.sleep(0.02)
+    if number == signal.SIGINT:  # as a terminal does, to all
+        os.killpg(run.pid, number)
+    else:
+        os.kill(mates[0], number)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == (130 if number == signal.SIGINT else 1)
+    assert "Traceback" not in err
+    assert ("died (signal 9)" in err) == (number == signal.SIGKILL)
+    assert [path.name for path in tmp_path.iterdir()] == ["part.nc"]
+    assert not any(Path(f"/proc/{mate}").exists() for mate in mates)
