@@ -69,7 +69,7 @@ def process(
             help="write a report: .html to look at, .json(.gz) for programs; DIR/: one for each",
         ),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
+    jobs: Annotated[int, typer.Option(min=1, help="processes that work at a time, on many programs or a large one")] = 1,
     strict: Annotated[
         bool,
         typer.Option(

@@ -264,6 +264,7 @@ def test_a_run_that_is_cut_leaves_nothing_half_written_and_nobody_behind(tmp_pat
     while not (mates := children(run.pid)):
         assert run.poll() is None, "it never took a second process"
         time.sleep(0.02)
+    time.sleep(0.3)  # while it starts somebody, it does not listen
     if number == signal.SIGINT:  # as a terminal does, to all
         os.killpg(run.pid, number)
     else:
