@@ -141,7 +141,7 @@ def run_jobs(
     settings : Settings
         The user's choices.
     workers : int
-        How many are worked on at a time.
+        How many processes work at a time: on a program each, or all on one if that is alone.
     progress : callable or None
         See `pipeline.Progress`; where several work at a time, it counts the programs.
 

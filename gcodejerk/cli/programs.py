@@ -69,7 +69,9 @@ def process(
             help="write a report: .html to look at, .json(.gz) for programs; DIR/: one for each",
         ),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="processes that work at a time, on many programs or a large one")] = 1,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="processes at work, on many programs or on a large one")
+    ] = 1,
     strict: Annotated[
         bool,
         typer.Option(
