@@ -158,9 +158,8 @@ class Crew:
 
     def _collect(self, answers: dict[int, _Answer], timeout: float | None) -> None:
         """Take the answers that are there."""
-        by_pipe = {mate.pipe: mate for mate in self.mates if mate.in_hand}
+        by_pipe: dict[Any, _Mate] = {mate.pipe: mate for mate in self.mates if mate.in_hand}
         for pipe in wait(list(by_pipe), timeout) if by_pipe else ():
-            assert isinstance(pipe, Connection)
             number, index, answer = by_pipe[pipe].answer()
             if index != _HELLO and number == self._round:
                 answers[index] = answer
