@@ -36,7 +36,7 @@ from gcodejerk.storage import column, gathered, kept
 
 WINDOW_SAMPLES = 400_000
 """Samples of a window, about."""
-BATCH_SAMPLES, BATCH_MOVES = 1 << 17, 2048
+BATCH_SAMPLES, BATCH_MOVES = 1 << 18, 2048
 """Samples of a batch at most, some 100 bytes each while it is worked on; and its moves."""
 FINE_DECIMALS = 3
 """Decimals more than the resolution's for an axis that moves a few steps only."""
