@@ -34,6 +34,8 @@ IN_HAND = 2
 """Pieces that a mate has at a time, so that none waits for its master."""
 AHEAD = 4
 """Pieces, for each of the crew, that are asked for ahead of the answers that were taken."""
+_STAYS = pickle.PicklingError, AttributeError, TypeError
+"""Raised for what cannot be pickled."""
 _HELLO = -1
 """In the place of a piece's index: the mate has imported what it needs."""
 
@@ -119,9 +121,7 @@ class Crew:
                     handed += 1
                     continue
                 handed += 1
-                if mate is not None:
-                    mate.give(self._round, index, function, piece)
-                else:
+                if mate is None or not mate.give(self._round, index, function, piece):
                     answers[index] = self._done_here(function, piece)
             elif given in answers:
                 yield answers.pop(given).taken()
@@ -136,7 +136,7 @@ class Crew:
         begin = time.process_time()
         answer = _tried(function, piece)
         self._spent += time.process_time() - begin
-        if self._spent > self.pays and not self.mates:
+        if self._spent > self.pays and not self.mates and _travels(function):
             self.call(function)
         return answer
 
@@ -178,15 +178,18 @@ class _Mate:
         self.ready = False
         self._function: Callable[[Any], Any] | None = None
 
-    def give(self, number: int, index: int, function: Callable[[Any], Any], piece: object) -> None:
-        """Hand it a piece, and the function where it is another one."""
+    def give(self, number: int, index: int, function: Callable[[Any], Any], piece: object) -> bool:
+        """Hand it a piece, and the function where it is another one; whether these can travel."""
         new = None if function is self._function else function
         try:
             self.pipe.send((number, index, new, piece))
         except OSError:
             raise LostError(self.end()) from None
+        except _STAYS:
+            return False
         self._function = function
         self.in_hand += 1
+        return True
 
     def answer(self) -> tuple[int, int, _Answer]:
         """Take an answer."""
@@ -206,6 +209,15 @@ class _Mate:
             self.process.kill()
             self.process.join()
         return self.process.exitcode
+
+
+def _travels(function: Callable[[Any], Any]) -> bool:
+    """Whether other processes can be told of a function; somebody else's emitter may say no."""
+    try:
+        pickle.dumps(function)
+    except _STAYS:
+        return False
+    return True
 
 
 def _tried(function: Callable[[Any], Any], piece: object) -> _Answer:

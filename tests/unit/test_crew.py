@@ -32,9 +32,8 @@ def values(answers):
 
 
 @pytest.fixture
-def crew(monkeypatch):
+def crew():
     """Two of them, both at work from the first piece on."""
-    monkeypatch.setattr(module, "PAYS", -1.0)
     with Crew(2) as crew:
         crew.call(act)
         crew.wait_for_all()
@@ -95,6 +94,15 @@ def test_the_death_of_one_is_told(crew):
     with pytest.raises(LostError) as lost:
         list(crew.map(act, [("die", signal.SIGKILL)] * 9))
     assert lost.value.status == -signal.SIGKILL
+
+
+def test_what_cannot_travel_is_done_at_home(crew):
+    for act_here in (lambda piece: piece[1], lambda piece: -piece[1]):
+        assert list(crew.map(act_here, [("", k) for k in range(9)]))[1] in (1, -1)
+    assert values(crew.map(act, [("", k) for k in range(9)])) == list(range(9))
+    with Crew(2, pays=-1.0) as other:
+        assert list(other.map(lambda piece: piece, [1, 2])) == [1, 2]
+        assert not other.mates
 
 
 def test_nobody_is_started_where_it_does_not_pay():

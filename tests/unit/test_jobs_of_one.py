@@ -46,7 +46,6 @@ def program(holes):
 def crew():
     """Three that work together from the first piece on."""
     with pytest.MonkeyPatch.context() as patch, Crew(3) as crew:
-        patch.setattr(module, "PAYS", -1.0)
         crew.call(abs)
         crew.wait_for_all()
         answer = module._Mate.answer
