@@ -28,7 +28,7 @@ from gcodejerk.errors import GcodejerkError
 from gcodejerk.motion.threads import one_thread
 from gcodejerk.spread import In, Out, here
 
-PAYS = 1.0
+PAYS = 0.5
 """Work in pieces after which others are called, about what it takes to start one [s]."""
 IN_HAND = 2
 """Pieces that a mate has at a time, so that none waits for its master."""
