@@ -199,6 +199,8 @@ def _cuts(edits: NDArray[np.int64], program: Program) -> NDArray[np.int64]:
     none = np.zeros((0, 3), dtype=np.int64)
     if len(rows) < 2 or (np.diff(begin) <= 0).any() or (np.diff(rapid) <= 0).any():
         return none
+    if begin[0] < 0 or rapid[-1] >= len(program.rapids):
+        return none
     chosen = np.flatnonzero(np.diff(begin // SECTION, prepend=0))
     chosen = chosen[chosen > 0]
     follows = rapid[chosen] - rapid[chosen - 1] == 1

@@ -194,6 +194,9 @@ def test_wrong_hints_prove_nothing_and_hide_nothing(small):
     swapped = summed(swapped)
     expected = judged(data, swapped, None)
     assert not expected.ok
+    beyond = edits.copy()
+    beyond[-1, 2] = 10**6
+    assert judged(data, output, beyond) == whole
     for _ in range(6):
         hint = edits.copy()
         hint[:, rng.integers(0, 3)] += rng.integers(-40, 40, len(hint))
