@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import tempfile
 import traceback
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,6 +21,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from gcodejerk.batch.crew import Crew, LostError
 from gcodejerk.batch.current import is_current
 from gcodejerk.batch.files import (
     STANDARD,
@@ -34,21 +35,20 @@ from gcodejerk.batch.files import (
     version,
 )
 from gcodejerk.batch.originals import keep
+from gcodejerk.batch.reports import write_report
 from gcodejerk.batch.workers import map_jobs
 from gcodejerk.errors import EmitError, GcodejerkError
 from gcodejerk.machine import Machine
-from gcodejerk.planning.designs import known_limits
 from gcodejerk.reasons import REASONS
-from gcodejerk.report.columns import FEW, PACKED, packed, write_rapids
+from gcodejerk.report.columns import PACKED, packed
 from gcodejerk.report.difference import difference
 from gcodejerk.report.page.document import is_page, write_page
-from gcodejerk.report.records import Record, dump, process_record, summary_of
+from gcodejerk.report.records import Record, summary_of
 from gcodejerk.report.tables import summary_line, whole_line
-from gcodejerk.report.tuning_record import settings_record
-from gcodejerk.rewrite.pipeline import Progress, Settings, process_file, silent
+from gcodejerk.rewrite.pipeline import Progress, Settings, process_file
 from gcodejerk.rewrite.result import Result
 from gcodejerk.rewrite.rewriter import changed_error
-from gcodejerk.storage import windows
+from gcodejerk.spread import Spread, here
 
 FIRST_LINES = 12
 """Of rapids that were left alone, for each reason."""
@@ -141,7 +141,7 @@ def run_jobs(
     settings : Settings
         The user's choices.
     workers : int
-        How many are worked on at a time.
+        How many processes work at a time: on a program each, or all on one if that is alone.
     progress : callable or None
         See `pipeline.Progress`; where several work at a time, it counts the programs.
 
@@ -151,7 +151,9 @@ def run_jobs(
         One for each job.
     """
     if len(jobs) == 1:
-        yield run_job(jobs[0], machine, settings, progress)
+        with Crew(workers) as crew:
+            spread = here if workers == 1 else crew.map
+            yield run_job(jobs[0], machine, settings, progress, spread)
     elif workers == 1:
         for job in jobs:
             yield _run_whatever_happens(job, machine, settings, progress)
@@ -164,12 +166,20 @@ def run_jobs(
                     progress("programs", number, len(jobs))
 
 
-def run_job(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
+def run_job(
+    job: Job,
+    machine: Machine,
+    settings: Settings,
+    progress: Progress | None,
+    spread: Spread = here,
+) -> Done:
     """Process one program; a user's mistake, or the system's refusal, becomes a message."""
     try:
-        return _run(job, machine, settings, progress)
+        return _run(job, machine, settings, progress, spread)
     except BrokenPipeError:
         raise
+    except LostError as error:
+        return _lost(job, error.status)
     except GcodejerkError as error:
         return Done(job.called, error=str(error))
     except MemoryError:
@@ -203,7 +213,9 @@ def _lost(job: Job, status: int | None) -> Done:
     return Done(job.called, error=str(lost))
 
 
-def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | None) -> Done:
+def _run(
+    job: Job, machine: Machine, settings: Settings, progress: Progress | None, spread: Spread
+) -> Done:
     _refuse_overwriting(job, machine)
     writes = job.mode == "write"
     if job.if_changed and writes:
@@ -219,7 +231,7 @@ def _run(job: Job, machine: Machine, settings: Settings, progress: Progress | No
         done: Done | None = None
         files = _opened(job, stack, lambda: done is None or done.changed or not keeps)
         result = process_file(
-            source, files.target, machine, settings, job.called, progress, files.beside
+            source, files.target, machine, settings, job.called, progress, files.beside, spread
         )
         _refuse_if_strict(job, result)
         _write_report(job, files, result, machine, source, progress)
@@ -328,76 +340,6 @@ def _left_at(result: Result) -> tuple[tuple[str, tuple[int, ...], int], ...]:
         )
         for k in np.argsort(-counts, kind="stable").tolist()
     )
-
-
-def write_report(
-    file: BinaryIO,
-    result: Result,
-    machine: Machine,
-    output: str | None,
-    source: BinaryIO,
-    progress: Progress | None = None,
-) -> None:
-    """Write the JSON report on a result; parameters as for `record_of`."""
-    if len(result.plans) <= FEW:
-        file.write(dump(record_of(result, machine, output, source, progress)))
-        return
-    report = progress or silent
-    limit = known_limits(result.plans, lambda done, total: report("bounds", done, total))
-    more = {} if result.settings is None else settings_record(result.settings)
-    write_rapids(
-        file, result, machine, output, _blocks(result, source), limit, more,
-        lambda done, total: report("reporting", done, total),
-    )  # fmt: skip
-
-
-def _blocks(result: Result, source: BinaryIO) -> Iterator[str]:
-    """The text of each rapid's block."""
-    rapids = result.program.rapids
-    for part in windows(len(rapids)):
-        places = zip(rapids.begin[part].tolist(), rapids.end[part].tolist(), strict=True)
-        for begin, end in places:
-            source.seek(begin)
-            yield source.read(end - begin).decode("latin-1").strip()
-
-
-def record_of(
-    result: Result,
-    machine: Machine,
-    output: str | None,
-    source: BinaryIO,
-    progress: Progress | None = None,
-    bounds: bool = True,
-) -> Record:
-    """The report on a result, with the text of each rapid's block read from the source.
-
-    Parameters
-    ----------
-    result : Result
-        Of `process_file`.
-    machine : Machine
-        What it was processed for.
-    output : str or None
-        Name of the file that was written.
-    source : binary file
-        The program.
-    progress : callable, optional
-        See `pipeline.Progress`.
-    bounds : bool
-        Whether to compute the limit of each rapid, which takes some 10 ms for each distinct one.
-
-    Returns
-    -------
-    dict
-        Section 4 of the contract.
-    """
-    blocks = list(_blocks(result, source))
-    limit = None
-    if bounds:
-        report = progress or silent
-        limit = known_limits(result.plans, lambda done, total: report("bounds", done, total))
-    record = process_record(result, machine, output, blocks, limit)
-    return record if result.settings is None else record | settings_record(result.settings)
 
 
 def _refuse_overwriting(job: Job, machine: Machine) -> None:

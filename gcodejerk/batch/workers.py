@@ -23,7 +23,7 @@ In = TypeVar("In")
 Out = TypeVar("Out")
 
 # A fork would copy the locks of numpy's threads as they happen to stand.
-_CONTEXT = multiprocessing.get_context("spawn")
+CONTEXT = multiprocessing.get_context("spawn")
 PATIENCE = 5.0
 """Time that a worker has to put its things away. [s]"""
 
@@ -92,9 +92,9 @@ class _Worker(Generic[In, Out]):
 
     def _start_process(self) -> None:
         """Start the process, or another one in the place of a dead one."""
-        self.pipe, theirs = _CONTEXT.Pipe()
-        self.process = _CONTEXT.Process(target=_work, args=(theirs, self.function), daemon=True)
-        with _deaf_to_ctrl_c():
+        self.pipe, theirs = CONTEXT.Pipe()
+        self.process = CONTEXT.Process(target=_work, args=(theirs, self.function), daemon=True)
+        with deaf_to_ctrl_c():
             self.process.start()
         theirs.close()
 
@@ -119,7 +119,7 @@ class _Worker(Generic[In, Out]):
 
 
 @contextlib.contextmanager
-def _deaf_to_ctrl_c() -> Iterator[None]:
+def deaf_to_ctrl_c() -> Iterator[None]:
     """What is started here ignores SIGINT from its first moment on."""
     if threading.current_thread() is not threading.main_thread():
         yield

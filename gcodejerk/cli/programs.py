@@ -69,7 +69,9 @@ def process(
             help="write a report: .html to look at, .json(.gz) for programs; DIR/: one for each",
         ),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="programs worked on at a time")] = 1,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="processes at work, on many programs or on a large one")
+    ] = 1,
     strict: Annotated[
         bool,
         typer.Option(
@@ -258,7 +260,7 @@ def inspect(
 ) -> None:
     """Show all rapids of a program: planned, or left alone and why."""
     from gcodejerk.batch.files import open_input
-    from gcodejerk.batch.jobs import record_of
+    from gcodejerk.batch.reports import record_of
     from gcodejerk.report.tables import rapids_table, summary_line, whole_line
     from gcodejerk.rewrite.pipeline import Settings, process_file
 

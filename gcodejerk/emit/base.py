@@ -92,8 +92,15 @@ class Controller(ABC):
     """Samples of the longest move that it can write."""
     repeats: bool = False
     """Where blocks, modes, ways and places of two streams are the same, their texts are."""
+    joins: bool = True
+    """Its texts depend on whether the line right in front has a stream."""
     between: bytes = b""
     """What stands between two moves of a file of its own."""
+
+    @property
+    def apart(self) -> bool:
+        """Texts depend on rows and blocks alone, not on which of the program they are."""
+        return self.repeats
 
     def in_form(self, form: str) -> Controller:
         """The emitter for one of its forms.

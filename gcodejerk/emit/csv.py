@@ -29,6 +29,8 @@ class CsvController(Controller):
 
     name = "csv"
     in_place = False
+    joins = False
+    apart = True
     suffix = ".csv"
     forms = PvtTableController.forms
 

@@ -21,6 +21,8 @@ from gcodejerk.units import MM_PER_INCH
 
 COMMENT_LENGTH = 69
 """Controllers and senders with short lines choke on longer comments."""
+_SHOWN = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in range(256))
+"""Characters as comments have them."""
 
 
 class Frame:
@@ -72,7 +74,7 @@ class Frame:
         """`(gcodejerk: ...)` with the words of the block, in at most COMMENT_LENGTH characters."""
         opens, closes = self.writing.comment
         words = b" ".join(b"".join(w.text.split()) for w in self.block.words)
-        shown = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in words)
+        shown = words.translate(_SHOWN)
         room = COMMENT_LENGTH - len(opens + b"gcodejerk: " + closes)
         if len(shown) > room:
             shown = shown[: room - 3] + b"..."

@@ -64,6 +64,7 @@ class LinuxcncController(LinuxcncSettings, Controller):
 
     name = "linuxcnc"
     play = Play.ALIGNED
+    joins = False
     unblended = "ABCUVW"
     forms = (
         Form(
@@ -109,7 +110,14 @@ class LinuxcncController(LinuxcncSettings, Controller):
         feed = _feeds(batch, rapids)
         guard = batch.plans.machine.controller_options.override_guard
         out = []
-        every = [_Points(batch, rapids, row, feed[row]) for row in range(len(batch))]
+        way = batch.plans.displacement[batch.moves]
+        leading = leading_axis(way[:, : len(LINEAR)]).tolist()
+        # Every row begins with zeros, the last of which is the start.
+        starts = ((batch.grid.knots > 0).argmax(axis=1) - 1).tolist()
+        every = [
+            _Points(batch, rapids, row, feed[row], *more)
+            for row, more in enumerate(zip(way, leading, starts, strict=True))
+        ]
         texts = _texts(every, ends)
         for row, move in enumerate(batch.moves.tolist()):
             block = parse_block(blocks[row], options.dialect)
@@ -235,17 +243,25 @@ def _feeds(batch: Batch, rapids: Rapids) -> NDArray[np.int64]:
 class _Points:
     """The points of one move as text."""
 
-    def __init__(self, batch: Batch, rapids: Rapids, row: int, feed: NDArray[np.int64]) -> None:
+    def __init__(
+        self,
+        batch: Batch,
+        rapids: Rapids,
+        row: int,
+        feed: NDArray[np.int64],
+        way: NDArray[np.float64],
+        leading: int,
+        first: int,
+    ) -> None:
         move = batch.moves[row]
         self.inch = bool(rapids.inch[move])
         self.incremental = bool(rapids.incremental[move])
         self.decimals = INCH_DECIMALS if self.inch else DECIMALS
-        moving = batch.plans.displacement[move] != 0.0
-        self.axes = np.flatnonzero(moving).tolist()
-        self.leading = int(leading_axis(batch.plans.displacement[[move], : len(LINEAR)])[0])
-        self.sign = int(np.sign(batch.plans.displacement[move, self.leading]))
-        first = int(np.flatnonzero(batch.grid.knots[row] > 0)[0]) - 1
-        scale = {a: 2 if rapids.diameter[move] and AXES[a] == "X" else 1 for a in self.axes}
+        self.axes = way.nonzero()[0].tolist()
+        self.leading = leading
+        self.sign = 1 if way[leading] > 0.0 else -1
+        diameter = bool(rapids.diameter[move])
+        scale = {a: 2 if diameter and AXES[a] == "X" else 1 for a in self.axes}
         self.whole = {a: batch.whole[a][row, first:] * scale[a] for a in self.axes}
         self.scale = scale[self.leading]
         self.feed = feed[first + 1 :]

@@ -34,6 +34,7 @@ from gcodejerk.motion.search.unit_move import Move, Optimum, optimum_profiles
 from gcodejerk.planning.optima import Progress, Question, answers
 from gcodejerk.planning.plans import Plans, same_rows
 from gcodejerk.planning.task import Task, worst_in_band
+from gcodejerk.spread import here
 from gcodejerk.storage import gathered
 
 ALLOWED = 0.97
@@ -48,6 +49,8 @@ NEXT_TO_NOTHING, SETTLED = 0.01, 0.1
 the tolerance, whichever is more; but what can be settled on arrival, is."""
 NOTHING = 1e-3
 """A bound is 0 where no more than this share of today's residual can be left over the band."""
+AT_ONCE = 128
+"""Moves that are searched together, by whoever has time."""
 COARSE = 24
 """Moves of so few intervals may gain from segments that end between them."""
 
@@ -131,11 +134,16 @@ def _searched(task: Task, search: Search) -> tuple[Profiles, Array]:
         remembered.clear()
     new = np.array([k for k, key in enumerate(keys) if key not in remembered], dtype=np.intp)
     few = task.take(first[new])
-    for index, longest in few.alike():
-        own = few.take(index)
-        own = replace(own, objective=own.objective.excited())
-        looked_at = own.objective.in_band(task.band, longest, SEARCHED, FEWEST)
-        found, feasible = search(own, looked_at)
+    pieces = [
+        (index[begin : begin + AT_ONCE], longest)
+        for index, longest in few.alike()
+        for begin in range(0, len(index), AT_ONCE)
+    ]
+    alone = replace(few, progress=None, spread=here)
+    answers = task.spread(
+        partial(_found, search), ((alone.take(index), longest) for index, longest in pieces)
+    )
+    for (index, _), (found, feasible) in zip(pieces, answers, strict=True):
         for row, k in enumerate(new[index]):
             own_profile = found.take(slice(row, row + 1))
             remembered[keys[k]] = own_profile if feasible[row] else None
@@ -149,6 +157,13 @@ def _searched(task: Task, search: Search) -> tuple[Profiles, Array]:
         profiles = profiles.replaced(judged, chosen)
         worst[judged] = worst_in_band(task.take(judged), chosen)
     return profiles, worst
+
+
+def _found(search: Search, piece: tuple[Task, float]) -> tuple[Profiles, NDArray[np.bool_]]:
+    """What a search finds for moves that excite the same modes and take no longer than a time."""
+    task, longest = piece
+    own = replace(task, objective=task.objective.excited())
+    return search(own, own.objective.in_band(task.band, longest, SEARCHED, FEWEST))
 
 
 @cache

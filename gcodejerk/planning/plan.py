@@ -34,6 +34,7 @@ from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.refusals import limit_error, time_error
 from gcodejerk.planning.task import Task, worst_at_arrival, worst_in_band
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.spread import Spread, here
 
 PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
@@ -57,6 +58,7 @@ def plan_moves(
     speed: Array | None = None,
     lone: NDArray[np.bool_] | None = None,
     as_today: bool = False,
+    spread: Spread = here,
 ) -> Plans:
     """Plan moves, all of them together.
 
@@ -84,6 +86,8 @@ def plan_moves(
     as_today : bool, optional
         Profile `conventional` as the controller has it, also where a stream could not be written
         within the limits: to look at, not to emit.
+    spread : Spread, optional
+        Who searches.
 
     Returns
     -------
@@ -128,6 +132,7 @@ def plan_moves(
         progress=progress,
         speed=speed,
         lone=lone,
+        spread=spread,
     ).run()
 
 
@@ -151,6 +156,7 @@ class _Planner:
     progress: InitVar[Progress | None]
     speed: InitVar[Array | None]
     lone: InitVar[NDArray[np.bool_] | None]
+    spread: InitVar[Spread]
     modes: Modes = field(init=False)
     interval: float = field(init=False)
     move: NDArray[np.int64] = field(init=False)
@@ -162,7 +168,11 @@ class _Planner:
     """What the profiles' moves leave at worst over the band, and what today's do [mm]."""
 
     def __post_init__(
-        self, progress: Progress | None, speed: Array | None, lone: NDArray[np.bool_] | None
+        self,
+        progress: Progress | None,
+        speed: Array | None,
+        lone: NDArray[np.bool_] | None,
+        spread: Spread,
     ) -> None:
         self.modes, self.interval = Modes.of(self.machine), self.machine.interval
         rows = np.nonzero(self.reason == CERTAIN)[0]
@@ -176,8 +186,9 @@ class _Planner:
         cap = None if speed is None else speed[self.move] / self.length[self.move]
         alone = None if lone is None else lone[self.move]
         self.task = Task.of(
-            self.machine, self.modes, self.share, progress=progress, speed=cap, lone=alone
-        )
+            self.machine, self.modes, self.share,
+            progress=progress, speed=cap, lone=alone, spread=spread,
+        )  # fmt: skip
         self.limits, self.conventional = self.task.limits, self.task.conventional
 
     def run(self) -> Plans:

@@ -218,6 +218,28 @@ class Plans:
             lasting=None if self.lasting is None else gathered(self.lasting, index),
         )
 
+    def part(self, rows: NDArray[np.int64], own: NDArray[np.bool_]) -> Plans:
+        """Some of the moves, rising, as a window by itself, with the profiles of `own` alone."""
+        begin, end = (np.searchsorted(self.move, rows, side=side) for side in ("left", "right"))
+        count = np.where(own, end - begin, 0)
+        move = np.repeat(np.arange(len(rows)), count)
+        chosen = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(move))
+        columns = (
+            *("reason", "displacement", "length", "conventional_time", "counts"),
+            *("worst_in_band", "most_in_band"),
+        )
+        taken: dict[str, Any] = {name: getattr(self, name)[rows] for name in columns}
+        return replace(
+            self,
+            **taken,
+            move=move,
+            share=self.share[chosen],
+            profiles=self.profiles.take(chosen),
+            conventional=self.conventional.take(chosen),
+            profile_counts=self.profile_counts[chosen],
+            lasting=None if self.lasting is None else self.lasting[rows],
+        )
+
 
 def _same_or(
     share: Array, rows: NDArray[np.int64], displacement: Array, move: NDArray[np.int64]

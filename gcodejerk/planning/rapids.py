@@ -19,6 +19,7 @@ from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plan import PROFILES, plan_moves, rule_out
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length, same_rows
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.spread import Spread, here
 from gcodejerk.storage import column, windows
 
 FARTHEST = 1e8
@@ -32,6 +33,7 @@ def plan_rapids(
     progress: Progress | None = None,
     unblended: str = "",
     only_gains: bool = False,
+    spread: Spread = here,
 ) -> Plans:
     """Plan the rapids of a program, all of them together.
 
@@ -49,6 +51,8 @@ def plan_rapids(
         Axes whose rapids are left alone, since the controller stops between their blocks.
     only_gains : bool, optional
         Leave all rapids alone where nothing is known to vibrate, so that nothing can be gained.
+    spread : Spread, optional
+        Who searches.
 
     Returns
     -------
@@ -77,7 +81,7 @@ def plan_rapids(
     first, like = same_rows(displacement, rapids.speed, reason, rapids.lone)
     plans = plan_moves(
         displacement[first], machine, profile, reason=reason[first], progress=progress,
-        speed=rapids.speed[first], lone=rapids.lone[first],
+        speed=rapids.speed[first], lone=rapids.lone[first], spread=spread,
     )  # fmt: skip
     return plans if len(first) == len(rapids) else plans.repeated(like)
 

@@ -30,13 +30,14 @@ from gcodejerk.planning.lines import (
     smoothed,
 )
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.pvt import Rows
 from gcodejerk.planning.records import without_pauses
 from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.storage import column, gathered, kept
 
-BATCH_SAMPLES = 400_000
-"""Samples of a batch, about; each needs some 100 bytes while it is worked on."""
+WINDOW_SAMPLES = 400_000
+"""Samples of a window, about."""
+BATCH_SAMPLES, BATCH_MOVES = 1 << 18, 2048
+"""Samples of a batch at most, some 100 bytes each while it is worked on; and its moves."""
 FINE_DECIMALS = 3
 """Decimals more than the resolution's for an axis that moves a few steps only."""
 FEW_STEPS = 8.0
@@ -91,6 +92,15 @@ def stream_windows(
 
     Batches have to be taken before the next window is; a window may have none.
     """
+    for window in moves_of_windows(plans, like):
+        made = (make_batch(plans, moves, number_format, stride, play, like) for moves in window)
+        yield (batch for batch in made if len(batch))
+
+
+def moves_of_windows(
+    plans: Plans, like: NDArray[np.int64] | None = None
+) -> Iterator[list[NDArray[np.int64]]]:
+    """The moves of the batches of each window; parameters as for `make_streams`."""
     planned = np.nonzero(plans.planned)[0]
     if like is not None:
         planned = planned[like[planned] == planned]
@@ -98,19 +108,20 @@ def stream_windows(
     begin = 0
     while begin < len(planned):
         before = samples[begin - 1] if begin else 0
-        end = max(begin + 1, int(np.searchsorted(samples, before + BATCH_SAMPLES, side="right")))
+        end = max(begin + 1, int(np.searchsorted(samples, before + WINDOW_SAMPLES, side="right")))
         window = planned[begin:end]
         # Of like duration: within a factor of two.
         octave = np.frexp(plans.counts[window].astype(float))[1]
-        made = (
-            _make_batch(plans, moves, number_format, stride, play, like)
-            for moves in (window[octave == k] for k in np.unique(octave))
-        )
-        yield (batch for batch in made if len(batch))
+        batches: list[NDArray[np.int64]] = []
+        for k in np.unique(octave):
+            moves = window[octave == k]
+            most = min(max(BATCH_SAMPLES >> int(k), 1), BATCH_MOVES)
+            batches += (moves[at : at + most] for at in range(0, len(moves), most))
+        yield batches
         begin = end
 
 
-def _make_batch(
+def make_batch(
     plans: Plans,
     moves: NDArray[np.int64],
     number_format: NumberFormat,
@@ -247,10 +258,9 @@ class Residuals:
         self.residual = column(shape, np.nan)
         self.conventional = column(shape, np.nan)
 
-    def add(self, batch: Batch | Rows) -> None:
-        """Note one batch."""
-        self.residual[batch.moves] = batch.residual
-        self.conventional[batch.moves] = batch.conventional_residual
+    def note(self, moves: NDArray[np.int64], residual: Array, conventional: Array) -> None:
+        """Note some moves."""
+        self.residual[moves], self.conventional[moves] = residual, conventional
 
     def repeat(self, like: NDArray[np.int64]) -> None:
         """Note of all moves what was found of those that have the very streams."""

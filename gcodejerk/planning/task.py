@@ -28,6 +28,7 @@ from gcodejerk.motion.search.rows import parts
 from gcodejerk.planning.conventional import conventional_limits, todays_profiles, unit_limits
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import Modes
+from gcodejerk.spread import Spread, here
 
 AT_ONCE = 1 << 18
 """Residuals, of moves at frequencies, that are judged at a time: some 12 MB."""
@@ -56,6 +57,8 @@ class Task:
         For designs that take long.
     own_law : bool
         What the controller does today does not follow from the limits alone.
+    spread : Spread
+        Who computes what takes long.
     """
 
     counts: NDArray[np.int64]
@@ -69,12 +72,13 @@ class Task:
     tolerance: float
     progress: Progress | None = None
     own_law: bool = False
+    spread: Spread = here
 
     @classmethod
     def of(
         cls, machine: Machine, modes: Modes, share: Array, counts: NDArray[np.int64] | None = None,
         progress: Progress | None = None, speed: Array | None = None,
-        lone: NDArray[np.bool_] | None = None,
+        lone: NDArray[np.bool_] | None = None, spread: Spread = here,
     ) -> Task:  # fmt: skip
         """Moves on a machine.
 
@@ -94,6 +98,8 @@ class Task:
             Speed that the program states, which no unit profile exceeds; NaN for none. [1/s]
         lone : ndarray of bool, shape (n,), optional
             No other motion follows directly (`Axis.conventional`); all of them by default.
+        spread : Spread, optional
+            Who computes what takes long.
 
         Returns
         -------
@@ -118,6 +124,7 @@ class Task:
             tolerance=machine.design.tolerance,
             progress=progress,
             own_law=machine.planner in LAWS or any(axis.filter for axis in machine.axes),
+            spread=spread,
         )
 
     def __len__(self) -> int:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.emit import Controller, Options, load_controller
 from gcodejerk.emit.fits import reasons_to_leave
@@ -49,6 +50,7 @@ from gcodejerk.rewrite.set_control import set_control
 from gcodejerk.rewrite.stamp import ProcessedError, stamp_text
 from gcodejerk.rewrite.what_if import entry_notes
 from gcodejerk.rewrite.writing import write_streams
+from gcodejerk.spread import Spread, here
 from gcodejerk.verification import Verification, require, verify_files
 
 Progress = Callable[[str, int, int], None]
@@ -157,6 +159,7 @@ def process_file(
     name: str,
     progress: Progress | None = None,
     beside: BinaryIO | None = None,
+    spread: Spread = here,
 ) -> Result:
     """The same with open files, in bounded memory.
 
@@ -177,6 +180,8 @@ def process_file(
     beside : binary file, optional
         Empty, seekable, readable: takes what the controller writes beside the program
         (`Controller.beside`). Such a controller needs it where there is a target.
+    spread : Spread, optional
+        Who does what takes long; the result is the same.
 
     Returns
     -------
@@ -197,8 +202,9 @@ def process_file(
     front = settings.front
     if not front:
         return _process(
-            source, target, machine, settings, name, emitter, progress or silent, None, beside
-        )
+            source, target, machine, settings, name, emitter, progress or silent, None, beside,
+            spread,
+        )  # fmt: skip
     if target is not None and not emitter.in_place:
         raise EmitError(
             f"{front.options} needs streams within the program, those of controller {emitter.name} "
@@ -215,8 +221,9 @@ def process_file(
         prove=require if target is not None and settings.verify else None,
     ) as (used, written):
         return _process(
-            used, target, machine, settings, name, emitter, progress or silent, written, beside
-        )
+            used, target, machine, settings, name, emitter, progress or silent, written, beside,
+            spread,
+        )  # fmt: skip
 
 
 def _process(
@@ -229,12 +236,13 @@ def _process(
     report: Progress,
     written: WrittenOut | None,
     beside: BinaryIO | None,
+    spread: Spread,
 ) -> Result:
     """Process a program; the source is that with its flow and cycles written out, if they are."""
     lines = None if written is None else written.map
     program = _read(source, machine, settings, name, emitter, report, lines)
     check_dialect(machine, program)
-    plans = _plan(source, program, machine, settings, emitter, report)
+    plans = _plan(source, program, machine, settings, emitter, report, spread)
     peaks = np.zeros((3, len(plans)))
     form = emitter.row_format(machine) if emitter.play is Play.CUBIC else None
     steps = emitter.end_steps(machine)
@@ -251,16 +259,17 @@ def _process(
     )  # fmt: skip
     design = replace(machine.design, profile=settings.profile or machine.design.profile)
     designed = replace(machine, design=design)
-    collected, deviation = write_streams(writer, plans, designed, report, form, peaks)
+    collected, deviation = write_streams(writer, plans, designed, report, form, peaks, spread)
+    edits = writer.edits.finish()
     verification = None
     if target is not None and settings.verify:
         report("verifying", 0, 1)
         verification = _verified(
-            source, target, machine, settings, program, plans, emitter, lines, beside, report
-        )
+            source, target, machine, settings, program, plans, emitter, lines, beside, report,
+            spread, edits,
+        )  # fmt: skip
         report("verifying", 1, 1)
     what_if = entry_notes(source, program, machine.program_start())
-    edits = writer.edits.finish()
     differences = hunks(edits, program.rapids, program.insert_at, lines)
     program = in_original(program, written)
     return Result(
@@ -360,6 +369,7 @@ def _plan(
     settings: Settings,
     emitter: Controller,
     report: Progress,
+    spread: Spread,
 ) -> Plans:
     """All rapids of the program that are certain, and that the control could read as streams."""
     rapids = program.rapids
@@ -376,6 +386,7 @@ def _plan(
         lambda done, total: report("planning", done, total),
         emitter.unblended if emitter.in_place else "",
         only_gains=True,
+        spread=spread,
     )
     if emitter.longest is not None:
         too_long = plans.planned & (plans.counts > emitter.longest)
@@ -403,6 +414,8 @@ def _verified(
     lines: Lines | None,
     beside: BinaryIO | None,
     report: Progress,
+    spread: Spread = here,
+    edits: NDArray[np.int64] | None = None,
 ) -> Verification:
     """Read an output back; whatever is wrong with it is raised, in lines of the original."""
     source.seek(0)
@@ -420,6 +433,9 @@ def _verified(
             beside=beside if emitter.beside else None,
             program=program,
             progress=lambda done, total: report("verifying", done, total),
+            # One process reads the files as a whole: that is the plainer proof.
+            spread=None if spread is here else spread,
+            edits=edits,
         )
         require(lines_in_original(found, lines))
     except (ProgramError, VerifyError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -118,6 +119,15 @@ class ReportedProfiles(Mapping[int, Array]):
             rows.extend(like[begin[single]])
         self.lines, self.length, self.row = lines.finish(), lengths.finish(), rows.finish()
         self.made: dict[tuple[int, float], Array] = {}
+
+    def between(self, first: int, last: int) -> ReportedProfiles:
+        """Those of some lines, both included, with their own profiles alone."""
+        part = slice(*np.searchsorted(self.lines, [first, last + 1]).tolist())
+        rows, row = np.unique(self.row[part], return_inverse=True)
+        own = copy(self)
+        own.profiles, own.row = self.profiles.take(rows), row.reshape(-1)
+        own.lines, own.length, own.made = self.lines[part].copy(), self.length[part].copy(), {}
+        return own
 
     def __len__(self) -> int:
         return len(self.lines)

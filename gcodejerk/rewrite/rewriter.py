@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import BinaryIO
 
 import numpy as np
@@ -20,15 +20,11 @@ from gcodejerk.emit import Controller, Options
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Program
-from gcodejerk.planning.batch import Batch
-from gcodejerk.planning.pvt import Rows
 from gcodejerk.rewrite.expanded import TERMINATOR_LENGTH
 from gcodejerk.rewrite.stamp import SUM_DIGITS, SUM_MARK, SUM_UNKNOWN, SUM_WITHIN
 from gcodejerk.storage import Growing, windows
 
 COPY_SIZE = 1 << 20
-AT_ONCE = 2048
-"""Streams whose texts are made together."""
 
 
 def digest_of(source: BinaryIO) -> bytes:
@@ -134,34 +130,24 @@ class Rewriter:
             self._sign(self.emitter.header(machine))
         self._put_beside(self.emitter.beside_header(machine))
 
-    def add(self, batch: Batch | Rows) -> None:
-        """Make the texts of a batch; those of one window are written together."""
-        if self.target is None:
+    def begin(self) -> None:
+        """Copy what stands in front of the first stream, and write the stamp."""
+        if self.target is None or not self.emitter.in_place or self.noted or len(self.edits):
             return
-        if self.emitter.in_place and not (self.noted or len(self.edits)):
-            self.source.seek(self.at)
-            self._copy(self.program.insert_at)
-            self._put_stamp()
-        rapids = self.program.rapids
-        if isinstance(batch, Rows):
-            self._made(batch, self.emitter.render_rows(batch, rapids, self._blocks(batch)))
-            return
-        # The text of one stream does not depend on others, and what it is made of takes much room.
-        few: Iterable[Batch] = [batch]
-        if len(batch) > AT_ONCE:
-            begins = range(0, len(batch), AT_ONCE)
-            rows = np.arange(len(batch))
-            few = (batch.take(rows[k : k + AT_ONCE]) for k in begins)
-        for part in few:
-            blocks, newline = self._blocks(part), self.program.newline
-            self._made(part, self.emitter.render(part, rapids, blocks, newline, self.options))
-            if self.beside is not None:
-                samples = self.emitter.render_beside(part, rapids)
-                self.aside.update(zip(part.moves.tolist(), samples, strict=True))
+        self.source.seek(self.at)
+        self._copy(self.program.insert_at)
+        self._put_stamp()
 
-    def _made(self, batch: Batch | Rows, texts: list[bytes]) -> None:
-        """Take texts."""
-        self.texts.update(zip(batch.moves.tolist(), texts, strict=True))
+    def add(
+        self,
+        moves: NDArray[np.int64],
+        texts: Sequence[bytes],
+        aside: Sequence[bytes] | None = None,
+    ) -> None:
+        """Take texts, and what belongs beside them; those of one window are written together."""
+        self.texts.update(zip(moves.tolist(), texts, strict=True))
+        if aside is not None:
+            self.aside.update(zip(moves.tolist(), aside, strict=True))
 
     def write(self) -> None:
         """Write the streams of a window; windows come in the order of the file."""
@@ -220,10 +206,10 @@ class Rewriter:
             self.beside.write(text)
             self.sums.update(text)
 
-    def _blocks(self, batch: Batch | Rows) -> list[bytes]:
+    def blocks(self, moves: NDArray[np.int64]) -> list[bytes]:
         """The blocks of rapids."""
         rapids, blocks = self.program.rapids, []
-        begins, ends = rapids.begin[batch.moves].tolist(), rapids.end[batch.moves].tolist()
+        begins, ends = rapids.begin[moves].tolist(), rapids.end[moves].tolist()
         for begin, end in zip(begins, ends, strict=True):
             self.source.seek(begin)
             blocks.append(self.source.read(end - begin))

@@ -8,40 +8,40 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Start, read_program
-from gcodejerk.storage import release
+from gcodejerk.spread import Spread
 from gcodejerk.verification.bytes.alignment import Alignment, Progress
-from gcodejerk.verification.bytes.form import Stream
 from gcodejerk.verification.bytes.guarded_form import check_guarded
 from gcodejerk.verification.bytes.hal import CONTROLLER, Beside, HalAlignment
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
 from gcodejerk.verification.findings import Findings, Kind, Verification
-from gcodejerk.verification.physics.aligned import Reported, check_aligned, in_own_steps
+from gcodejerk.verification.physics.aligned import Reported
 from gcodejerk.verification.physics.alike import Alike
-from gcodejerk.verification.physics.dynamics import check_dynamics, stride_of
+from gcodejerk.verification.physics.dynamics import check_dynamics
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
 from gcodejerk.verification.rows.files import RowsFile, rows_format
 from gcodejerk.verification.rows.judge import judge_rows
 from gcodejerk.verification.samples import SampleReader
 from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.sections import judge_sections
 from gcodejerk.verification.settings import check_settings, settings_note
+from gcodejerk.verification.streams import BATCH_BYTES, batches, checked, judge_streams, moves
 from gcodejerk.verification.table import TableReader
 
 MOST = 100
 """Violations that are collected, unless asked otherwise."""
-BATCH_BYTES = 1 << 20
-"""Text of streams that is judged at a time."""
 HAL_BYTES = 1 << 18
 """The same where the points stand in another file: some hundred rapids."""
 NAMES = ("<original>", "<processed>")
@@ -157,6 +157,8 @@ def verify_files(
     beside: BinaryIO | None = None,
     program: Program | None = None,
     progress: Progress | None = None,
+    spread: Spread | None = None,
+    edits: NDArray[np.int64] | None = None,
 ) -> Verification:
     """Compare open files; see `verify`.
 
@@ -187,6 +189,11 @@ def verify_files(
         read it; taken if the file still has its digest, and read anew if not.
     progress : callable, optional
         Called with how many rapids were looked at, and how many there are, of streams in place.
+    spread : Spread, optional
+        Who judges sections of the files, where there are `edits`.
+    edits : ndarray of int, shape (k, 3), optional
+        Begin and end of each stream in the processed file, and the rapid that it replaces: a hint
+        of where the files may be cut. Nothing is taken on trust (`sections`).
 
     Returns
     -------
@@ -208,14 +215,22 @@ def verify_files(
         windows = Window(original), Window(processed)
         kept, places = check_settings(*windows, program, machine, control, found)
         return Verification(len(program.rapids), 0, kept, found.sorted(), names, places=places)
-    replaced: Sequence[int]
+    replaced: Sequence[int] | NDArray[np.int64]
     if table:
         replaced, kept = _judge_table(processed, program, machine, found), 0
     elif machine.controller == CONTROLLER:
         replaced, kept = _judge_pair(original, processed, beside, program, machine, found, progress)
     else:
-        files = (original, processed)
-        replaced, kept = _judge_program(*files, program, machine, found, reported or {}, progress)
+        files, held_to = (original, processed), reported or {}
+        by_sections = None
+        if spread is not None and edits is not None and not _is_guarded(machine):
+            stood = [file.tell() for file in files]
+            by_sections = judge_sections(*files, program, machine, held_to, edits, progress, spread)
+            for file, place in zip(files, stood, strict=True):
+                file.seek(place)
+        replaced, kept = by_sections or _judge_program(
+            *files, program, machine, found, held_to, progress
+        )
     original.seek(begin)
     confirmed = confirm(original, program.dialect, start, program.rapids, replaced, found)
     rapids = len(program.rapids)
@@ -236,31 +251,18 @@ def _judge_program(
     alignment = Alignment(*windows, program, machine, found, reported)
     alignment.progress = progress
     reader = Reader(program.rapids, machine, found, program.language)
-    stride = stride_of(machine)
     alike = Alike(reported if alignment.aligned else {})
-
-    def judge(paths: Paths, found: Findings) -> bool:
-        check_line(paths, machine, found)
-        if alignment.aligned:
-            check_aligned(paths, machine, found, reported)
-        elif not _moves(paths):
-            return False
-        else:
-            check_dynamics(paths, machine, stride, found)
-        return True
-
-    for streams in _batches(_checked(alignment, reader)):
-        paths = reader.paths(streams)
-        if alignment.aligned:
-            paths = in_own_steps(paths)
-        check_rapids(paths, program.rapids, machine, found)
-        alignment.judged(alike.judge(paths, judge, found))
-        release()
+    judge_streams(alignment, reader, alike, machine, reported, found)
     if alignment.guarded and alignment.aligned:
         lines = program.rapids.line[np.array(alignment.replaced)].tolist()
         check_guarded(original, program.dialect, lines, found)
     alignment.check_sum()
     return alignment.replaced, alignment.kept
+
+
+def _is_guarded(machine: Machine) -> bool:
+    """Whether streams stand in structures that are judged over the whole file."""
+    return machine.controller_options.override_guard
 
 
 def _judge_pair(
@@ -289,13 +291,13 @@ def _judge_pair(
     alignment.progress = progress
     reader = Reader(program.rapids, machine, found, program.language)
     samples = SampleReader(beside, about, program.rapids, machine, found)
-    for streams in _batches(_checked(alignment, reader), HAL_BYTES):
+    for streams in batches(checked(alignment, reader), HAL_BYTES):
         written = reader.paths(streams)
         check_line(written, machine, found)
         played = samples.paths(streams, written)
         if played is not None:
             _check_lines(played, program, machine, found)
-            if _moves(played):
+            if moves(played):
                 check_dynamics(played, machine, 1, found)
     samples.finish()
     alignment.check_opening()
@@ -311,7 +313,7 @@ def _judge_table(table: BinaryIO, program: Program, machine: Machine, found: Fin
     reader = TableReader(table, program.rapids, machine, found)
     for paths in reader.paths():
         _check_lines(paths, program, machine, found)
-        if _moves(paths):
+        if moves(paths):
             check_dynamics(paths, machine, 1, found)
     return reader.replaced
 
@@ -346,33 +348,7 @@ def _digest(original: BinaryIO) -> bytes:
     return digest.digest()
 
 
-def _checked(alignment: Alignment, reader: Reader) -> Iterator[Stream]:
-    """Streams whose axes are right."""
-    for stream in alignment.streams():
-        if reader.check_end(stream, alignment.block):
-            yield stream
-
-
-def _batches(streams: Iterator[Stream], most: int = 0) -> Iterator[list[Stream]]:
-    """Streams in lists, each of some MB of text."""
-    batch: list[Stream] = []
-    size = 0
-    for stream in streams:
-        batch.append(stream)
-        size += len(stream.text) + 64 * len(stream.rest)
-        if size > (most or BATCH_BYTES):
-            yield batch
-            batch, size = [], 0
-    if batch:
-        yield batch
-
-
 def _check_lines(paths: Paths, program: Program, machine: Machine, found: Findings) -> None:
     """Where the points are, and whether there may be any."""
     check_rapids(paths, program.rapids, machine, found)
     check_line(paths, machine, found)
-
-
-def _moves(paths: Paths) -> bool:
-    """Whether every stream has a length: without one there is no time profile."""
-    return bool((paths.displacement != 0.0).any(axis=1).all())

@@ -22,7 +22,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from gcodejerk import Machine, find_machine
-from gcodejerk.batch.jobs import write_report
+from gcodejerk.batch.reports import write_report
 from gcodejerk.report.columns import packed
 from gcodejerk.rewrite import pipeline
 from gcodejerk.rewrite.pipeline import Settings, process_file

@@ -98,10 +98,10 @@ def test_a_bug_in_one_file_is_told_with_its_traceback_and_stops_nobody(shop, mon
     vmc = Machine.load(find_machine("vmc"))
     whole = jobs.process_file
 
-    def sometimes(source, target, machine, settings, name, progress, beside):
+    def sometimes(source, target, machine, settings, name, *more):
         if name == "shop/b.ngc":
             raise ZeroDivisionError("drawn")
-        return whole(source, target, machine, settings, name, progress, beside)
+        return whole(source, target, machine, settings, name, *more)
 
     monkeypatch.setattr(jobs, "process_file", sometimes)
     names = ["shop/a.nc", "shop/b.ngc", "shop/lathe/c.TAP"]

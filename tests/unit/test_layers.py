@@ -36,7 +36,7 @@ def order(picture):
 
 ROOMS = {
     "": order("""
-    _version axes errors units reasons start advice storage
+    _version axes errors units reasons start advice storage spread
  <- nc | machine | motion
  <- cycles | unrolling | planning
  <- studies | parameters | verification | testing | identification | simulation
@@ -74,7 +74,8 @@ ROOMS = {
     findings
  <- bytes
  <- physics | second_reading
- <- cycles unrolling | table samples settings | rows | reported
+ <- cycles unrolling | table samples settings | rows | reported | streams
+ <- sections
  <- proof
 """),
 }

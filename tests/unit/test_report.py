@@ -9,7 +9,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from gcodejerk.batch import jobs
+from gcodejerk.batch import reports
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.planning.move import plan_move
 from gcodejerk.reasons import Reason
@@ -97,14 +97,14 @@ def test_report_of_a_large_program_says_the_same_line_by_line(machine, monkeypat
         b"G0 X-%d Y-%d\nG1 Z-3\nG0 Z0 ; \xe9\n" % (5 * (k % 7), k % 3) for k in range(40)
     )
     result, source = process(program, machine), io.BytesIO(program)
-    whole = dump(jobs.record_of(result, machine, "out", source))
-    monkeypatch.setattr(jobs, "FEW", 10)
+    whole = dump(reports.record_of(result, machine, "out", source))
+    monkeypatch.setattr(reports, "FEW", 10)
     monkeypatch.setattr(columns, "AT_ONCE", 17)
     monkeypatch.setattr(columns, "REMEMBERED", 5)
     plain, squeezed = io.BytesIO(), io.BytesIO()
-    jobs.write_report(plain, result, machine, "out", source)
+    reports.write_report(plain, result, machine, "out", source)
     with columns.packed(squeezed) as file:
-        jobs.write_report(file, result, machine, "out", source)
+        reports.write_report(file, result, machine, "out", source)
     assert json.loads(plain.getvalue()) == json.loads(whole)
     assert gzip.decompress(squeezed.getvalue()) == plain.getvalue()
     assert plain.getvalue().count(b"\n") == len(result.plans) + 2

@@ -11,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from gcodejerk.batch.jobs import record_of
+from gcodejerk.batch.reports import record_of
 from gcodejerk.errors import EmitError, ProgramError, VerifyError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.report.difference import difference

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gcodejerk import Machine, find_machine, storage
-from gcodejerk.batch.jobs import write_report
+from gcodejerk.batch.reports import write_report
 from gcodejerk.report.page.document import page_html
 from gcodejerk.rewrite.pipeline import Settings, process_file
 

@@ -74,7 +74,7 @@ def one_batch(displacement, machine=MACHINE, stride=1, profile=None, **number_fo
     """All planned moves in one batch, short ones behind much padding."""
     plans = plan_moves(displacement, machine, profile)
     moves = np.nonzero(plans.planned)[0]
-    return stream._make_batch(plans, moves, spelling_of(displacement, **number_format), stride)
+    return stream.make_batch(plans, moves, spelling_of(displacement, **number_format), stride)
 
 
 @pytest.mark.parametrize("machine", [MACHINE, INDEPENDENT], ids=["linear", "independent"])
@@ -151,7 +151,7 @@ def test_many_small_batches_are_the_same_as_one(machine, samples, monkeypatch):
     displacement = drawn_moves(25, seed=3)
     displacement[4] = 0.0
     whole = by_move(streams(displacement, machine, 2))
-    monkeypatch.setattr(stream, "BATCH_SAMPLES", samples)
+    monkeypatch.setattr(stream, "WINDOW_SAMPLES", samples)
     parts = streams(displacement, machine, 2)
     assert len(parts) > 3
     assert samples > 1 or {len(part) for part in parts} == {1}
@@ -172,7 +172,7 @@ def test_many_small_batches_are_the_same_as_one(machine, samples, monkeypatch):
 
 
 def test_a_window_holds_about_as_many_samples_as_it_may(monkeypatch):
-    monkeypatch.setattr(stream, "BATCH_SAMPLES", 3000)
+    monkeypatch.setattr(stream, "WINDOW_SAMPLES", 3000)
     displacement = drawn_moves(60, seed=8)
     plans = plan_moves(displacement, MACHINE)
     last = -1

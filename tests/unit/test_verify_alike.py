@@ -9,7 +9,7 @@ import pytest
 
 from gcodejerk import Machine, find_machine, process, verify
 from gcodejerk.nc import Rapids, read_program
-from gcodejerk.verification import proof
+from gcodejerk.verification import proof, streams
 from gcodejerk.verification.bytes.alignment import Alignment
 from gcodejerk.verification.bytes.proven import Proven
 from gcodejerk.verification.bytes.source import Window
@@ -103,7 +103,7 @@ def test_one_damaged_stream_among_hundreds_alike_is_found(
     controller, incremental, one_by_one, monkeypatch
 ):
     # Most batches come behind those from which something was learned.
-    monkeypatch.setattr(proof, "BATCH_BYTES", 1 << 16)
+    monkeypatch.setattr(streams, "BATCH_BYTES", 1 << 16)
     program = drilling(incremental)
     machine, output = processed(controller, program)
     begins = [m.start() for m in re.finditer(rb"\(gcodejerk: ", output)]
@@ -127,9 +127,9 @@ def test_what_is_alike_is_judged_once(monkeypatch):
     program = drilling()
     machine, output = processed("haas", program)
     seen = []
-    judge = proof.check_line
+    judge = streams.check_line
     monkeypatch.setattr(
-        proof,
+        streams,
         "check_line",
         lambda paths, *rest: (seen.append(len(paths.begin)), judge(paths, *rest)),
     )
@@ -230,6 +230,6 @@ def test_what_is_the_same_to_the_byte_is_read_once(monkeypatch):
     monkeypatch.setattr(
         Proven, "read", lambda self, key, text: (judged.append(key), read(self, key, text))[1]
     )
-    monkeypatch.setattr(proof, "BATCH_BYTES", 1 << 14)
+    monkeypatch.setattr(streams, "BATCH_BYTES", 1 << 14)
     assert verify(program, output, machine).ok
     assert len(judged) < 0.6 * every

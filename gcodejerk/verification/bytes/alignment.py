@@ -77,6 +77,26 @@ class Alignment:
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 
+    def begin_at(self, at: int, line: int, *, follows: bool) -> None:
+        """Begin within the files, behind the stamp, in front of the second of the rapids.
+
+        Parameters
+        ----------
+        at, line : int
+            Where the window of the original begins in the file.
+        follows : bool
+            The first rapid has a stream.
+        """
+        self.at, self.original.line = at, line
+        self._stamp_at = None
+        if follows:
+            self.replaced.append(0)
+
+    @property
+    def stamped(self) -> bool:
+        """Whether a stamp was passed."""
+        return self._stamp_line is not None
+
     @property
     def rewritten(self) -> int:
         """How many rapids have a stream."""

@@ -1,0 +1,34 @@
+"""Work in pieces, and who does it: whoever computes hands pieces on, and does not know to whom.
+
+`batch` owns processes and hands a `Spread` down; where nobody does, everything is done here.
+
+Rule 1: where pieces are cut depends on the program alone, and what comes of a piece on the piece
+alone. So results are the same to the bit, whoever computes them, and however many they are.
+Rule 2: a function and its pieces can be pickled, and a piece is a window of the program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol, TypeVar
+
+In = TypeVar("In")
+Out = TypeVar("Out")
+
+
+class Spread(Protocol):
+    """As `map`: applies a function to pieces, and gives the answers in their order."""
+
+    def __call__(self, function: Callable[[In], Out], pieces: Iterable[In], /) -> Iterator[Out]:
+        """Pieces may be asked for some way ahead of the answers."""
+
+
+def here(function: Callable[[In], Out], pieces: Iterable[In]) -> Iterator[Out]:
+    """One after the other, in this process.
+
+    Examples
+    --------
+    >>> list(here(abs, [-1, 2]))
+    [1, 2]
+    """
+    return map(function, pieces)
