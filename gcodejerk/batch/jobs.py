@@ -21,7 +21,6 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gcodejerk.batch.crew import Crew, LostError
 from gcodejerk.batch.current import is_current
 from gcodejerk.batch.files import (
     STANDARD,
@@ -35,6 +34,7 @@ from gcodejerk.batch.files import (
     version,
 )
 from gcodejerk.batch.originals import keep
+from gcodejerk.batch.pool import LostError, Pool
 from gcodejerk.batch.reports import write_report
 from gcodejerk.batch.workers import map_jobs
 from gcodejerk.errors import EmitError, GcodejerkError
@@ -151,8 +151,8 @@ def run_jobs(
         One for each job.
     """
     if len(jobs) == 1:
-        with Crew(workers) as crew:
-            spread = here if workers == 1 else crew.map
+        with Pool(workers) as pool:
+            spread = here if workers == 1 else pool.map
             yield run_job(jobs[0], machine, settings, progress, spread)
     elif workers == 1:
         for job in jobs:

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from gcodejerk import Machine, find_machine
-from gcodejerk.batch import crew as module
-from gcodejerk.batch.crew import Crew, LostError
+from gcodejerk.batch import pool as module
 from gcodejerk.batch.jobs import Job, run_job
+from gcodejerk.batch.pool import LostError, Pool
 from gcodejerk.batch.reports import record_of
 from gcodejerk.planning import designs, stream
 from gcodejerk.reasons import REASONS, Reason
@@ -43,17 +43,19 @@ def program(holes):
 
 
 @pytest.fixture(scope="module")
-def crew():
+def pool():
     """Three that work together from the first piece on."""
-    with pytest.MonkeyPatch.context() as patch, Crew(3) as crew:
-        crew.call(abs)
-        crew.wait_for_all()
-        answer = module._Mate.answer
+    with pytest.MonkeyPatch.context() as patch, Pool(3) as pool:
+        pool.call(abs)
+        pool.wait_for_all()
+        answer = module._Worker.answer
         patch.setattr(
-            module._Mate, "answer", lambda mate: (crew.answered.append(mate), answer(mate))[1]
+            module._Worker,
+            "answer",
+            lambda worker: (pool.answered.append(worker), answer(worker))[1],
         )
-        crew.answered = []
-        yield crew
+        pool.answered = []
+        yield pool
     assert not multiprocessing.active_children()
 
 
@@ -83,11 +85,11 @@ def outcome(data, machine, controller, spread):
     [(VMC, "linuxcnc"), (VMC, "grbl"), (VMC, "csv"), (VMC, "linuxcnc-hal"), (ROUTER, "haas")],
     ids=str,
 )
-def test_the_same_bytes_with_one_process_and_with_three(machine, controller, crew, small):
+def test_the_same_bytes_with_one_process_and_with_three(machine, controller, pool, small):
     data, done = program(16), []
 
     def spread(function, parts):
-        for answer in crew.map(function, parts):
+        for answer in pool.map(function, parts):
             done.append(type(function).__name__)
             yield answer
 
@@ -95,8 +97,8 @@ def test_the_same_bytes_with_one_process_and_with_three(machine, controller, cre
     three = outcome(data, machine, controller, spread)
     assert one == three
     assert one[3].rewritten > 30
-    assert set(crew.mates) == set(crew.answered)
-    crew.answered.clear()
+    assert set(pool.workers) == set(pool.answered)
+    pool.answered.clear()
     assert done.count("partial") > 5
     if controller != "linuxcnc-hal":
         assert done.count("Maker") > 5
@@ -263,17 +265,17 @@ def test_a_run_that_is_cut_leaves_nothing_half_written_and_nobody_behind(tmp_pat
         [*command, "--jobs", "2"], cwd=tmp_path, start_new_session=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    while not (mates := children(run.pid)):
+    while not (workers := children(run.pid)):
         assert run.poll() is None, "it never took a second process"
         time.sleep(0.02)
     time.sleep(0.3)  # while it starts somebody, it does not listen
     if number == signal.SIGINT:  # as a terminal does, to all
         os.killpg(run.pid, number)
     else:
-        os.kill(mates[0], number)
+        os.kill(workers[0], number)
     _, err = run.communicate(timeout=60)
     assert run.returncode == (130 if number == signal.SIGINT else 1)
     assert "Traceback" not in err
     assert ("died (signal 9)" in err) == (number == signal.SIGKILL)
     assert [path.name for path in tmp_path.iterdir()] == ["part.nc"]
-    assert not any(Path(f"/proc/{mate}").exists() for mate in mates)
+    assert not any(Path(f"/proc/{worker}").exists() for worker in workers)

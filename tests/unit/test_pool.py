@@ -7,8 +7,8 @@ import time
 
 import pytest
 
-from gcodejerk.batch import crew as module
-from gcodejerk.batch.crew import Crew, LostError
+from gcodejerk.batch import pool as module
+from gcodejerk.batch.pool import LostError, Pool
 from gcodejerk.errors import PlanError
 
 
@@ -32,35 +32,35 @@ def values(answers):
 
 
 @pytest.fixture
-def crew():
+def pool():
     """Two of them, both at work from the first piece on."""
-    with Crew(2) as crew:
-        crew.call(act)
-        crew.wait_for_all()
-        yield crew
+    with Pool(2) as pool:
+        pool.call(act)
+        pool.wait_for_all()
+        yield pool
     assert not multiprocessing.active_children()
 
 
-def test_answers_come_in_order_and_both_work(crew):
+def test_answers_come_in_order_and_both_work(pool):
     pieces = [("wait", 0.3), *(("", k) for k in range(9)), ("wait", 0.05), ("", 10)]
     for _ in range(2):
-        answers = list(crew.map(act, iter(pieces)))
+        answers = list(pool.map(act, iter(pieces)))
         assert values(answers) == [value for _, value in pieces]
         assert {elsewhere for _, elsewhere in answers} == {True, False}
     # What somebody stopped listening to is nobody's answer afterwards.
-    answers = crew.map(act, [("wait", 0.1), *(("", -k) for k in range(9))])
+    answers = pool.map(act, [("wait", 0.1), *(("", -k) for k in range(9))])
     assert next(answers)[0] == 0.1
     answers.close()
-    assert values(crew.map(act, [("", k) for k in range(20)])) == list(range(20))
+    assert values(pool.map(act, [("", k) for k in range(20)])) == list(range(20))
     # A large piece, and a large answer, do not wait for each other.
     large = [("", bytes(1 << 20)) for _ in range(6)]
-    assert values(crew.map(act, large)) == [value for _, value in large]
-    assert list(crew.map(act, [])) == []
+    assert values(pool.map(act, large)) == [value for _, value in large]
+    assert list(pool.map(act, [])) == []
 
 
-def test_what_goes_wrong_comes_where_it_would_with_one(crew):
+def test_what_goes_wrong_comes_where_it_would_with_one(pool):
     pieces = [("", 0), ("", 1), ("", 2), ("wait", 0.2), ("refuse", 4), ("fail", 5), ("fail", 6)]
-    answers = crew.map(act, pieces)
+    answers = pool.map(act, pieces)
     assert values(next(answers) for _ in range(4)) == [0, 1, 2, 0.2]
     with pytest.raises(PlanError, match="problem 4\n  remedy"):
         next(answers)
@@ -69,16 +69,16 @@ def test_what_goes_wrong_comes_where_it_would_with_one(crew):
         yield from pieces[:3]
         raise OSError("no more pieces")
 
-    answers = crew.map(act, ending())
+    answers = pool.map(act, ending())
     assert values(next(answers) for _ in range(3)) == [0, 1, 2]
     with pytest.raises(OSError, match="no more pieces"):
         next(answers)
     for _ in range(2):  # whoever does it
         with pytest.raises(ValueError, match="bug 5"):
-            list(crew.map(act, [("wait", 0.1), ("fail", 5), ("fail", 5)]))
+            list(pool.map(act, [("wait", 0.1), ("fail", 5), ("fail", 5)]))
 
 
-def test_few_pieces_are_asked_for_ahead(crew):
+def test_few_pieces_are_asked_for_ahead(pool):
     asked = 0
 
     def pieces():
@@ -86,28 +86,28 @@ def test_few_pieces_are_asked_for_ahead(crew):
         for asked in range(1, 41):
             yield "", asked
 
-    for taken, _ in enumerate(crew.map(act, pieces())):
-        assert asked <= taken + 1 + module.AHEAD * crew.size
+    for taken, _ in enumerate(pool.map(act, pieces())):
+        assert asked <= taken + 1 + module.AHEAD * pool.size
 
 
-def test_the_death_of_one_is_told(crew):
+def test_the_death_of_one_is_told(pool):
     with pytest.raises(LostError) as lost:
-        list(crew.map(act, [("die", signal.SIGKILL)] * 9))
+        list(pool.map(act, [("die", signal.SIGKILL)] * 9))
     assert lost.value.status == -signal.SIGKILL
 
 
-def test_what_cannot_travel_is_done_at_home(crew):
+def test_what_cannot_travel_is_done_at_home(pool):
     for act_here in (lambda piece: piece[1], lambda piece: -piece[1]):
-        assert list(crew.map(act_here, [("", k) for k in range(9)]))[1] in (1, -1)
-    assert values(crew.map(act, [("", k) for k in range(9)])) == list(range(9))
-    with Crew(2, pays=-1.0) as other:
+        assert list(pool.map(act_here, [("", k) for k in range(9)]))[1] in (1, -1)
+    assert values(pool.map(act, [("", k) for k in range(9)])) == list(range(9))
+    with Pool(2, pays=-1.0) as other:
         assert list(other.map(lambda piece: piece, [1, 2])) == [1, 2]
-        assert not other.mates
+        assert not other.workers
 
 
 def test_nobody_is_started_where_it_does_not_pay():
-    with Crew(4) as crew:
-        assert values(crew.map(act, [("", k) for k in range(50)])) == list(range(50))
-        assert not crew.mates
-    with Crew(1) as crew:
-        assert isinstance(crew.map(abs, [-1]), map)
+    with Pool(4) as pool:
+        assert values(pool.map(act, [("", k) for k in range(50)])) == list(range(50))
+        assert not pool.workers
+    with Pool(1) as pool:
+        assert isinstance(pool.map(abs, [-1]), map)

@@ -1,11 +1,11 @@
 """Several processes at one program: pieces of its work go to whoever has room for them.
 
-The process that owns the program is one of the crew: it computes pieces itself wherever no answer
+The process that owns the program is one of the pool: it computes pieces itself wherever no answer
 is there yet. So nobody is started for a small program, where the work is done before it would pay.
 
 Rule 1: answers come in the order of the pieces, and so does what goes wrong.
-Rule 2: of pieces and answers only a few for each of the crew are in memory.
-Rule 3: as for `workers`: no mate outlives its master, and Ctrl-C is the master's business.
+Rule 2: of pieces and answers only a few for each process are in memory.
+Rule 3: as for `workers`: no worker outlives its owner, and Ctrl-C is the owner's business.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from gcodejerk.spread import In, Out, here
 PAYS = 0.5
 """Work in pieces after which others are called, about what it takes to start one [s]."""
 IN_HAND = 2
-"""Pieces that a mate has at a time, so that none waits for its master."""
+"""Pieces that a worker has at a time, so that none waits for its owner."""
 AHEAD = 4
-"""Pieces, for each of the crew, that are asked for ahead of the answers that were taken."""
+"""Pieces, for each process, that are asked for ahead of the answers that were taken."""
 _STAYS = pickle.PicklingError, AttributeError, TypeError
 """Raised for what cannot be pickled."""
 _HELLO = -1
-"""In the place of a piece's index: the mate has imported what it needs."""
+"""In the place of a piece's index: the worker has imported what it needs."""
 
 
 class LostError(GcodejerkError):
@@ -61,7 +61,7 @@ class _Answer(NamedTuple):
         return self.value
 
 
-class Crew:
+class Pool:
     """A process with others that it starts when they pay.
 
     Parameters
@@ -74,11 +74,11 @@ class Crew:
 
     def __init__(self, size: int, pays: float = PAYS) -> None:
         self.size, self.pays = size, pays
-        self.mates: list[_Mate] = []
+        self.workers: list[_Worker] = []
         self._round = 0
         self._spent = 0.0
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> Pool:
         return self
 
     def __exit__(
@@ -87,11 +87,11 @@ class Crew:
         error: BaseException | None,
         place: TracebackType | None,
     ) -> None:
-        mates, self.mates = self.mates, []
-        for mate in mates:
-            mate.process.terminate()
-        for mate in mates:
-            mate.end()
+        workers, self.workers = self.workers, []
+        for worker in workers:
+            worker.process.terminate()
+        for worker in workers:
+            worker.end()
 
     def map(self, function: Callable[[In], Out], pieces: Iterable[In], /) -> Iterator[Out]:
         """See `Spread`; one map at a time."""
@@ -105,8 +105,8 @@ class Crew:
         handed, given, more = 0, 0, True
         while True:
             self._collect(answers, 0.0)
-            mate = self._free()
-            if given in answers and (mate is None or not more):
+            worker = self._free()
+            if given in answers and (worker is None or not more):
                 yield answers.pop(given).taken()
                 given += 1
                 continue
@@ -121,7 +121,7 @@ class Crew:
                     handed += 1
                     continue
                 handed += 1
-                if mate is None or not mate.give(self._round, index, function, piece):
+                if worker is None or not worker.give(self._round, index, function, piece):
                     answers[index] = self._done_here(function, piece)
             elif given in answers:
                 yield answers.pop(given).taken()
@@ -136,36 +136,38 @@ class Crew:
         begin = time.process_time()
         answer = _tried(function, piece)
         self._spent += time.process_time() - begin
-        if self._spent > self.pays and not self.mates and _travels(function):
+        if self._spent > self.pays and not self.workers and _travels(function):
             self.call(function)
         return answer
 
     def call(self, function: Callable[[Any], Any]) -> None:
         """Start the others; they have pieces as soon as they know the function."""
-        self.mates = [_Mate() for _ in range(self.size - 1)]
-        for mate in self.mates:
-            mate.give(self._round, _HELLO, function, None)
+        self.workers = [_Worker() for _ in range(self.size - 1)]
+        for worker in self.workers:
+            worker.give(self._round, _HELLO, function, None)
 
     def wait_for_all(self) -> None:
         """Until everybody can work."""
-        while any(mate.in_hand for mate in self.mates):
+        while any(worker.in_hand for worker in self.workers):
             self._collect({}, None)
 
-    def _free(self) -> _Mate | None:
+    def _free(self) -> _Worker | None:
         """One who has room for a piece, the one with the most."""
-        ready = [m for m in self.mates if m.ready and m.in_hand < IN_HAND]
+        ready = [m for m in self.workers if m.ready and m.in_hand < IN_HAND]
         return min(ready, key=lambda m: m.in_hand, default=None)
 
     def _collect(self, answers: dict[int, _Answer], timeout: float | None) -> None:
         """Take the answers that are there."""
-        by_pipe: dict[Any, _Mate] = {mate.pipe: mate for mate in self.mates if mate.in_hand}
+        by_pipe: dict[Any, _Worker] = {
+            worker.pipe: worker for worker in self.workers if worker.in_hand
+        }
         for pipe in wait(list(by_pipe), timeout) if by_pipe else ():
             number, index, answer = by_pipe[pipe].answer()
             if index != _HELLO and number == self._round:
                 answers[index] = answer
 
 
-class _Mate:
+class _Worker:
     """Another process, and our end of its pipe."""
 
     def __init__(self) -> None:
@@ -229,11 +231,11 @@ def _tried(function: Callable[[Any], Any], piece: object) -> _Answer:
 
 
 def _work(pipe: Connection) -> None:
-    """What a mate does."""
+    """What a worker does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     exit_on(signal.SIGTERM)
     inbox: SimpleQueue[Any] = SimpleQueue()
-    # The master is never kept waiting while it sends, so that both cannot wait for each other.
+    # The owner is never kept waiting while it sends, so that both cannot wait for each other.
     threading.Thread(target=_receive, args=(pipe, inbox), daemon=True).start()
     function: Callable[[Any], Any] = _nothing
     with one_thread(), contextlib.suppress(EOFError, OSError):
@@ -250,7 +252,7 @@ def _nothing(piece: object) -> None:
 
 
 def _receive(pipe: Connection, inbox: SimpleQueue[Any]) -> None:
-    """Take what the master sends; nothing more comes where its pipe ends."""
+    """Take what the owner sends; nothing more comes where its pipe ends."""
     try:
         with contextlib.suppress(EOFError, OSError):
             while True:
