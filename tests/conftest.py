@@ -171,6 +171,11 @@ REPEATS = {
     "unit/test_fuzzing.py": {
         "test_a_harness_finds_nothing_in_a_few_hundred_inputs": 4,
     },
+    "unit/test_jobs_of_one.py": {
+        "test_a_run_that_is_cut_leaves_nothing_half_written_and_nobody_behind": 2,
+        "test_sections_find_what_the_whole_does": 2,
+        "test_the_same_bytes_with_one_process_and_with_three": 4,
+    },
     "unit/test_machine_document.py": {
         "test_a_hostile_text_is_refused_without_being_expanded": 5,
     },
