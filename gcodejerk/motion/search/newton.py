@@ -17,7 +17,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.candidates import Single, step_weights
 from gcodejerk.motion.search.objective import Objective
 
-POWERS = ((2.0, False), (8.0, True), (30.0, True))
+POWERS = ((2, False), (14, True))
 """Powers for which steps are proposed, and whether with what the power itself bends: without, a
 step leads to where all would be left still, and far; with it, to the edge."""
 DAMPED, SINGULAR = 1e-2, 1e-6
