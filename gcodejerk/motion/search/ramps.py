@@ -21,7 +21,7 @@ from gcodejerk.motion.profiles.symmetric import SymmetricProfiles, conventional_
 from gcodejerk.motion.search.candidates import symmetric_worst
 from gcodejerk.motion.search.combinations import best_combinations
 from gcodejerk.motion.search.condition3 import four_segment_range
-from gcodejerk.motion.search.newton import proposed_steps, slopes
+from gcodejerk.motion.search.newton import LAST_POWERS, POWERS, Powers, proposed_steps, slopes
 from gcodejerk.motion.search.objective import Objective
 from gcodejerk.motion.search.rows import ROUNDING, parts
 
@@ -39,8 +39,10 @@ FEW = 8
 """So few frequencies can be perfectly still: nulls are narrow, and worth a longer search."""
 STARTS, ROUNDS = 16, 1
 """Profiles that are descended from, and in how many steps."""
-LEADERS, LAST = (8, 5), (16, 6)
-"""Those that go on to the bottom, and in how many steps: of `FEW` frequencies, and of more."""
+LEADERS, LAST = (8, 5), (16, 4)
+"""Those that go on, and in how many steps: of `FEW` frequencies, and of more."""
+FINAL = (2, 6)
+"""Of more, the best that go on to the bottom, where the largest residuals have edges."""
 REACH = (0.3, 0.3, 0.25)
 """The longest first step: parts of T1 and of T2, and of Ta's range."""
 GROWS, SHRINKS = 1.5, 0.3
@@ -116,7 +118,10 @@ class _Search:
         points, value, reach = self._descend(points, value, reach, ROUNDS)
         many = len(self.objective.poles) > FEW
         points, value, reach = _best(LEADERS[many], points, value, reach)
-        points, value, _ = self._descend(points, value, reach, LAST[many])
+        points, value, reach = self._descend(points, value, reach, LAST[many])
+        if many:
+            points, value, reach = _best(FINAL[0], points, value, reach)
+            points, value, _ = self._descend(points, value, reach, FINAL[1], LAST_POWERS)
         points, value = (x[:, 0] for x in _best(1, points, value))
         return self._profiles(points), np.isfinite(value)
 
@@ -188,14 +193,14 @@ class _Search:
         return np.stack([T1, T2, np.where(np.isfinite(share), share, 0.0)], axis=-1)
 
     def _descend(
-        self, points: Array, value: Array, reach: Array, rounds: int
+        self, points: Array, value: Array, reach: Array, rounds: int, powers: Powers = POWERS
     ) -> tuple[Array, Array, Array]:
         """Steps downhill from k points of each move, shape (n, k, 3), with their values.
 
         `reach`: the longest step of each, as parts of `REACH`.
         """
         for _ in range(rounds):
-            step = self._steps(points)
+            step = self._steps(points, powers)
             longest = np.abs(step).max(axis=-1, keepdims=True)
             step *= np.minimum(1.0, reach[..., np.newaxis, np.newaxis] / np.maximum(longest, TINY))
             near = self._within(points[:, :, np.newaxis] + step * _unit(points)[:, :, np.newaxis])
@@ -221,7 +226,7 @@ class _Search:
         np.fmax(points[..., :2], np.where(shortest > 0.0, shortest, 0.0), out=points[..., :2])
         return points
 
-    def _steps(self, points: Array) -> Array:
+    def _steps(self, points: Array, powers: Powers) -> Array:
         """Proposed steps from points, in parts of `REACH`, shape (n, k, proposals, 3)."""
         T1, T2, share = points[..., 0], points[..., 1], points[..., 2]
         Ta, _, legal = self._ramps(points)
@@ -242,7 +247,7 @@ class _Search:
         fixed = np.zeros((2, 3, share.size), dtype=bool)
         fixed[0] = [(shortest >= T1).ravel(), (shortest >= T2).ravel(), (share <= 0.0).ravel()]
         fixed[1, 2] = (share >= 1.0).ravel()
-        steps = proposed_steps(left, by, self.objective, fixed)
+        steps = proposed_steps(left, by, self.objective, fixed, powers)
         return np.moveaxis(steps.reshape(len(steps), *share.shape, 3), 0, 2)
 
     def _value(self, points: Array, bound: Array | None = None) -> Array:
