@@ -50,7 +50,7 @@ GROWS, SHRINKS = 1.5, 0.3
 """
 NUDGE = 1e-4
 """Relative change of T1 and T2 by which the slope of Ta's range is found."""
-WIDE = 512
+WIDE = 256
 """Candidates of a move that are looked at at a time, about: so many moves are searched at once."""
 SHORTEST = 1e-12
 """Segments that are shorter are not there, and times that differ by less are equal. [s]"""
@@ -258,7 +258,8 @@ class _Search:
         T1, T2 = points[..., 0], points[..., 1]
         Ta, acceleration, legal = self._ramps(points)
         # What is not legal is evaluated as something harmless.
-        jerk = acceleration / np.minimum(T1, T2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            jerk = acceleration / np.minimum(T1, T2)
         T1, Ta, T2 = (
             np.where(legal, own, harmless) for own, harmless in ((T1, 1.0), (Ta, 0.0), (T2, 1.0))
         )
