@@ -1,5 +1,7 @@
 """The design of Condition III against dense scans that know no map."""
 
+import itertools
+
 import numpy as np
 import pytest
 from jerk_sums import columns, displacement
@@ -13,7 +15,7 @@ from gcodejerk.motion import (
     residual_acceleration,
     symmetric_response,
 )
-from gcodejerk.motion.search.condition3 import TIE
+from gcodejerk.motion.search.condition3 import TIE, _evenly
 
 INTERVAL = 0.001
 
@@ -196,3 +198,17 @@ def test_residuals_too_small_to_matter_are_ties_and_leave_the_lowest_jerk():
     )
     assert float(profiles.T1[0]) == pytest.approx(0.01)
     assert 0.0 < float(worst[0]) < TIE
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02, 0.3])
+def test_a_map_of_four_segments_is_what_profiles_leave_one_by_one(damping):
+    rng = np.random.default_rng(12)
+    own = mode_poles([3.0, 20.0, 57.0, 400.0], [damping] * 4)
+    weights = rng.uniform(0.1, 1.0, (3, 4))
+    total = rng.uniform(0.02, 1.0, 3)
+    T1 = total[:, np.newaxis] * np.linspace(0.03, 0.47, 41)
+    found = _evenly(T1, total, Objective.of_modes(own, weights))
+    for i, k in itertools.product(range(3), range(0, 41, 5)):
+        durations = (T1[i, k], 0.0, 0.5 * total[i] - T1[i, k], 0.0)
+        expected = displacement(*columns(*durations), own, weights[i])[0]
+        assert found[i, k] == pytest.approx(float(expected[0]), rel=1e-7, abs=1e-12)

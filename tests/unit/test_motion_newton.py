@@ -1,6 +1,7 @@
 """Steps downhill, and combinations of switching times, against profiles one by one."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from test_motion_candidates import drawn_objective
 from gcodejerk.motion import Objective, SymmetricProfiles, mode_poles
 from gcodejerk.motion.search.combinations import best_combinations
 from gcodejerk.motion.search.newton import POWERS, proposed_steps, slopes
+from gcodejerk.motion.search.ramps import _Search
 
 INTERVAL = 0.001
 
@@ -120,7 +122,8 @@ def test_combinations_are_the_best_of_all_profiles_with_these_times(damping, spe
         A, J = 12.0 / total**2, 200.0 / total**3
         found = best_combinations(times, total, (2.0 / total, A, J), objective, INTERVAL)
         for i, first in itertools.product(range(n), range(k - 1)):
-            one = objective.take(slice(i, i + 1))
+            # By the sum of all squares, as of one group.
+            one = replace(objective.take(slice(i, i + 1)), group=np.zeros_like(objective.group))
             T = total[i]
             best = np.inf
             for second, third in itertools.combinations(range(k), 2):
@@ -139,3 +142,29 @@ def test_combinations_are_the_best_of_all_profiles_with_these_times(damping, spe
                 T1, Ta, T2 = (x[i, first : first + 1] for x in found)
                 own = SymmetricProfiles(T1, Ta, T2, T - 2 * (T1 + Ta + T2)).general()
                 assert float(one.of(own)[0]) <= best * (1 + 1e-3) + 1e-4 * one.weights.max()
+
+
+def test_the_range_of_constant_acceleration_changes_as_differences_say():
+    rng = np.random.default_rng(4)
+    total = rng.uniform(0.1, 0.4, 6)
+    objective = Objective.of_modes(mode_poles([20.0], [0.0]), np.ones((6, 1)))
+    limits = 1.6 / total, np.linspace(6.0, 14.0, 6) / total**2, 1e4 / total**3
+    search = _Search(total, *limits, objective, INTERVAL)
+    T1, T2 = (rng.uniform(0.02, 0.3, (6, 40)) * total[:, np.newaxis] for _ in range(2))
+    share = rng.uniform(0.0, 1.0, T1.shape)
+    low, high, slope = search._slopes_of_Ta(T1, T2, share)
+    assert (low > 0.0).any()
+    assert (low == 0.0).any()
+    there = low < high
+    assert there.sum() > 40
+    step = 1e-7
+    for own, moved in zip(slope, ((step, 0.0), (0.0, step)), strict=True):
+        ends = [
+            (1.0 - share) * least + share * most
+            for least, most in (
+                search._range_of_Ta(T1 + sign * moved[0], T2 + sign * moved[1]) for sign in (-1, 1)
+            )
+        ]
+        difference = (ends[1] - ends[0]) / (2.0 * step)
+        near = there & (np.abs(difference) < 50.0)
+        assert (np.abs(own - difference)[near] < 1e-3).mean() > 0.99

@@ -282,3 +282,19 @@ def test_a_mode_that_does_not_vibrate_is_refused_with_its_damping(damping):
 def test_a_frequency_that_is_none_is_refused(frequency):
     with pytest.raises(PlanError, match=r"frequency is .*above zero"):
         residual_acceleration([0.0, 1.0], [1.0, -1.0], frequency, 0.0)
+
+
+def test_evenly_spaced_modes_are_as_right_as_modes_by_themselves():
+    """They are computed as products; here one mode after the other, and so alone."""
+    band = np.linspace(0.8, 1.2, 401)
+    own = mode_poles([3.0, 70.0], [0.3, 0.001])
+    poles = np.concatenate([own[0] * band, own[1] * band[:7], [1j, 2j, 4j, -50.0 + 900.0j]])
+    durations = (np.array([x]) for x in (0.02, 0.013, 0.08, 3.0))
+    profile = SymmetricProfiles(*durations).general()
+    together = profiles_response(profile, poles)[0]
+    alone = np.concatenate([profiles_response(profile, poles[k : k + 1])[0] for k in range(412)])
+    assert len(poles) == 412
+    # Steps that nearly cancel: what is left is small beside each of them.
+    scale = np.abs(profile.jerk).max() / np.abs(poles) ** 2
+    np.testing.assert_allclose(np.abs(together - alone) / scale, 0.0, atol=1e-12)
+    assert np.abs(alone / scale).max() > 1e-3

@@ -22,6 +22,8 @@ from gcodejerk.motion.search.rows import ROUNDING, best_in_rows, parts, pick_in_
 
 FEW_POLES = 12
 """So many poles can be evaluated in double precision, or for many more candidates."""
+AT_ONCE = 1 << 13
+"""Candidates of the map evaluated at a time: arrays in double precision, in the cache."""
 MAP_COLUMNS = 257
 """Values of T1 that are looked at first."""
 ZOOMS = 8
@@ -107,7 +109,10 @@ def _best_T1(total: Array, low: Array, high: Array, objective: Objective) -> Arr
     low, high, whole = low[:, np.newaxis], high[:, np.newaxis], total[:, np.newaxis]
     quarter = np.clip(0.25 * whole, low, high)
     every = np.column_stack([quarter, low + (high - low) * np.linspace(0.0, 1.0, MAP_COLUMNS)])
-    value = _worst(every, total, objective)
+    value = np.empty(every.shape)
+    value[:, :1] = _worst(quarter, total, objective)
+    for part in parts(len(total), MAP_COLUMNS, AT_ONCE):
+        value[part, 1:] = _evenly(every[part, 1:], total[part], objective.take(part))
     T1, worst = pick_in_rows(_least(value, np.abs(every - quarter)), every, value)
     step = (high - low) / (MAP_COLUMNS - 1)
     for _ in range(ZOOMS):
@@ -118,6 +123,42 @@ def _best_T1(total: Array, low: Array, high: Array, objective: Objective) -> Arr
         T1, worst = np.where(better, found, T1), np.where(better, least, worst)
         step = 0.25 * step
     return T1
+
+
+def _evenly(T1: Array, total: Array, objective: Objective) -> Array:
+    r"""The same for values of T1 side by side that are evenly spaced, shape (n, k).
+
+    With :math:`T_1 + T_2 = T/2` the response of `symmetric_response` is, but for
+    :math:`A/\lambda^2`, :math:`(e^{\lambda T_1} - 1)/T_1 \cdot (1 + h e^{\lambda T_2}) -
+    (e^{\lambda T_2} - 1)/T_2 \cdot (h + e^{\lambda T_1})` with :math:`h = e^{\lambda T/2}`, and the
+    exponentials of T1 and T2 are those of the first, times powers of those of a step.
+    """
+    n, k = T1.shape
+    T2 = 0.5 * total[:, np.newaxis] - T1
+    step = ((T1[:, -1] - T1[:, 0]) / (k - 1))[:, np.newaxis]
+    A = 6.0 / (total[:, np.newaxis] * (total[:, np.newaxis] - T1))
+    rise, fall = A / T1, A / T2
+    squares = np.zeros((len(objective.poles), n, k))
+    first, second, part = (np.empty((n, k), dtype=np.complex128) for _ in range(3))
+    for m, pole in enumerate(objective.poles):
+        half = np.exp(0.5 * pole * total)[:, np.newaxis]
+        for power, begin, way in ((first, T1, pole), (second, T2, -pole)):
+            power[:, :1] = np.exp(pole * begin[:, :1])
+            ratio, done = np.exp(way * step), 1
+            while done < k:
+                more = min(done, k - done)
+                np.multiply(power[:, :more], ratio, out=power[:, done : done + more])
+                ratio, done = ratio * ratio, done + more
+        np.multiply(second, half, out=part)
+        part += 1.0
+        part *= (first - 1.0) * rise
+        first += half
+        first *= (second - 1.0) * fall
+        part -= first
+        squares[m] = part.real**2 + part.imag**2
+    scale = np.abs(objective.poles) ** 2 * objective.poles.imag
+    displacement = np.sqrt(squares) / scale[:, np.newaxis, np.newaxis]
+    return objective.worst(np.moveaxis(displacement, 0, -1))
 
 
 def _worst(T1: Array, total: Array, objective: Objective) -> Array:

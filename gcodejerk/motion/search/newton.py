@@ -17,9 +17,13 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.candidates import Single, step_weights
 from gcodejerk.motion.search.objective import Objective
 
-POWERS = ((2.0, False), (8.0, True), (30.0, True))
+Powers = tuple[tuple[int, bool], ...]
+
+POWERS: Powers = ((2, False), (14, True))
 """Powers for which steps are proposed, and whether with what the power itself bends: without, a
 step leads to where all would be left still, and far; with it, to the edge."""
+LAST_POWERS: Powers = ((2, False), (8, True), (30, True))
+"""The same where the best are brought to the bottom."""
 DAMPED, SINGULAR = 1e-2, 1e-6
 """Added to the second derivatives, times each of them and times the largest."""
 
@@ -104,7 +108,11 @@ def _moved(
 
 
 def proposed_steps(
-    left: Single, slope: Single, objective: Objective, fixed: NDArray[np.bool_]
+    left: Single,
+    slope: Single,
+    objective: Objective,
+    fixed: NDArray[np.bool_],
+    powers: Powers = POWERS,
 ) -> Array:
     """Steps that lower the largest residual, as far as slopes tell.
 
@@ -116,10 +124,12 @@ def proposed_steps(
         Its groups.
     fixed : ndarray of bool, shape (2, 3, m)
         Which of the three may not fall, and which may not rise.
+    powers : tuple, optional
+        As `POWERS`.
 
     Returns
     -------
-    ndarray, shape (len(POWERS), m, 3)
+    ndarray, shape (len(powers), m, 3)
         In the units of the three numbers.
     """
     squares, radial = _summed(left * left), np.stack([_summed(own * left) for own in slope])
@@ -132,7 +142,7 @@ def proposed_steps(
     share = squares / np.where(largest > 0.0, largest, np.float32(1.0))
     inverse = np.float32(1.0) / np.where(squares > 0.0, squares, np.float32(1.0))
     steps = []
-    for power, bent in POWERS:
+    for power, bent in powers:
         weight = share ** np.float32(0.5 * power - 1.0)
         gradient = (weight * radial).sum(axis=1, dtype=np.float64)
         held = (fixed[0] & (gradient > 0.0)) | (fixed[1] & (gradient < 0.0))

@@ -21,14 +21,14 @@ from gcodejerk.motion.profiles.symmetric import SymmetricProfiles, conventional_
 from gcodejerk.motion.search.candidates import symmetric_worst
 from gcodejerk.motion.search.combinations import best_combinations
 from gcodejerk.motion.search.condition3 import four_segment_range
-from gcodejerk.motion.search.newton import proposed_steps, slopes
+from gcodejerk.motion.search.newton import LAST_POWERS, POWERS, Powers, proposed_steps, slopes
 from gcodejerk.motion.search.objective import Objective
 from gcodejerk.motion.search.rows import ROUNDING, parts
 
-TIMES, SPREAD = 32, 1.6
+TIMES, SPREAD = 36, 1.6
 """Times of the grid of combinations, and the power by which they are closer where ramps are short.
 """
-EDGES, LINE = 8, 17
+EDGES, LINE = 5, 9
 """Values of T1 and of T2 that are looked at at both ends of Ta's range, and of T1 of the
 four-segment profiles."""
 BISECTIONS = 24
@@ -37,19 +37,23 @@ PROMISING = 4.0
 """What leaves so many times the least of the grid is not evaluated to its end."""
 FEW = 8
 """So few frequencies can be perfectly still: nulls are narrow, and worth a longer search."""
-STARTS, ROUNDS = 12, 2
+STARTS, ROUNDS = 16, 1
 """Profiles that are descended from, and in how many steps."""
-LEADERS, LAST = (8, 3), (16, 7)
-"""Those that go on to the bottom, and in how many steps: of `FEW` frequencies, and of more."""
+LEADERS, LAST = (8, 5), (16, 4)
+"""Those that go on, and in how many steps: of `FEW` frequencies, and of more."""
+FINAL = (2, 6)
+"""Of more, the best that go on to the bottom, where the largest residuals have edges."""
 REACH = (0.3, 0.3, 0.25)
 """The longest first step: parts of T1 and of T2, and of Ta's range."""
 GROWS, SHRINKS = 1.5, 0.3
 """What the longest step is multiplied by after one that led downhill, and after one that did not.
 """
-RETURNS = 2
-"""Times that T1 and T2 are made as long as the limit of jerk asks for."""
 NUDGE = 1e-4
 """Relative change of T1 and T2 by which the slope of Ta's range is found."""
+WIDE = 256
+"""Candidates of a move that are looked at at a time, about: so many moves are searched at once."""
+SHORTEST = 1e-12
+"""Segments that are shorter are not there, and times that differ by less are equal. [s]"""
 TINY = 1e-12
 """A step that is none."""
 
@@ -83,7 +87,7 @@ def design_symmetric(
     n = len(total)
     columns, feasible = [np.ones(n) for _ in range(4)], np.zeros(n, dtype=bool)
     fastest = conventional_profiles(velocity, acceleration, jerk, interval)
-    for part in parts(n, TIMES**2 // 2):
+    for part in parts(n, WIDE):
         search = _Search(
             total[part], velocity[part], acceleration[part], jerk[part], objective.take(part),
             interval,
@@ -114,9 +118,12 @@ class _Search:
         points, value, reach = self._descend(points, value, reach, ROUNDS)
         many = len(self.objective.poles) > FEW
         points, value, reach = _best(LEADERS[many], points, value, reach)
-        points, value, _ = self._descend(points, value, reach, LAST[many])
+        points, value, reach = self._descend(points, value, reach, LAST[many])
+        if many:
+            points, value, reach = _best(FINAL[0], points, value, reach)
+            points, value, _ = self._descend(points, value, reach, FINAL[1], LAST_POWERS)
         points, value = (x[:, 0] for x in _best(1, points, value))
-        return self._profiles(points)[0], np.isfinite(value)
+        return self._profiles(points), np.isfinite(value)
 
     def _first(self, known: list[SymmetricProfiles]) -> tuple[Array, Array]:
         """Points of the grid, one for each T1, and what is looked at besides; their values."""
@@ -186,14 +193,14 @@ class _Search:
         return np.stack([T1, T2, np.where(np.isfinite(share), share, 0.0)], axis=-1)
 
     def _descend(
-        self, points: Array, value: Array, reach: Array, rounds: int
+        self, points: Array, value: Array, reach: Array, rounds: int, powers: Powers = POWERS
     ) -> tuple[Array, Array, Array]:
         """Steps downhill from k points of each move, shape (n, k, 3), with their values.
 
         `reach`: the longest step of each, as parts of `REACH`.
         """
         for _ in range(rounds):
-            step = self._steps(points)
+            step = self._steps(points, powers)
             longest = np.abs(step).max(axis=-1, keepdims=True)
             step *= np.minimum(1.0, reach[..., np.newaxis, np.newaxis] / np.maximum(longest, TINY))
             near = self._within(points[:, :, np.newaxis] + step * _unit(points)[:, :, np.newaxis])
@@ -213,29 +220,20 @@ class _Search:
         np.clip(points[..., 2], 0.0, 1.0, out=points[..., 2])
         np.maximum(points[..., :2], self.interval, out=points[..., :2])
         J = self.J.reshape(-1, *(1,) * (points.ndim - 1))
-        for _ in range(RETURNS):
-            profiles = self._profiles(points)[0]
-            with np.errstate(invalid="ignore", divide="ignore"):
-                shortest = profiles.acceleration[..., np.newaxis] / J * (1.0 + ROUNDING)
-            np.fmax(points[..., :2], np.where(shortest > 0.0, shortest, 0.0), out=points[..., :2])
+        acceleration = self._ramps(points)[1]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shortest = acceleration[..., np.newaxis] / J * (1.0 + ROUNDING)
+        np.fmax(points[..., :2], np.where(shortest > 0.0, shortest, 0.0), out=points[..., :2])
         return points
 
-    def _steps(self, points: Array) -> Array:
+    def _steps(self, points: Array, powers: Powers) -> Array:
         """Proposed steps from points, in parts of `REACH`, shape (n, k, proposals, 3)."""
         T1, T2, share = points[..., 0], points[..., 1], points[..., 2]
-        profiles, legal = self._profiles(points)
+        Ta, _, legal = self._ramps(points)
         quarter = 0.25 * self.total[:, np.newaxis]
-        own = (profiles.T1, profiles.Ta, profiles.T2)
-        ramp = [np.where(legal, x, quarter) for x in own]
+        ramp = [np.where(legal, x, quarter) for x in (T1, Ta, T2)]
         left, by = slopes(ramp[0], ramp[1], ramp[2], self.total, self.objective)
-        low, high = self._range_of_Ta(T1, T2)
-        slope = []
-        for which, T in enumerate((T1, T2)):
-            moved = [T1, T2]
-            moved[which] = T * (1.0 + NUDGE)
-            lower, higher = self._range_of_Ta(*moved)
-            change = (lower - low) * (1.0 - share) + (higher - high) * share
-            slope.append(np.where(np.isfinite(change), change, 0.0) / (NUDGE * T))
+        low, high, slope = self._slopes_of_Ta(T1, T2, share)
         width = np.where(np.isfinite(high - low), high - low, 0.0)
         unit = _unit(points)
         by_T1, by_T2, by_Ta = (
@@ -249,7 +247,7 @@ class _Search:
         fixed = np.zeros((2, 3, share.size), dtype=bool)
         fixed[0] = [(shortest >= T1).ravel(), (shortest >= T2).ravel(), (share <= 0.0).ravel()]
         fixed[1, 2] = (share >= 1.0).ravel()
-        steps = proposed_steps(left, by, self.objective, fixed)
+        steps = proposed_steps(left, by, self.objective, fixed, powers)
         return np.moveaxis(steps.reshape(len(steps), *share.shape, 3), 0, 2)
 
     def _value(self, points: Array, bound: Array | None = None) -> Array:
@@ -257,17 +255,18 @@ class _Search:
 
         It may be infinite, too, where it is above its bound, of the same shape.
         """
-        profiles, legal = self._profiles(points)
+        T1, T2 = points[..., 0], points[..., 1]
+        Ta, acceleration, legal = self._ramps(points)
         # What is not legal is evaluated as something harmless.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            jerk = acceleration / np.minimum(T1, T2)
         T1, Ta, T2 = (
-            np.where(legal, own, harmless)
-            for own, harmless in ((profiles.T1, 1.0), (profiles.Ta, 0.0), (profiles.T2, 1.0))
+            np.where(legal, own, harmless) for own, harmless in ((T1, 1.0), (Ta, 0.0), (T2, 1.0))
         )
         total = np.where(legal.any(axis=1), self.total, 4.0)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             bound = np.where(legal, np.inf if bound is None else bound, -1.0)
             worst = symmetric_worst(T1, Ta, T2, total, self.objective, bound)
-            jerk = profiles.jerk
         # Where nothing vibrates the lowest jerk is the best.
         still = ~self.objective.weights.any(axis=1, keepdims=True)
         return np.where(legal, np.where(still, jerk, worst), np.inf)
@@ -290,8 +289,36 @@ class _Search:
             low = p - np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
         return np.maximum(low, 0.0), high
 
-    def _profiles(self, points: Array) -> tuple[SymmetricProfiles, NDArray[np.bool_]]:
-        """The profiles of points; whether each keeps limits and segment durations."""
+    def _slopes_of_Ta(self, T1: Array, T2: Array, share: Array) -> tuple[Array, Array, list[Array]]:
+        """Ta's range, and how a share of it changes with T1 and T2; 0 where there is no range."""
+        shape = (len(self.total),) + (1,) * (T1.ndim - 1)
+        T, centroid, A = (x.reshape(shape) for x in (self.total, self.centroid, self.A))
+        half = 0.5 * (T1 + T2)
+        moment = T1 * T1 / 3.0 + 0.5 * T1 * T2 + T2 * T2 / 6.0
+        b, p = T1 + 0.5 * T2 - centroid, 0.5 * T - T1 - 0.5 * T2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            root = np.sqrt(b * b - 2.0 * (moment - centroid * half))
+            other = np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
+            first, last = root - b, 0.5 * T - T1 - T2
+            high, low = np.minimum(first, last), p - other
+            slope = []
+            for own, part in ((1.0, 2.0 * T1 / 3.0 + 0.5 * T2), (0.5, 0.5 * T1 + T2 / 3.0)):
+                upper = (own * b - part + 0.5 * centroid) / root - own
+                lower = -own - (0.25 * T - own * p - part) / other
+                change = np.where(low > 0.0, lower, 0.0) * (1.0 - share)
+                change += np.where(first < last, upper, -1.0) * share
+                slope.append(np.where(np.isfinite(change), change, 0.0))
+        return np.maximum(low, 0.0), high, slope
+
+    def _profiles(self, points: Array) -> SymmetricProfiles:
+        """The profiles of points, shape (n, 3)."""
+        T1, T2 = points[:, 0], points[:, 1]
+        Ta = self._ramps(points)[0]
+        Tv = self.total - 2.0 * (T1 + Ta + T2)
+        return SymmetricProfiles(T1, Ta, T2, np.where(np.abs(Tv) < SHORTEST, 0.0, Tv))
+
+    def _ramps(self, points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Ta and the acceleration of points; whether each keeps limits and segment durations."""
         T1, T2, share = points[..., 0], points[..., 1], points[..., 2]
         T = self.total.reshape((len(self.total),) + (1,) * (T1.ndim - 1))
         J = self.J.reshape(T.shape)
@@ -299,28 +326,28 @@ class _Search:
         dt = self.interval * (1.0 - ROUNDING)
         Ta = low + share * (high - low)
         # A segment that would be shorter than the interval vanishes or grows to it.
-        grown = np.where(low <= 0.0, 0.0, self.interval)
-        Ta = np.where(Ta < dt, grown, Ta)
-        room = 0.5 * T - T1 - T2
+        Ta = np.where(Ta < dt, (low > 0.0) * self.interval, Ta)
+        half = 0.5 * (T1 + T2)
+        room = 0.5 * T - 2.0 * half
         Tv = 2.0 * (room - Ta)
         closed = np.where(Tv < 0.5 * self.interval, room, room - 0.5 * self.interval)
         Ta = np.where(Tv < dt, closed, Ta)
-        Ta = np.where(np.abs(Ta) < 1e-12, 0.0, Ta)
+        Ta = np.where(np.abs(Ta) < SHORTEST, 0.0, Ta)
         Tv = 2.0 * (room - Ta)
-        Tv = np.where(np.abs(Tv) < 1e-12, 0.0, Tv)
+        moment = T1 * T1 / 3.0 + Ta * (T1 + 0.5 * Ta) + T2 * (half + 0.5 * Ta - T2 / 3.0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            profiles = SymmetricProfiles(T1, Ta, T2, Tv)
-            tolerance = 1e-12
+            acceleration = 1.0 / ((Ta + half) * T - 2.0 * moment)
+            shortest = np.minimum(T1, T2)
             legal = (
-                (low <= high + tolerance)
-                & (Ta >= low - tolerance)
-                & (Ta <= high + tolerance)
+                (low <= high + SHORTEST)
+                & (Ta >= low - SHORTEST)
+                & (Ta <= high + SHORTEST)
                 & ((Ta == 0.0) | (Ta >= dt))
-                & ((Tv == 0.0) | (Tv >= dt))
-                & (np.minimum(T1, T2) >= dt)
-                & (profiles.acceleration <= J * np.minimum(T1, T2))
+                & ((np.abs(Tv) < SHORTEST) | (Tv >= dt))
+                & (shortest >= dt)
+                & (acceleration <= J * shortest)
             )
-        return profiles, legal
+        return Ta, acceleration, legal
 
 
 def _unit(points: Array) -> Array:
