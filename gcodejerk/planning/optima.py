@@ -42,6 +42,8 @@ ARRIVED = 1e-9
 """Error of the end, for the unit length."""
 FEW = 16
 """Fewer problems than this are solved in this process."""
+GENERATION = 2
+"""Counted on whenever the solver answers otherwise: answers of before are not taken."""
 NONE = b"none"
 """In the cache: the problem has no solution."""
 BATCH = 64
@@ -89,7 +91,7 @@ class Question:
             ]
         )  # fmt: skip
         # Rounded: the same move computed in another order is the same problem.
-        text = ",".join([__version__, *(f"{x:.10g}" for x in numbers)])
+        text = ",".join([__version__, str(GENERATION), *(f"{x:.10g}" for x in numbers)])
         return hashlib.blake2b(text.encode(), digest_size=16).digest(), scale
 
 
