@@ -16,6 +16,8 @@ damping too.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -28,6 +30,8 @@ STILL = 1e-9
 """Acceleration that is none, of the profile's peak. [-]"""
 EVEN = 2e-15
 """Relative change of the distance of poles, up to which they are evenly spaced."""
+LONGEST_RUN = 16
+"""Of so many evenly spaced poles exponentials are products; the rounding is below 1e-14."""
 AT_ONCE = 16000
 """Numbers of an array that stays in the processor's nearest memory."""
 
@@ -223,14 +227,19 @@ def _steps_response(profiles: Profiles, poles: Complex, starts: NDArray[np.int64
     response = np.empty((len(starts), len(poles)), dtype=np.complex128)
     left = np.repeat(profiles.total, np.diff(profiles.first) + 1) - profiles.step_times()
     a, j = profiles.acceleration_steps(), profiles.jerk_steps()
-    # Some poles at once: of few steps, a pole by itself is mostly calls.
+    # Some poles at once: of few steps, a pole by itself is mostly calls. Runs stay whole, so that
+    # what is computed of a profile does not depend on how many stand beside it.
     some = max(1, AT_ONCE // max(len(left), 1))
-    for first in range(0, len(poles), some):
-        own = poles[first : first + some]
-        inverse = 1.0 / own[:, np.newaxis]
-        each = _exponentials(own, left)
-        each *= (a + j * inverse) * inverse
-        response[:, first : first + some] = np.add.reduceat(each, starts, axis=1).T
+    runs: list[slice] = []
+    for run in _even_runs(poles):
+        runs.append(run)
+        first = runs[0].start
+        if run.stop - first >= some or run.stop == len(poles):
+            inverse = 1.0 / poles[first : run.stop, np.newaxis]
+            each = np.concatenate([_exponentials(poles[one], left) for one in runs])
+            each *= (a + j * inverse) * inverse
+            response[:, first : run.stop] = np.add.reduceat(each, starts, axis=1).T
+            runs = []
     return response
 
 
@@ -256,32 +265,29 @@ def symmetric_response(profiles: SymmetricProfiles, poles: Complex) -> Complex:
     return response
 
 
-def _exponentials(poles: Complex, duration: Array) -> Complex:
-    """exp(pole t) of many poles, shape (m, k): where they are evenly spaced, as products.
-
-    By doubling: for a thousand of them the rounding is still some 1e-13.
-    """
-    if len(poles) < 3:
-        return _exponential(poles[:, np.newaxis], duration)
-    spacing = np.diff(poles)
-    even = np.abs(np.diff(spacing)) <= EVEN * np.abs(poles[1:-1])
-    out = np.empty((len(poles), len(duration)), dtype=np.complex128)
+def _even_runs(poles: Complex) -> Iterator[slice]:
+    """Poles next to each other that are evenly spaced, a few at a time."""
+    even = np.abs(np.diff(poles, n=2)) <= EVEN * np.abs(poles[1:-1])
     begin = 0
     while begin < len(poles):
-        uneven = np.flatnonzero(~even[begin:])
-        end = begin + 2 + int(uneven[0]) if len(uneven) else len(poles)
-        end = min(end, len(poles))
-        run = out[begin:end]
-        run[0] = _exponential(poles[begin], duration)
-        if end - begin > 1:
-            step = _exponential((poles[end - 1] - poles[begin]) / (end - 1 - begin), duration)
-            done = 1
-            while done < len(run):
-                more = min(done, len(run) - done)
-                np.multiply(run[:more], step, out=run[done : done + more])
-                done += more
-                step = step * step
+        uneven = np.flatnonzero(~even[begin : begin + LONGEST_RUN - 2])
+        end = begin + (2 + int(uneven[0]) if len(uneven) else LONGEST_RUN)
+        yield slice(begin, min(end, len(poles)))
         begin = end
+
+
+def _exponentials(poles: Complex, duration: Array) -> Complex:
+    """exp(pole t) of evenly spaced poles, shape (m, k): as products, by doubling."""
+    out = np.empty((len(poles), len(duration)), dtype=np.complex128)
+    out[0] = _exponential(poles[0], duration)
+    if len(poles) > 1:
+        step = _exponential((poles[-1] - poles[0]) / (len(poles) - 1), duration)
+        done = 1
+        while done < len(poles):
+            more = min(done, len(poles) - done)
+            np.multiply(out[:more], step, out=out[done : done + more])
+            done += more
+            step = step * step
     return out
 
 

@@ -26,7 +26,7 @@ PROGRAMS = {
     "increments": "G0 X0 Y0 Z15\nG91\nG1 X20 Y10 F5000\nZ-10\nZ-4 F300\nX2\nZ14 F5000\nX40\nG90\n"
     "Z-1 F300\nX70\nM2\n",
     "words": "G0 X0 Y0 Z15\nN10 G1 X20 F5000 (over) M8\nN20 Y30 S500\nN30 F200 X21 Z2\nX25\nM2\n",
-    "inch": "G20\nG0 X0 Y0 Z1\nG1 X2 F200\nZ.3\nZ-.1 F10\nX2.5\nM2\n",
+    "inch": "G20\nG0 X0 Y0 Z1\nG1 X2 F200\nZ.7\nZ-.1 F10\nX2.5\nM2\n",
 }
 SAID = {"inch": RapidFeed(200.0, 0.2)}
 

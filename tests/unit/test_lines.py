@@ -102,12 +102,12 @@ def test_blocks_without_length_are_skipped_at_the_ends_and_made_up_for_in_the_mi
 
 
 def test_a_plan_is_judged_in_the_form_of_its_control_and_has_a_point_for_every_interval():
-    move = {"X": 37.3, "Z": -20.0}
+    move = {"X": 40.0, "Z": -20.0}
     table = plan_move(move, MACHINE)
     held = plan_move(move, MACHINE, stride=2, play=Play.HELD)
     assert held.planned
     np.testing.assert_array_equal(held.t, table.t)
     np.testing.assert_array_equal(held.positions["X"], table.positions["X"])
-    (batch,) = batches([[37.3, -20.0]], Play.HELD)
+    (batch,) = batches([[40.0, -20.0]], Play.HELD)
     np.testing.assert_array_equal(held.residual, batch.residual)
     assert abs(held.residual[0, 1] - table.residual[0, 1]) > 5e-4

@@ -298,3 +298,13 @@ def test_evenly_spaced_modes_are_as_right_as_modes_by_themselves():
     scale = np.abs(profile.jerk).max() / np.abs(poles) ** 2
     np.testing.assert_allclose(np.abs(together - alone) / scale, 0.0, atol=1e-12)
     assert np.abs(alone / scale).max() > 1e-3
+
+
+def test_what_a_profile_does_is_the_same_to_the_bit_whatever_stands_beside_it():
+    rng = np.random.default_rng(8)
+    columns = rng.uniform(0.001, 0.1, (4, 3000))
+    poles = mode_poles(np.concatenate([30.0 * np.linspace(0.9, 1.1, 21), [50.0, 51.0, 80.0]]), 0.02)
+    together = profiles_response(SymmetricProfiles(*columns).general(), poles)
+    for some in (slice(0, 1), slice(7, 8), slice(100, 140)):
+        alone = profiles_response(SymmetricProfiles(*columns[:, some]).general(), poles)
+        np.testing.assert_array_equal(alone, together[some])
