@@ -266,13 +266,19 @@ def symmetric_response(profiles: SymmetricProfiles, poles: Complex) -> Complex:
 
 
 def _even_runs(poles: Complex) -> Iterator[slice]:
-    """Poles next to each other that are evenly spaced, a few at a time."""
-    even = np.abs(np.diff(poles, n=2)) <= EVEN * np.abs(poles[1:-1])
+    """Poles next to each other that are evenly spaced, a few at a time; others by themselves.
+
+    None decays more slowly than the one in front: behind one that has died, the product would be
+    nothing times infinity.
+    """
+    step = np.diff(poles)
+    even = (np.abs(np.diff(step)) <= EVEN * np.abs(poles[1:-1])) & (step[1:].real <= 0.0)
     begin = 0
     while begin < len(poles):
-        uneven = np.flatnonzero(~even[begin : begin + LONGEST_RUN - 2])
-        end = begin + (2 + int(uneven[0]) if len(uneven) else LONGEST_RUN)
-        yield slice(begin, min(end, len(poles)))
+        run = even[begin : begin + LONGEST_RUN - 2]
+        length = len(run) if run.all() else int(np.argmin(run))
+        end = begin + (length + 2 if length else 1)
+        yield slice(begin, end)
         begin = end
 
 

@@ -308,3 +308,18 @@ def test_what_a_profile_does_is_the_same_to_the_bit_whatever_stands_beside_it():
     for some in (slice(0, 1), slice(7, 8), slice(100, 140)):
         alone = profiles_response(SymmetricProfiles(*columns[:, some]).general(), poles)
         np.testing.assert_array_equal(alone, together[some])
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("behind", [[], [5.0]])
+def test_a_mode_that_dies_soon_costs_the_next_nothing(behind):
+    """From one to the next, exponentials as products would be nothing times infinity."""
+    frequency = np.array([100.0, 30.0, 20.0, 10.0, *behind])
+    poles = mode_poles(frequency, np.where(frequency > 50.0, 0.5, 0.0))
+    decaying = np.array([-900.0, -600.0, -300.0, 0.0]) + 200.0j
+    poles = np.concatenate([poles, decaying])
+    profile = one(0.02, 3.0, 0.02, 2.0)
+    alone = np.array([profiles_response(profile, pole[np.newaxis])[0, 0] for pole in poles])
+    together = profiles_response(profile, poles)[0]
+    scale = np.abs(profile.jerk).max() / np.abs(poles) ** 2
+    np.testing.assert_allclose(np.abs(together - alone) / scale, 0.0, atol=1e-12)
