@@ -5,14 +5,12 @@ is there yet. So nobody is started for a small program, where the work is done b
 
 Rule 1: answers come in the order of the pieces, and so does what goes wrong.
 Rule 2: of pieces and answers only a few for each process are in memory.
-Rule 3: as for `workers`: no worker outlives its owner, and Ctrl-C is the owner's business.
 """
 
 from __future__ import annotations
 
 import contextlib
 import pickle
-import signal
 import threading
 import time
 import traceback
@@ -22,8 +20,7 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, NamedTuple
 
-from gcodejerk.batch.signals import exit_on
-from gcodejerk.batch.workers import CONTEXT, PATIENCE, deaf_to_ctrl_c
+from gcodejerk.batch.processes import Child, answer_signals, end_all
 from gcodejerk.errors import GcodejerkError
 from gcodejerk.motion.threads import one_thread
 from gcodejerk.spread import In, Out, here
@@ -88,10 +85,7 @@ class Pool:
         place: TracebackType | None,
     ) -> None:
         workers, self.workers = self.workers, []
-        for worker in workers:
-            worker.process.terminate()
-        for worker in workers:
-            worker.end()
+        end_all(workers)
 
     def map(self, function: Callable[[In], Out], pieces: Iterable[In], /) -> Iterator[Out]:
         """See `Spread`; one map at a time."""
@@ -167,15 +161,11 @@ class Pool:
                 answers[index] = answer
 
 
-class _Worker:
-    """Another process, and our end of its pipe."""
+class _Worker(Child):
+    """Another process, and what it has in hand."""
 
     def __init__(self) -> None:
-        self.pipe, theirs = CONTEXT.Pipe()
-        self.process = CONTEXT.Process(target=_work, args=(theirs,), daemon=True)
-        with deaf_to_ctrl_c():
-            self.process.start()
-        theirs.close()
+        super().__init__(_work)
         self.in_hand = 0
         self.ready = False
         self._function: Callable[[Any], Any] | None = None
@@ -203,15 +193,6 @@ class _Worker:
         self.ready = True
         return number, index, answer
 
-    def end(self) -> int | None:
-        """Wait for its end; the exit status."""
-        self.pipe.close()
-        self.process.join(PATIENCE)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
-        return self.process.exitcode
-
 
 def _travels(function: Callable[[Any], Any]) -> bool:
     """Whether other processes can be told of a function; somebody else's emitter may say no."""
@@ -232,8 +213,7 @@ def _tried(function: Callable[[Any], Any], piece: object) -> _Answer:
 
 def _work(pipe: Connection) -> None:
     """What a worker does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    exit_on(signal.SIGTERM)
+    answer_signals()
     inbox: SimpleQueue[Any] = SimpleQueue()
     # The owner is never kept waiting while it sends, so that both cannot wait for each other.
     threading.Thread(target=_receive, args=(pipe, inbox), daemon=True).start()

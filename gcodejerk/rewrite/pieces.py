@@ -7,7 +7,7 @@ of them, and their blocks. So it can be worked on in another process (`spread`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,9 +59,8 @@ class Piece:
         places = np.searchsorted(rows, moves)
         own = np.zeros(len(rows), dtype=np.bool_)
         own[places] = True
-        columns = {f.name: getattr(rapids, f.name)[rows] for f in fields(rapids)}
         part = replace(plans.part(rows, own), reason=reason[rows])
-        return cls(rows, places, part, Rapids(**columns), number_format.take(rows), blocks)
+        return cls(rows, places, part, rapids.part(rows), number_format.take(rows), blocks)
 
     def behind(self, reason: NDArray[np.uint8]) -> Piece:
         """The same with other reasons for the rapids in front of its moves."""

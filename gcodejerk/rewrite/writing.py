@@ -166,10 +166,8 @@ class _Streams:
         aside = None
         texts = made.texts
         if made.batch is not None:
-            batch, rapids = (
-                replace(made.batch, moves=moves, plans=self.plans),
-                writer.program.rapids,
-            )
+            batch = replace(made.batch, moves=moves, plans=self.plans)
+            rapids = writer.program.rapids
             blocks = writer.blocks(moves)
             texts = emitter.render(batch, rapids, blocks, self.make.newline, self.make.options)
             aside = None if writer.beside is None else emitter.render_beside(batch, rapids)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO, Protocol, runtime_checkable
 
 import numpy as np
@@ -165,7 +165,7 @@ def judge_sections(
     if len(cuts) < FEWEST:
         return None
     windows = Window(original), Window(processed)
-    empty = replace(program, rapids=_rows(program.rapids, np.zeros(0, dtype=np.int64)))
+    empty = replace(program, rapids=program.rapids.part(slice(0)))
     sections = _sections(*windows, program, reported, cuts)
     replaced, kept, stamped = list[NDArray[np.int64]](), 0, False
     last = -1
@@ -226,7 +226,7 @@ def _sections(
         begin = int(rapids.begin[first]) if k else 0
         end = program.size if final else int(rapids.begin[behind])
         rows = np.arange(max(first - 1, 0), min(behind + 1, len(rapids)))
-        own = _rows(rapids, rows)
+        own = rapids.part(rows)
         inside = (rows >= first) & (rows < behind)
         own.reason[~inside & (own.reason == CERTAIN)] = REASONS.index(Reason.AFTER_END)
         lines = rapids.line[first], rapids.line[behind - 1]
@@ -242,11 +242,6 @@ def _sections(
             follows=bool(follows),
             reported=_between(reported, int(lines[0]), int(lines[1])),
         )
-
-
-def _rows(rapids: Rapids, rows: NDArray[np.int64]) -> Rapids:
-    """Some of the rapids."""
-    return Rapids(**{f.name: getattr(rapids, f.name)[rows] for f in fields(rapids)})
 
 
 def _between(reported: Reported, first: int, last: int) -> Reported:

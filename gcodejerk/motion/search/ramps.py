@@ -219,7 +219,7 @@ class _Search:
         """Points moved back to the limits that they are beyond; nearly, where it is the jerk's."""
         np.clip(points[..., 2], 0.0, 1.0, out=points[..., 2])
         np.maximum(points[..., :2], self.interval, out=points[..., :2])
-        J = self.J.reshape(-1, *(1,) * (points.ndim - 1))
+        J = self._beside(points, self.J)
         acceleration = self._ramps(points)[1]
         with np.errstate(invalid="ignore", divide="ignore"):
             shortest = acceleration[..., np.newaxis] / J * (1.0 + ROUNDING)
@@ -272,43 +272,45 @@ class _Search:
         return np.where(legal, np.where(still, jerk, worst), np.inf)
 
     def _range_of_Ta(self, T1: Array, T2: Array) -> tuple[Array, Array]:
-        """Least and greatest Ta for given T1 and T2: from A and from V and T_SUM.
+        """Least and greatest Ta for given T1 and T2: from A and from V and T_SUM."""
+        (p, lower), (b, upper), room = self._roots_of_Ta(T1, T2)
+        return np.maximum(p - lower, 0.0), np.minimum(upper - b, room)
 
-        Both limits are quadratic in Ta, since the ramp's moment is.
+    def _roots_of_Ta(
+        self, T1: Array, T2: Array
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+        """What Ta's range follows from: A asks for Ta >= p - root, V for Ta <= root - b.
+
+        Both limits are quadratic in Ta, since the ramp's moment is. Last: what T_SUM leaves to Ta.
         """
-        shape = (len(self.total),) + (1,) * (T1.ndim - 1)
-        T, centroid, A = (x.reshape(shape) for x in (self.total, self.centroid, self.A))
-        half = 0.5 * (T1 + T2)
-        moment = T1 * T1 / 3.0 + 0.5 * T1 * T2 + T2 * T2 / 6.0
-        b = T1 + 0.5 * T2 - centroid
-        p = 0.5 * T - T1 - 0.5 * T2
-        with np.errstate(invalid="ignore"):
-            high = np.minimum(
-                -b + np.sqrt(b * b - 2.0 * (moment - centroid * half)), 0.5 * T - T1 - T2
-            )
-            low = p - np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
-        return np.maximum(low, 0.0), high
-
-    def _slopes_of_Ta(self, T1: Array, T2: Array, share: Array) -> tuple[Array, Array, list[Array]]:
-        """Ta's range, and how a share of it changes with T1 and T2; 0 where there is no range."""
-        shape = (len(self.total),) + (1,) * (T1.ndim - 1)
-        T, centroid, A = (x.reshape(shape) for x in (self.total, self.centroid, self.A))
+        T, centroid, A = (self._beside(T1, x) for x in (self.total, self.centroid, self.A))
         half = 0.5 * (T1 + T2)
         moment = T1 * T1 / 3.0 + 0.5 * T1 * T2 + T2 * T2 / 6.0
         b, p = T1 + 0.5 * T2 - centroid, 0.5 * T - T1 - 0.5 * T2
+        with np.errstate(invalid="ignore"):
+            upper = np.sqrt(b * b - 2.0 * (moment - centroid * half))
+            lower = np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
+        return (p, lower), (b, upper), 0.5 * T - T1 - T2
+
+    def _slopes_of_Ta(self, T1: Array, T2: Array, share: Array) -> tuple[Array, Array, list[Array]]:
+        """Ta's range, and how a share of it changes with T1 and T2; 0 where there is no range."""
+        (p, lower), (b, upper), room = self._roots_of_Ta(T1, T2)
+        T, centroid = (self._beside(T1, x) for x in (self.total, self.centroid))
+        low, high = p - lower, upper - b
+        slope = []
         with np.errstate(invalid="ignore", divide="ignore"):
-            root = np.sqrt(b * b - 2.0 * (moment - centroid * half))
-            other = np.sqrt(p * p + half * T - 2.0 * moment - 1.0 / A)
-            first, last = root - b, 0.5 * T - T1 - T2
-            high, low = np.minimum(first, last), p - other
-            slope = []
             for own, part in ((1.0, 2.0 * T1 / 3.0 + 0.5 * T2), (0.5, 0.5 * T1 + T2 / 3.0)):
-                upper = (own * b - part + 0.5 * centroid) / root - own
-                lower = -own - (0.25 * T - own * p - part) / other
-                change = np.where(low > 0.0, lower, 0.0) * (1.0 - share)
-                change += np.where(first < last, upper, -1.0) * share
+                rises = (own * b - part + 0.5 * centroid) / upper - own
+                falls = -own - (0.25 * T - own * p - part) / lower
+                change = np.where(low > 0.0, falls, 0.0) * (1.0 - share)
+                change += np.where(high < room, rises, -1.0) * share
                 slope.append(np.where(np.isfinite(change), change, 0.0))
-        return np.maximum(low, 0.0), high, slope
+        return np.maximum(low, 0.0), np.minimum(high, room), slope
+
+    @staticmethod
+    def _beside(points: Array, column: Array) -> Array:
+        """A number of each move, shaped to stand beside numbers of its points."""
+        return column.reshape(-1, *(1,) * (points.ndim - 1))
 
     def _profiles(self, points: Array) -> SymmetricProfiles:
         """The profiles of points, shape (n, 3)."""
@@ -320,8 +322,7 @@ class _Search:
     def _ramps(self, points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Ta and the acceleration of points; whether each keeps limits and segment durations."""
         T1, T2, share = points[..., 0], points[..., 1], points[..., 2]
-        T = self.total.reshape((len(self.total),) + (1,) * (T1.ndim - 1))
-        J = self.J.reshape(T.shape)
+        T, J = (self._beside(T1, x) for x in (self.total, self.J))
         low, high = self._range_of_Ta(T1, T2)
         dt = self.interval * (1.0 - ROUNDING)
         Ta = low + share * (high - low)

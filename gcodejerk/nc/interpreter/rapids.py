@@ -83,7 +83,7 @@ class Rapids:
     def __len__(self) -> int:
         return len(self.line)
 
-    def part(self, rows: slice) -> Rapids:
+    def part(self, rows: slice | NDArray[np.int64]) -> Rapids:
         """Some of the rapids."""
         return Rapids(**{column.name: getattr(self, column.name)[rows] for column in fields(self)})
 
