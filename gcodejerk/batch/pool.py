@@ -31,9 +31,9 @@ IN_HAND = 2
 """Pieces that a worker has at a time, so that none waits for its owner."""
 AHEAD = 4
 """Pieces, for each process, that are asked for ahead of the answers that were taken."""
-_STAYS = pickle.PicklingError, AttributeError, TypeError
+NOT_PICKLED = pickle.PicklingError, AttributeError, TypeError
 """Raised for what cannot be pickled."""
-_HELLO = -1
+GREETING = -1
 """In the place of a piece's index: the worker has imported what it needs."""
 
 
@@ -46,7 +46,7 @@ class LostError(GcodejerkError):
 
 
 class _Answer(NamedTuple):
-    """What became of a piece."""
+    """The value of a piece, or the error that it ended in."""
 
     value: Any
     error: Exception | None = None
@@ -130,7 +130,7 @@ class Pool:
         begin = time.process_time()
         answer = _tried(function, piece)
         self._spent += time.process_time() - begin
-        if self._spent > self.pays and not self.workers and _travels(function):
+        if self._spent > self.pays and not self.workers and _can_be_pickled(function):
             self.call(function)
         return answer
 
@@ -138,7 +138,7 @@ class Pool:
         """Start the others; they have pieces as soon as they know the function."""
         self.workers = [_Worker() for _ in range(self.size - 1)]
         for worker in self.workers:
-            worker.give(self._round, _HELLO, function, None)
+            worker.give(self._round, GREETING, function, None)
 
     def wait_for_all(self) -> None:
         """Until everybody can work."""
@@ -157,7 +157,7 @@ class Pool:
         }
         for pipe in wait(list(by_pipe), timeout) if by_pipe else ():
             number, index, answer = by_pipe[pipe].answer()
-            if index != _HELLO and number == self._round:
+            if index != GREETING and number == self._round:
                 answers[index] = answer
 
 
@@ -177,7 +177,7 @@ class _Worker(Child):
             self.pipe.send((number, index, new, piece))
         except OSError:
             raise LostError(self.end()) from None
-        except _STAYS:
+        except NOT_PICKLED:
             return False
         self._function = function
         self.in_hand += 1
@@ -194,11 +194,11 @@ class _Worker(Child):
         return number, index, answer
 
 
-def _travels(function: Callable[[Any], Any]) -> bool:
+def _can_be_pickled(function: Callable[[Any], Any]) -> bool:
     """Whether other processes can be told of a function; somebody else's emitter may say no."""
     try:
         pickle.dumps(function)
-    except _STAYS:
+    except NOT_PICKLED:
         return False
     return True
 
@@ -222,7 +222,7 @@ def _work(pipe: Connection) -> None:
         while (message := inbox.get()) is not None:
             number, index, new, piece = message
             function = function if new is None else new
-            answer = _Answer(None) if index == _HELLO else _portable(_tried(function, piece))
+            answer = _Answer(None) if index == GREETING else _portable(_tried(function, piece))
             del message, piece
             pipe.send((number, index, answer))
 
