@@ -82,7 +82,10 @@ QUICK = (
     *("unit/test_amplitude_map.py", "unit/test_layers.py", "golden/test_golden.py"),
 )
 """Modules of the quick tests, below this folder: some of every room."""
-NOT_QUICK = ("test_what_does_not_end", "test_measured_spectra", "test_a_series_runs_on_over_chunks")
+NOT_QUICK = (
+    *("test_what_does_not_end", "test_measured_spectra", "test_a_series_runs_on_over_chunks"),
+    "test_shortest_is_written_only_where",
+)
 """Beginnings of names of their tests that take seconds."""
 
 REPEATS = {
@@ -240,15 +243,13 @@ REPEATS = {
 
 def pytest_itemcollected(item):
     module = item.path.as_posix().rpartition("/tests/")[2]
-    if module in QUICK and not item.name.startswith(NOT_QUICK):
-        item.add_marker("quick")
     test = getattr(item, "originalname", item.name)
-    every = REPEATS.get(module, {}).get(test)
-    if every:
-        cases = item.config.cases
-        if cases[module, test] % every:
-            item.add_marker("repeats")
-        cases[module, test] += 1
+    count = item.config.cases[module, test]
+    item.config.cases[module, test] += 1
+    if count % REPEATS.get(module, {}).get(test, 1):
+        item.add_marker("repeats")
+    elif module in QUICK and not item.name.startswith(NOT_QUICK):
+        item.add_marker("quick")
 
 
 def explores(config):
