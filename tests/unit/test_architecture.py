@@ -102,4 +102,4 @@ def test_tests_that_are_taken_in_strides_are_there():
     for module, tests in table.items():
         body = ast.parse((ROOT / "tests" / module).read_text()).body
         assert set(tests) <= {node.name for node in body if isinstance(node, ast.FunctionDef)}
-        assert all(every > 1 for every in tests.values())
+        assert all(every == 0 or every > 1 for every in tests.values())

@@ -313,11 +313,14 @@ def assert_every_axis_is_shown(case, shown, figure):
     assert {c.name for c in (*shown.shown, *shown.others)} <= set(CONTENDERS)
 
 
-def test_modes_are_named_where_there_is_room_and_counted_where_there_is_little():
+def test_modes_are_named_where_there_is_room():
     _, figure = compared("centre", ("X", 30.0), ("Y", -12.0), ("Z", 5.0))
     words = words_of(figure)
     for name in ("rocking 30 Hz", "column 42 Hz", "bed 50 Hz", "table 55 Hz", "head 110 Hz"):
         assert name in words
+
+
+def test_modes_are_counted_where_there_is_little_room():
     few = words_of(compared("many", ("X", 5.0))[1])
     assert "a mode with" not in few
     assert all(f"{f} Hz" in few for f in (30, 33, 36, 39, 42, 60, 66, 90, 100))
