@@ -105,6 +105,22 @@ def test_what_is_fixed_does_not_move_where_it_would_go_beyond():
             assert (held[k, ~outward] == free[k, ~outward]).all()
 
 
+@pytest.mark.parametrize("tiny", [0.0, 1e-22, 1e-19, 1e-17])
+def test_a_mode_that_is_all_but_still_breaks_no_step(tiny):
+    """Its square has no inverse in single precision."""
+    rng = np.random.default_rng(9)
+    objective = Objective.of_modes(mode_poles([20.0, 35.0], [0.02, 0.02]), np.ones((5, 2)))
+    *ramp, total = drawn_ramps(rng, 5, 6)
+    left, slope = slopes(*ramp, total, objective)
+    left[:, 1] = tiny
+    assert left.dtype == np.float32
+    nothing_fixed = np.zeros((2, 3, 30), dtype=bool)
+    steps = proposed_steps(left, slope, objective, nothing_fixed)
+    assert np.isfinite(steps).all()
+    left[:, 1] = 0.0
+    np.testing.assert_allclose(steps, proposed_steps(left, slope, objective, nothing_fixed), 1e-3)
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.03])
 @pytest.mark.parametrize("spectrum", [False, True], ids=["band", "spectrum"])
 def test_combinations_are_the_best_of_all_profiles_with_these_times(damping, spectrum):

@@ -24,6 +24,8 @@ POWERS: Powers = ((2, False), (14, True))
 step leads to where all would be left still, and far; with it, to the edge."""
 LAST_POWERS: Powers = ((2, False), (8, True), (30, True))
 """The same where the best are brought to the bottom."""
+LEAST = np.float32(1e-36)
+"""Squares of less are none: what is divided by them would be no number in single precision."""
 DAMPED, SINGULAR = 1e-2, 1e-6
 """Added to the second derivatives, times each of them and times the largest."""
 
@@ -140,7 +142,7 @@ def proposed_steps(
         products = {k: np.add.reduceat(x, starts, axis=-2) for k, x in products.items()}
     largest = squares.max(axis=0, initial=0.0)
     share = squares / np.where(largest > 0.0, largest, np.float32(1.0))
-    inverse = np.float32(1.0) / np.where(squares > 0.0, squares, np.float32(1.0))
+    inverse = np.float32(1.0) / np.maximum(squares, LEAST)
     steps = []
     for power, bent in powers:
         weight = share ** np.float32(0.5 * power - 1.0)
