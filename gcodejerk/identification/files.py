@@ -34,7 +34,7 @@ LARGEST = 1 << 30
 """Bytes of a file."""
 HEAD_LINES = 40
 SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?$")
+_NUMBER = re.compile(r"[-+]?(\d+(?:[.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?$")
 _TIME = re.compile(r"^#?\W*(time|t|zeit|timestamp)\b|^#?\W*(time|t)[ _(\[]", re.IGNORECASE)
 _COUNT = re.compile(r"^\W*(sample|count|index|n|no\.?)\W*$", re.IGNORECASE)
 

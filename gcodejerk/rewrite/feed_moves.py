@@ -21,9 +21,9 @@ LOOKED_AT = 2 << 20
 """Bytes of a program that are looked at: a second or two."""
 LEAST = 2
 """Fewer moves make no habit."""
-_COMMENT = re.compile(rb"\([^)]*\)|;.*")
-_PLAIN = re.compile(rb"(?:\s*[A-Za-z]\s*[-+]?(?:\d+\.?\d*|\.\d+))*\s*(?:\*\s*\d+)?\s*")
-_WORD = re.compile(rb"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
+_COMMENT = re.compile(rb"\([^()]*\)|;.*")
+_PLAIN = re.compile(rb"(?:\s*[A-Za-z]\s*[-+]?(?:\d+(?:\.\d*)?|\.\d+))*\s*(?:\*\s*\d+\s*)?")
+_WORD = re.compile(rb"([A-Za-z])\s*([-+]?(?:\d+(?:\.\d*)?|\.\d+))")
 _FEED_PER_MINUTE = 94
 _MOTION = {0, 1, 2, 3}
 
@@ -152,12 +152,11 @@ def look(source: BinaryIO) -> Travel | Alike | None:
     """
     source.seek(0)
     path = _Path()
-    read = 0
-    for line in source:
-        read += len(line)
-        text = _COMMENT.sub(b"", line).strip(b" \t\r\n%")
-        if read > LOOKED_AT:
-            break
+    lines = source.read(LOOKED_AT).splitlines()
+    if source.read(1):
+        del lines[-1:]  # perhaps not all of it
+    for line in lines:
+        text = _COMMENT.sub(b"", line).strip(b" \t%")
         if text.startswith((b"/", b"O", b"o")) or not _PLAIN.fullmatch(text):
             path.at.clear()  # macros, variables, other languages
             continue

@@ -116,3 +116,9 @@ def test_a_program_with_rapids_gets_no_note():
     program = b"G21 G90 G94 G64\nG0 X5\n" + PERSONAL.partition(b"M8\n")[2].replace(b"%\n", b"")
     result = process(program, Machine.load(find_machine("vmc")))
     assert not any("rapids found" in note for note in result.notes)
+
+
+def test_lines_may_end_in_any_way():
+    lines = b"G1 Z5 F5000|X9 Y9|Z-1 F300|X0|Z5 F5000|X30|Z-1 F300|Y3"
+    for end in (b"\n", b"\r\n", b"\r"):
+        assert look(io.BytesIO(lines.replace(b"|", end))) == Alike(count=4, feed=5000.0, above=5.0)

@@ -143,3 +143,9 @@ def test_no_pattern_runs_over_line_ends():
     patterns += [detect._KLARTEXT, detect._O_PROGRAM, detect._INCREMENTS]
     assert len(patterns) > 20
     assert not [p.pattern for p in patterns if b"\\s" in p.pattern]
+
+
+def test_what_stands_far_behind_in_a_line_tells_nothing():
+    near, far = b"G0 X1" + b" " * 200 + b"G187 P1\n", b"G0 X1" + b" " * 300 + b"G187 P1\n"
+    assert detect_dialect(b"%\nO1000\n" + near, "part.nc")[0].name == "haas"
+    assert detect_dialect(b"%\nO1000\n" + far, "part.nc")[0].name == "iso-mill"

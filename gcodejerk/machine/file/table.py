@@ -308,7 +308,7 @@ _PROGRAM = Section(
             "Folder with the subprograms that programs call in other files, as the control has "
             "them (O1000.nc, L54.SPF, name.ngc); named from the folder of this file. Left out: "
             "behind such a call nothing is known.", example="subprograms"),
-        Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*", "G-code words"),
+        Key("startup", Text(r"(\s*[A-Za-z][+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+))*\s*", "G-code words"),
             "The codes in force when a program starts (LinuxCNC: RS274NGC_STARTUP_CODE).",
             default="", example='"G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"'),
     )

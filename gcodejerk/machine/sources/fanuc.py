@@ -24,7 +24,7 @@ _LINE = re.compile(
     r"^\s*(?:N0*|No\.?\s*)?(1020|1320|1321|1401|1420|1620|1621)(?!\d)[\s:=]*(.*)$", re.I | re.M
 )
 _PUNCHED = re.compile(r"A\s*(\d{1,2})\s*(?:Q\d+\s*)?P\s*(-?[\d.]+)", re.I)
-_TYPED = re.compile(r"([XYZABCUVW])\s*[:=]?\s*(-?\d+\.?\d*)", re.I)
+_TYPED = re.compile(r"([XYZABCUVW])\s*[:=]?\s*(-?\d+(?:\.\d*)?)", re.I)
 _SINGLE = re.compile(r"P?\s*(-?[\d.]+)\s*$", re.I)
 
 Value = tuple[float, str]

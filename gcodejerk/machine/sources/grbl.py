@@ -24,7 +24,7 @@ NO_BEAM = (
     "if M3 turns a mill's spindle and no laser or plasma, add the line `spindle: mill`: until then "
     "rapids behind M3 are left alone"
 )
-_SETTING = re.compile(r"^[^$\n]{0,40}\$(\d{1,3})\s*=\s*([+-]?\d+\.?\d*|\.\d+)", re.MULTILINE)
+_SETTING = re.compile(r"^[^$\n]{0,40}\$(\d{1,3})\s*=\s*([+-]?\d+(?:\.\d*)?|\.\d+)", re.MULTILINE)
 _VERSION = re.compile(r"(grblhal|grbl)\s+(\d\S*)|\[VER:([^\]]*)\]", re.IGNORECASE)
 
 

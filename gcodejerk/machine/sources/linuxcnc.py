@@ -30,8 +30,8 @@ LINEAR_RESOLUTION, ROTARY_RESOLUTION = 1e-4, 1e-3
 _SECTION = re.compile(r"\s*\[\s*(\w+)\s*\]")
 _PAIR = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*?)\s*$")
 _INCLUDE = re.compile(r"#INCLUDE\s+(\S.*?)\s*$")
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_STARTUP = re.compile(r"(\s*[A-Za-z][+-]?([0-9]+\.?[0-9]*|\.[0-9]+))*\s*")
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
+_STARTUP = re.compile(r"(\s*[A-Za-z][+-]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+))*\s*")
 _SETP = re.compile(
     r"\s*setp\s+ini[._]([a-z])[._]max[._-](velocity|acceleration|jerk)\s+(\S+)", re.I
 )

@@ -38,7 +38,7 @@ ROTARY_UNITS: dict[str, dict[str, float]] = {
 }
 WITHOUT = {"length", "frequency"}
 """Quantities of which a bare number is clear: mm (deg), Hz."""
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.ASCII)
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.ASCII)
 
 
 def quantity(text: str, kind: str, what: str, rotary: bool = False) -> float:

@@ -18,6 +18,8 @@ from gcodejerk.nc.dialects.dialect import Dialect
 
 HEAD = 64 * 1024
 """Bytes at the top of a program that are looked at."""
+_BEHIND = re.compile(rb"(?<=[^\r\n]{256})[^\r\n]+")
+"""What is further behind in a line tells nothing, and could take patterns very long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +127,7 @@ _PC_CONTROL = (
         "G91.1, G64 P or G61.1",
     ),
     (_in_line(rb"^\s*(N\d+\s*)?G2[01]\s*\r?$", re.IGNORECASE), "G20 or G21 in a block of its own"),
-    (_in_line(rb"^\s*(n\d+\s*)?[gxyz]\d*\.?\d*\s*[xyz\s]"), "words in small letters"),
+    (_in_line(rb"^\s*(n\d+\s*)?[gxyz]\d*(?:\.\d*)?\s*[xyz\s]"), "words in small letters"),
 )
 """What tells a control that runs on a PC, or on a small board, from those of machining centres."""
 _SMALL_LETTERS = re.compile(rb"\([^)\n]*[a-z]{3}|;[ \t]*[^\n]*[a-z]{3}")
@@ -191,7 +193,7 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
     >>> detect_dialect(b"o100 sub\nG0 X1\no100 endsub\n", "part.ngc")[0].name
     'linuxcnc'
     """
-    head = head[:HEAD]
+    head = _BEHIND.sub(b"", head[:HEAD])
     if match := _KLARTEXT.search(head):
         line = 1 + head.count(b"\n", 0, match.start())
         return DIALECTS["klartext"], f"BEGIN PGM of Heidenhain Klartext (line {line})"

@@ -26,13 +26,13 @@ DEEPEST = 40
 WHOLE = 0.0001
 """How far a computed index of a variable may be from a whole number."""
 
-_NUMBER = re.compile(rb"[0-9]+\.?[0-9]*|\.[0-9]+")
+_NUMBER = re.compile(rb"[0-9]+(?:\.[0-9]*)?|\.[0-9]+")
 _LETTERS = re.compile(rb"[A-Z]+[0-9]?")
 _INDEX = re.compile(rb"[0-9]+")
 _NAME = re.compile(rb"<[^<>\[\]#]+>")
 _BLANKS = re.compile(rb"[ \t]*")
 _WITH_EXPONENT = re.compile(
-    rb"((?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:EX([-+]?[0-9]{1,3}))?(?![A-Z0-9_.])"
+    rb"((?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))(?:EX([-+]?[0-9]{1,3}))?(?![A-Z0-9_.])"
 )
 _IDENTIFIER = re.compile(rb"\$?[A-Z_][A-Z0-9_]*")
 _R = re.compile(rb"R[0-9]+")

@@ -17,7 +17,7 @@ from gcodejerk.nc.dialects.gcodes import G17, G40
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.text.block import Name
 
-_NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+_NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 _Z = 2
 
 

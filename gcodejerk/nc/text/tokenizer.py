@@ -38,7 +38,8 @@ _BLOCK = re.compile(
 """Text that a control may run: words, or an assignment."""
 _STRING = re.compile(rb'"[^"]*"')
 _LEADER = re.compile(
-    rb"[ \t]*%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t]*(?:\([^()]*\)?[ \t]*)*;?[ \t]*", re.IGNORECASE
+    rb"[ \t]*%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t]*(?:\([^()]*(?:\)[ \t]*)?)*;?[ \t]*",
+    re.IGNORECASE,
 )
 _PLAIN = re.compile(
     rb"(?:N[0-9]{1,8} ?)?(?:G[0-9]{1,3} ?)?(?:[XYZ]-?[0-9]{1,6}(?:\.[0-9]{0,8})? ?){1,3}"

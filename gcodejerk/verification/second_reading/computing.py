@@ -26,7 +26,7 @@ from gcodejerk.verification.second_reading.reading import NAN
 _MOST = 400
 """Operands and operators of an expression."""
 _BLANK = re.compile(rb"[ \t]*")
-_NUMBER = re.compile(rb"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:EX[-+]?[0-9]{1,3})?")
+_NUMBER = re.compile(rb"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:EX[-+]?[0-9]{1,3})?")
 _NAME = re.compile(rb"[$A-Z_][A-Z0-9_]*")
 _SIGN = re.compile(rb"[-+]")
 _HASH_WORD = re.compile(rb"(?<![A-Z])([A-FH-LP-Z])[ \t]*(?=[-+]?[ \t]*[#\[])")

@@ -32,7 +32,7 @@ _ENDS = re.compile(rb"(?<![A-Z])M0*(?:2|30)(?![0-9])")
 _DEF = re.compile(rb"(?:N[0-9]+)?DEF(?:REAL|INT|BOOL)")
 _HASH = re.compile(rb"#[ \t]*(?:([0-9]+)|[#\[])")
 _NAME = re.compile(rb"(?<![A-Z0-9_$])[A-Z_][A-Z_][A-Z0-9_]*")
-_WORD = re.compile(rb"([A-Z])([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_WORD = re.compile(rb"([A-Z])([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))")
 _SETS = re.compile(rb"#[ \t]*[0-9]+[ \t]*=.*")
 
 
