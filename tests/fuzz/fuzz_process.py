@@ -67,7 +67,8 @@ def load():
         output = result.output
         if controller != "csv":
             assert restored(data, result) == data
-            used = replace(machine, design=replace(machine.design, profile=profile))
+            design = replace(machine.design, profile=profile)
+            used = replace(machine, controller=controller, design=design)
             found = verify(data, output, used, dialect=dialect)
             assert found.ok, found.violations[:3]
             if result.planned:

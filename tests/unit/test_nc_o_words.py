@@ -8,6 +8,7 @@ import pytest
 from gcodejerk.nc import CERTAIN, REASONS, read_program, trace
 from gcodejerk.nc.flow import o_words, structures
 from gcodejerk.reasons import Reason
+from gcodejerk.testing.programs import differences
 
 HEAD = b"G21 G90 G94 G17 G40 F100 G0 X0 Y0 Z0\n"
 
@@ -214,3 +215,13 @@ def test_a_return_out_of_a_repeat_makes_its_later_passes_unknown():
     text += b"G91 G0 X1\nG90\no101 endrepeat\no100 endsub\n"
     assert end(text + b"o100 call [0]\n") == [1, 0, 0]
     assert end(text + b"o100 call [0]\no100 call [10]\nY2\n") == [None, 2, 0]
+
+
+def test_what_a_call_leaves_unknown_is_said_to_be_so_since_the_call():
+    rows = b"".join(b"G0 X%d Y1\n" % k for k in range(30))
+    for text in (rows, b"G0 X1 Y1\n"):
+        lines = b"G21 G90 G94 G64\n" + text + b"O1 call [1] (elsewhere)\nG0 X0 Y3 Z1\nM2\n"
+        assert not differences(lines)
+        (finding,) = read_program(io.BytesIO(lines)).findings
+        assert finding.line == 2 + text.count(b"\n")
+        assert "unknown since this line (O1 call [1]" in finding.message

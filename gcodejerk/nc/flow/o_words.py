@@ -174,6 +174,7 @@ class Passes:
         """Run a structure or a line."""
         if node.kind == "line":
             return self._line(node, state)
+        state.line = node.line  # since which what it loses is unknown
         if node.kind == "if":
             return self._branches(node, state)
         if node.kind == "call":
