@@ -18,8 +18,8 @@ from gcodejerk.nc.dialects.dialect import Dialect
 
 HEAD = 64 * 1024
 """Bytes at the top of a program that are looked at."""
-_BEHIND = re.compile(rb"(?<=[^\r\n]{256})[^\r\n]+")
-"""What is further behind in a line tells nothing, and could take patterns very long."""
+LOOKED_AT = 256
+"""Bytes of a line: what is further behind tells nothing, and could take patterns very long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +193,7 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
     >>> detect_dialect(b"o100 sub\nG0 X1\no100 endsub\n", "part.ngc")[0].name
     'linuxcnc'
     """
-    head = _BEHIND.sub(b"", head[:HEAD])
+    head = b"".join(map(_beginning, head[:HEAD].splitlines(keepends=True)))
     if match := _KLARTEXT.search(head):
         line = 1 + head.count(b"\n", 0, match.start())
         return DIALECTS["klartext"], f"BEGIN PGM of Heidenhain Klartext (line {line})"
@@ -232,6 +232,11 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
         "state it: --dialect, or the machine file's dialect",
         Place(name),
     )
+
+
+def _beginning(line: bytes) -> bytes:
+    """The part of a line that is looked at, and the line's end."""
+    return line if len(line) <= LOOKED_AT else line[:LOOKED_AT] + line[len(line.rstrip(b"\r\n")) :]
 
 
 def _read_alike(code: bytes, comments: bytes, lathe: bool) -> tuple[Dialect, str] | None:
