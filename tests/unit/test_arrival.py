@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.planning.arrival import BANDS, worst_in_bands
+from gcodejerk.planning.arrival import BANDS, _peak, worst_in_bands
 from gcodejerk.planning.plan import plan_moves
 
 MACHINE = Machine.loads(
@@ -53,3 +55,20 @@ def test_the_worst_in_a_band_is_that_of_a_dense_scan_in_displacement_and_acceler
             worst = np.maximum(worst, [D, felt])
     assert displacement[band] == pytest.approx(worst[0], rel=2e-3)
     assert acceleration[band] == pytest.approx(worst[1], rel=2e-3)
+
+
+@given(
+    # Of the half width of the widest band: within, at the ends of, and outside the narrower one.
+    at=st.floats(-1.3, 1.3),
+    top=st.floats(1.0, 9.0),
+    curvature=st.floats(0.01, 0.5),
+    half=st.integers(1, 7).map(lambda n: 2 * n),
+    band=st.sampled_from(BANDS),
+)
+def test_the_largest_of_a_parabola_is_exact_wherever_the_points_lie(at, top, curvature, half, band):
+    x = np.linspace(-1.0, 1.0, 2 * half + 1)
+    width = band / max(BANDS)
+    # The largest that the band holds; where it is at an end, that is a point.
+    inside = min(max(at, -width), width)
+    found = _peak(top - curvature * (x - at) ** 2, band)
+    assert found == pytest.approx(np.sqrt(top - curvature * (inside - at) ** 2), rel=1e-12)

@@ -112,6 +112,21 @@ def test_a_solution_is_one_within_each_limit_only(limit):
     assert not optima._holding([found], [replace(move, **{limit: 0.99 * peak})])[0]
 
 
+@pytest.mark.parametrize("moment", [0, 1, 2])
+def test_a_solution_is_one_that_ends_there_and_at_rest(moment):
+    # Jerks by whose addition one alone of position, velocity and acceleration at the end changes.
+    found, move = answers([question()])[0], question().move
+    wide = replace(move, velocity=1e9, acceleration=1e9, jerk=1e12)
+    begin, end = (move.count - k for k in (found.knots[:-1], found.knots[1:]))
+    moments = np.array([(begin.astype(float) ** k - end.astype(float) ** k) for k in (3, 2, 1)])
+    only = np.linalg.lstsq(moments, np.eye(3)[moment])[0]
+    assert optima._holding([found], [wide])[0]
+    share = np.abs(found.jerk).max() / np.abs(only).max()
+    for size, holds in ((1e-13, True), (1e-6, False), (1e-2, False)):
+        changed = replace(found, jerk=found.jerk + size * share * only)
+        assert optima._holding([changed], [wide]).tolist() == [holds]
+
+
 def test_many_problems_are_solved_by_several_processes_alike(monkeypatch):
     monkeypatch.setenv(VARIABLE, "")
     questions = [question(0.5 + 0.1 * k, 36 + k) for k in range(optima.FEW + 4)]
