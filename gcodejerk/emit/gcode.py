@@ -83,7 +83,7 @@ class GcodeController(Controller):
         return [
             f"streams in this form were not measured on {self.name}: {form.note}"
             for form in self.forms
-            if form.confidence == "unverified" and plans.planned.any()
+            if (form.name, form.confidence) == ("stream", "unverified") and plans.planned.any()
         ]
 
     def render(

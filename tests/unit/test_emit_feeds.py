@@ -10,6 +10,7 @@ import pytest
 
 from gcodejerk import Machine, process
 from gcodejerk.axes import AXES
+from gcodejerk.emit import load_controller
 from gcodejerk.emit.feeds import mean_feeds
 from gcodejerk.planning.batch import NumberFormat
 from gcodejerk.planning.plan import plan_moves
@@ -43,6 +44,11 @@ ROWS = [
     ({"A": 40.0}, "A"),
     ({"X": 9.0, "A": 40.0}, "X"),
 ]
+HEADS = {
+    "siemens": b"G710 G90 G94 G64 F250\n",
+    "grbl": b"G21 G90 G94 F250\n",
+    **dict.fromkeys(("marlin", "klipper"), b"G21\nG90\nG0 F250\n"),
+}
 CONTROLS = ("fanuc", "haas", "siemens", "grbl", "mach", "marlin", "klipper")
 
 
@@ -89,6 +95,23 @@ def test_for_others_f_is_the_length_of_the_block_over_its_time(row, axes):
     assert 60.0 * way[moves] / feeds[moves] == pytest.approx(times, rel=1e-4)
     fast = way > 0.1
     assert feeds[fast] == pytest.approx(60.0 * way[fast] / 0.002, abs=0.6e-4)
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_of_a_stream_is_said_what_was_not_measured_of_streams_alone(name):
+    made = process(
+        HEADS.get(name, HEAD) + b"G0 X12.\nM2\n",
+        replace(MACHINE, spindle="mill"),
+        controller=name,
+        dialect=name,
+    )
+    assert made.planned == 1
+    said = [note for note in made.notes if "were not measured on" in note]
+    facts = {form.name: form for form in load_controller(name).forms}
+    unverified = facts["stream"].confidence == "unverified"
+    assert [facts["stream"].note in note for note in said if "in this form" in note] == (
+        [True] * unverified
+    )
 
 
 def test_a_block_without_length_says_the_f_of_the_next():

@@ -80,6 +80,15 @@ NOT_CERTAIN = {
     "an axis variable": ("siemens", b"$AA_OFF[X]=5 ; shift\nG0 X5\nX6\n", WRITTEN),
     "G43 that may move": ("fanuc", b"G43 H1\nG0 Z9.\n", Reason.START_UNKNOWN),
     "G49 that may move": ("haas", b"G49\nG0 Z9.\n", Reason.START_UNKNOWN),
+    "a length across another plane": (
+        "fanuc", b"G18 G43 H1\nG17 G0 X1. Y1. Z1.\nG49\nG0 X5. Y7.\n", Reason.START_UNKNOWN
+    ),
+    "the same of Haas": (
+        "haas", b"G19 G43 H1\nG17 G0 X1. Y1. Z1.\nG49\nG0 X5.\n", Reason.START_UNKNOWN
+    ),
+    "the same of Mach": (
+        "mach", b"G18 G43 H1\nG17 G0 X1. Y1. Z1.\nG49\nG0 Y5.\n", Reason.START_UNKNOWN
+    ),
     "H without G43": ("fanuc", b"G43 H1 Z5.\nH2\nG0 Z9.\n", Reason.START_UNKNOWN),
     "another program": ("fanuc", b"M198 P1000\nG90 G40 G0 X5.\nX6.\n", Reason.UNITS_UNKNOWN),
     "an interrupt": ("fanuc", b"M96 P1000\nG90 G40 G0 X5.\nX6.\n", Reason.UNITS_UNKNOWN),
@@ -126,6 +135,7 @@ STILL_CERTAIN = {
     "a frame is written, then selected": ("siemens", b"$P_UIFR[1]=X5\nG54 D1\nG0 X5\nX6\n"),
     "parameters of LinuxCNC": ("linuxcnc", b"#5221=3\nG0 X5\n"),
     "G43 with its axis": ("fanuc", b"G43 H1 Z5.\nG0 Z9.\n"),
+    "no length along X": ("haas", b"G43 H1 Z5.\nG0 X9.\nG49\nG0 X5.\n"),
     "behind a modal macro": (
         "fanuc", b"G66 P9000\nX1.\nG67\nG21 G90 G94 G17 G40 G49 G54 G64 F9.\nG0 X5.\nX6.\n"
     ),

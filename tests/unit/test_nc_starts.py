@@ -106,6 +106,14 @@ def test_behind_a_tool_change_the_axes_stand_where_it_is_stated(dialect):
     np.testing.assert_allclose(rapids.start[1, :2], (80.0, 6.0))
 
 
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_lengths_that_the_program_cancels_are_no_longer_lost_at_a_tool_change(dialect):
+    # The builder's macro may cancel the length; G49 in the program has done so along all axes.
+    text = b"G90 G17 G21 G40 G54 G94 F9.\nG49\nG0 X1. Y1. Z1.\nT2 M6\nG0 X5. Y5.\nZ5.\n"
+    assert read(text, dialect, tool_change={})[0][-2:] == [None, None]
+    assert read(text.replace(b"G49\n", b""), dialect, tool_change={})[0][-2:] == [UNKNOWN, UNKNOWN]
+
+
 def test_behind_a_tool_change_z_has_a_name_where_the_tool_length_is_known():
     text = b"G0 X5. Y6. Z7.\nT1 M6\nG0 Z3.\n"
     facts = {"offsets": OFFSETS, "positions": HOME, "tool_change": {"Z": 0.0}}

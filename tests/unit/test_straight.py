@@ -12,7 +12,7 @@ from gcodejerk.planning.aligned import _followed
 from gcodejerk.planning.batch import NumberFormat, Sampler
 from gcodejerk.planning.plan import plan_moves
 from gcodejerk.planning.straight import StraightMoves
-from gcodejerk.planning.written import Written
+from gcodejerk.planning.written import LONGEST_TAIL, Written
 
 STEP = 1e-6
 MACHINE = """
@@ -109,3 +109,10 @@ def test_a_block_that_ends_too_soon_is_seen(written):
     block = rising(written)
     assert later(written, block, -1e-6).punctual().all()
     assert not later(written, block, -3e-6).punctual().any()
+
+
+def test_a_tail_without_length_or_a_long_one_is_seen(written):
+    for tail, slow in ((0.0, False), (0.5, True), (1.01, False)):
+        way = written.way.copy()
+        way[0, -1] = way[0, -2] + tail * LONGEST_TAIL * written.speed[0, -1]
+        assert replace(written, way=way).punctual().tolist() == [slow]

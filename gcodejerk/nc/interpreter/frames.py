@@ -51,20 +51,20 @@ def tool_length(
         H number -> length along Z. [mm]
     dialect : Dialect
         Says which axes a length may shift in G17 (elsewhere, or where the block names another, all
-        may), and whether the control itself may move.
+        may), and whether the control itself may move. G49 cancels what any axis has.
     """
     axes = dialect.length_axes
     end_bar(state, "tool data written")
     if state.plane != G17 or any(axis in values for axis in AXES if axis not in axes):
         axes = AXES
-    kept = {k: state.tool[k] for k, axis in enumerate(AXES) if axis not in axes}
-    places = {k: state.position[k] for k in kept}
+    others = [k for k, axis in enumerate(AXES) if axis not in axes]
+    kept = [] if code == G49 else [(k, state.tool[k], state.position[k]) for k in others]
     _shift_tool(state, code, values, lengths)
-    for k, offset in kept.items():
+    for k, offset, place in kept:
         state.tool[k] = offset
-        state.move(k, places[k])
+        state.move(k, place)
     if dialect.length_moves:
-        state.forget_positions(k for k in range(len(AXES)) if k not in kept)
+        state.forget_positions(k for k in range(len(AXES)) if k not in others)
 
 
 def _shift_tool(state: State, code: int, values: Values, lengths: Mapping[int, float]) -> None:

@@ -243,9 +243,10 @@ class Known:
         length = 0.0 if code == G49 else length if code == G43 else NAN
         only = self.g.get("plane") == G17 and named & ~_bits(self.dialect.length_axes) == 0
         axes = self.dialect.length_axes if only else AXES
+        changed = AXES if code == G49 else axes
         after = list(self.tool)
         for k, axis in enumerate(AXES):
-            if axis in axes:
+            if axis in changed:
                 after[k] = NAN if length != length else length if axis == "Z" else 0.0
         self.tool = self.rename(self.tool, after)
         self.end_bar("tool data")
