@@ -105,9 +105,10 @@ LATHE = (
     (_in_line(rb"(?<![A-Z_])G(50|92)\s*S\d"), "a limit of the spindle's speed, G50 S"),
     (_in_line(rb"(?<![A-Z_])G96(?!\d)"), "constant surface speed, G96"),
     (_INCREMENTS, "increments U and W"),
-    (_in_line(rb"^[^Y\n]*(?<![A-Z_])G7[1-6](?!\d)[^Y\n]*$"), "a turning cycle"),
 )
 """What programs of lathes hold, and hardly any program of a mill that reads Fanuc's language."""
+_TURNING_CYCLE = _in_line(rb"(?<![A-Z_])G7[1-6](?!\d)")
+"""In a program without any Y; with one, it is peck drilling, boring or a pocket of a mill."""
 _SPEED_LIMITS = tuple(
     (dialect, _in_line(rb"(?<![A-Z_])G%d\s*S\s*\d" % code, re.IGNORECASE), f"G{code} S")
     for dialect, code in (("fanuc-lathe-a", 50), ("fanuc-lathe-b", 92))
@@ -115,7 +116,9 @@ _SPEED_LIMITS = tuple(
 _TOOL_OF_LATHE = _in_line(rb"(?<![A-Z_])T\d{4}(?!\d)", re.IGNORECASE)
 _SURFACE = _in_line(rb"(?<![A-Z_])G9[67](?!\d)", re.IGNORECASE)
 _Y = _in_line(rb"(?<![A-Z_])Y\s*[-+.\d]", re.IGNORECASE)
-_TURNING = re.compile(rb"\b(LATHE|TURN(?:ING)?|TURN POST)\b")
+_TURNING = re.compile(rb"\b(LATHE|TURNING|TURN POST)\b")
+_TURN = re.compile(rb"\bTURN\b")
+"""The same without any Y; spindles and coolant are turned on in comments of mills, too."""
 _O_PROGRAM = _in_line(rb"^\s*[O:]\d+")
 _TAPE = re.compile(rb"\s*%[^\n]*\n(?:\s*\n)*\s*[O:]\d+", re.IGNORECASE)
 """How a program begins that is read as a tape."""
@@ -246,11 +249,7 @@ def _read_alike(code: bytes, comments: bytes, lathe: bool) -> tuple[Dialect, str
     neither a number there, nor cycles of lathes.
     """
     upper = code.upper()
-    if (
-        lathe
-        or any(pattern.search(upper) for pattern, _ in LATHE)
-        or _TURNING.search(comments.upper())
-    ):
+    if lathe or _turns(upper, comments):
         return None
     if _TAPE.match(code):
         why = (
@@ -278,12 +277,9 @@ def _refuse_mills(
     mills = [dialect for dialect in chosen if DIALECTS[dialect].lathe == "no"]
     if not mills:
         return
-    upper = code.upper()
     why = "the machine's X is a diameter" if lathe else ""
     if not why and not _LIKE_FANUC.isdisjoint(mills):
-        why = next((what for pattern, what in LATHE if pattern.search(upper)), "")
-        if not why and _TURNING.search(comments.upper()):
-            why = "a comment speaks of turning"
+        why = _turns(code.upper(), comments)
     if why:
         raise ProgramError(
             f"the program could be of {mills[0]} ({chosen[mills[0]]}), but reads like one of a "
@@ -292,6 +288,18 @@ def _refuse_mills(
             "the machine file's dialect",
             Place(name),
         )
+
+
+def _turns(code: bytes, comments: bytes) -> str:
+    """What says that a program, in capitals, is one of a lathe; empty where nothing does."""
+    why = next((what for pattern, what in LATHE if pattern.search(code)), "")
+    comments = comments.upper()
+    drawn = _Y.search(code) is not None
+    if not why and not drawn and _TURNING_CYCLE.search(code):
+        why = "a turning cycle"
+    if not why and (_TURNING.search(comments) or (not drawn and _TURN.search(comments))):
+        why = "a comment speaks of turning"
+    return why
 
 
 def _find_system(found: dict[str, str], code: bytes) -> None:
