@@ -172,7 +172,8 @@ def writing_of(dialect: Dialect) -> Writing:
     if dialect.writing is None:
         raise EmitError(
             f"no form of a stream is known for the dialect {dialect.name}",
-            "use --controller csv, which writes the streams as a table",
+            "use --controller csv, which writes the streams as a table, or say in which other "
+            "dialect the program is written (--dialect)",
         )
     return dialect.writing
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
+from gcodejerk.nc.dialects.any_mill import written_for
 from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.elsewhere import Elsewhere, find_elsewhere
@@ -67,6 +68,10 @@ class Program:
     rapids: Rapids
     subprograms: tuple[str, ...] = ()
     """Files, of `Start.subprograms`, in which the program goes on."""
+
+    def written_for(self, controller: str) -> Program:
+        """The same, with streams spelled as a control has them where the dialect is of several."""
+        return replace(self, language=written_for(self.language, controller))
 
 
 def parse_block(text: bytes, dialect: str | Dialect = "linuxcnc") -> Block:

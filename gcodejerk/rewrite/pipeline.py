@@ -359,7 +359,7 @@ def _read(
             "process the original, or add --force to process its remaining rapids",
             Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
         )
-    return program
+    return program.written_for(emitter.name)
 
 
 def _plan(

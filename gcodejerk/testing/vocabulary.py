@@ -199,6 +199,20 @@ VOCABULARIES: dict[str, Vocabulary] = {
         point=True,
         drills=True,
     ),
+    "any-mill": Vocabulary(
+        ("G21 G90 G17 G40 G94", "G0 X0. Y0. Z5. F200."),
+        (
+            *("G90", "G91", "G54", "G55", "G93", "G94", "G17", "G18", "G4 P1", "M9", "G20", "G21"),
+            *("G28 Z5.", "G53 G0 Z0.", "G92 X0.", "G92.1", "G43 H1", "G49", "G80", "G61", "G64"),
+            *("G91 G28 Z0.", "G18 G43 H1", "G49 G17", "G80 X9.", "X7.", "G0 X5 Y5", "G1 Z-2. F90."),
+            *("G2 X5. Y5. R20. F60.", "G98 G81 X5. Y5. Z-3. R2.", "X9.", "/G1 X5. F90.", "T1 M6"),
+            *("M3 S90", "M5", "M0", "G41 D1", "G40", "G68 X0. Y0. R10.", "G69", "G51 X2.", "G50"),
+            *("M98 P20", "M97", "G103 P1", "G10 L2 P1 X0.", "G52 X3.", "G30 Z2.", "D1", "F90."),
+        ),
+        (*_ROUND, "; X99"),
+        "M30",
+        point=True,
+    ),
     "mach": Vocabulary(
         ("G21 G90 G17 G94 G64", "G0 X0 Y0 Z5 F200"),
         (

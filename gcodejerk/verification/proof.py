@@ -335,7 +335,7 @@ def _read(
         neighbours=machine.neighbours_matter,
     )
     original.seek(begin)
-    return program
+    return program.written_for(machine.controller)
 
 
 def _digest(original: BinaryIO) -> bytes:

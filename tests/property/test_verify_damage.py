@@ -492,7 +492,7 @@ STRIDE = 2
 def missed(dialect, program, pick, stride=1):
     """Kinds of damage to a processed program that nobody notices; None if it has no room for it."""
     # The form of LinuxCNC's own streams has damages of its own.
-    own = {"linuxcnc": "mach", "rs274": "mach", "iso-mill": "haas"}
+    own = {"linuxcnc": "mach", "rs274": "mach", "iso-mill": "haas", "any-mill": "fanuc"}
     own |= dict.fromkeys(("centroid", "uccnc", "edingcnc", "planetcnc", "masso", "duet"), "mach")
     own |= dict.fromkeys(("mitsubishi", "mazatrol-eia", "syntec"), "fanuc")
     machine, controller = machine_for(dialect), own.get(dialect, dialect.split("-")[0])

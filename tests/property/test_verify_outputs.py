@@ -119,6 +119,7 @@ COMMON = {
     **{name: ["mach"] for name in ("centroid", "uccnc", "edingcnc", "planetcnc", "masso")},
     **{name: ["fanuc"] for name in ("mitsubishi", "mazatrol-eia", "syntec")},
     "duet": ["marlin", "mach"],
+    "any-mill": ["linuxcnc", "grbl", "mach", "fanuc", "haas"],
 }
 """Controllers that may read a dialect which is no control's own, or of a control without one."""
 

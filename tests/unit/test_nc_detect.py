@@ -1,15 +1,19 @@
 """``dialect: auto`` finds the dialect, says why, or refuses."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gcodejerk import Machine, ProgramError, process
+from gcodejerk.errors import EmitError
 from gcodejerk.machine import find_machine
 from gcodejerk.nc import AUTO, read_program
 from gcodejerk.nc.dialects import detect
+from gcodejerk.nc.dialects.any_mill import MEMBERS
 from gcodejerk.nc.dialects.detect import detect_dialect
+from gcodejerk.verification import verify
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
@@ -72,6 +76,8 @@ def test_the_dialect_is_found(text, dialect):
         (b"%\nO1000\nG90 G0 X1. Y2.\nG73 Z-3. R1. Q.5 F90.\nG80\n", "iso-mill"),
         (b"%\nO1000 (SQUARE)\nM3 S1000 (TURN SPINDLE ON)\nG0 X1. Y2.\n", "iso-mill"),
         (b"(Exported by a program)\nG90 G0 X1\n", "rs274"),
+        # nothing tells any mill's control from another
+        (b"G21 G90 G17\nG0 X1.5 Y2.\n", "any-mill"),
         (b"; roughing\nG90 G0 X1\n", "rs274"),
         (b"G21\r\nG90\r\nG0 X1\r\n", "rs274"),
         (b"G0 X1.23456 Y2\n", "rs274"),
@@ -126,6 +132,34 @@ def test_the_choice_is_told_with_its_reason():
     result = process(program, machine, dialect="auto", controller="grbl")
     assert result.verification.ok
     assert any("read as grbl" in note for note in result.notes)
+
+
+COMMON = b"G21 G90 G17 G94 F300.\nM5\nG0 X0. Y0. Z5.\nG1 X3.\nG0 X90. Y40.\nG1 Z1.\nM2\n"
+
+
+@pytest.mark.parametrize("controller", [member.name for member in MEMBERS])
+def test_what_any_mill_reads_is_written_as_the_control_that_runs_it_has_it(controller):
+    machine = replace(Machine.load(find_machine("vmc")), controller=controller)
+    result = process(COMMON, machine, dialect="auto")
+    assert result.program.dialect == "any-mill"
+    assert result.planned == 1
+    assert result.verification.ok
+    assert verify(COMMON, result.output, machine).ok
+    own = process(COMMON, machine, dialect=controller)
+
+    def points(made):
+        return [line for line in made.splitlines() if line.startswith((b"G1 ", b"G4", b"G0 F"))]
+
+    # Its points, and how they begin and end, are those of the control's own language.
+    assert points(result.output) == points(own.output)
+    damaged = result.output.replace(points(own.output)[5], points(own.output)[4], 1)
+    assert not verify(COMMON, damaged, machine).ok
+
+
+def test_what_any_mill_reads_is_not_written_for_other_controls():
+    with pytest.raises(EmitError, match="any-mill") as refused:
+        process(COMMON, Machine.load(find_machine("vmc")), controller="siemens", dialect="auto")
+    assert "--dialect" in refused.value.remedy
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="../shared is not here: no real programs to read")

@@ -10,6 +10,7 @@ import difflib
 from importlib.metadata import entry_points
 
 from gcodejerk.errors import ProgramError
+from gcodejerk.nc.dialects.any_mill import ANY_MILL
 from gcodejerk.nc.dialects.centroid import CENTROID
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.duet import DUET
@@ -38,7 +39,7 @@ DIALECTS: dict[str, Dialect] = {
     dialect.name: dialect
     for dialect in (
         *(LINUXCNC, FANUC, FANUC_LATHE_A, FANUC_LATHE_B, HAAS, SIEMENS, HEIDENHAIN_ISO),
-        *(GRBL, MACH, MARLIN, KLIPPER, RS274, ISO_MILL),
+        *(GRBL, MACH, MARLIN, KLIPPER, RS274, ISO_MILL, ANY_MILL),
         *(DUET, CENTROID, UCCNC, EDINGCNC, PLANETCNC, MASSO, MITSUBISHI, MAZATROL_EIA, SYNTEC),
         *(OKUMA, FAGOR, KLARTEXT),
     )

@@ -119,6 +119,7 @@ _Y = _in_line(rb"(?<![A-Z_])Y\s*[-+.\d]", re.IGNORECASE)
 _TURNING = re.compile(rb"\b(LATHE|TURNING|TURN POST)\b")
 _TURN = re.compile(rb"\bTURN\b")
 """The same without any Y; spindles and coolant are turned on in comments of mills, too."""
+_POINT = _in_line(rb"(?<![A-Z_])[XYZ]\s*[-+]?\d*\.", re.IGNORECASE)
 _O_PROGRAM = _in_line(rb"^\s*[O:]\d+")
 _TAPE = re.compile(rb"\s*%[^\n]*\n(?:\s*\n)*\s*[O:]\d+", re.IGNORECASE)
 """How a program begins that is read as a tape."""
@@ -261,8 +262,11 @@ def _read_alike(code: bytes, comments: bytes, lathe: bool) -> tuple[Dialect, str
     sign = next((what for pattern, what in _PC_CONTROL if pattern.search(code)), "")
     if not sign and _SMALL_LETTERS.search(comments):
         sign = "comments in small letters"
-    if not sign:
+    if not sign and not (_Y.search(code) and _POINT.search(code)):
         return None
+    if not sign:
+        why = "X and Y with decimal points, and nothing that tells controls of mills apart"
+        return DIALECTS["any-mill"], f"{why}, so as what they read alike"
     why = f"{sign}, as controls on a PC have it: LinuxCNC, grbl or Mach, and which, nothing tells"
     return DIALECTS["rs274"], f"{why}, so as what they read alike"
 

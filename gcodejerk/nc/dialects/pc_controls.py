@@ -27,7 +27,7 @@ from gcodejerk.nc.dialects.grbl import SYSTEMS
 from gcodejerk.nc.dialects.rs274 import RS274
 
 CYCLES = frozenset({730, *range(810, 900, 10)})
-_EFFECTS: dict[int, Effect] = {
+EFFECTS: dict[int, Effect] = {
     **dict.fromkeys((280, 300), "home"),
     **dict.fromkeys(SYSTEMS, "system"),
     **dict.fromkeys((430, 490), "length"),
@@ -35,6 +35,7 @@ _EFFECTS: dict[int, Effect] = {
     100: "data",
     **dict.fromkeys((520, 530, 920, 921), "frames"),
 }
+"""Codes of which it is known what they change, and not where they lead."""
 
 
 def _read_in_part(name: str, title: str, *sources: str, apart: str = "") -> Dialect:
@@ -81,7 +82,7 @@ def _read_in_part(name: str, title: str, *sources: str, apart: str = "") -> Dial
         ),
         uses={},
         defaults={"plane": 170, "feed mode": 940, "compensation": 400, "system": 540},
-        effects=_EFFECTS,
+        effects=EFFECTS,
         feed_modes={940: 94},
         drilling=Drilling(CYCLES, CYCLES, missing="unknown"),
         redrawn=frozenset({800}),
