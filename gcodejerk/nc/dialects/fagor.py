@@ -15,7 +15,8 @@ its tool changes, no more; behind every other code nothing is rewritten (`Dialec
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, Text, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text
 
 CYCLES = frozenset(range(810, 900, 10))
 _EFFECTS: dict[int, Effect] = {

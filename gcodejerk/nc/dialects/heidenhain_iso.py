@@ -7,7 +7,8 @@ and machine coordinates make everything behind them unknown. In the program's he
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Text, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, grouped
+from gcodejerk.nc.dialects.spelling import Text
 
 _CYCLES = (
     *(740, 750, 760, 770, 780, 830, 840, 850, 860, 1200, 1210, 1220, 1230, 1240, 1250, 1270),

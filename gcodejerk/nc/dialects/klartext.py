@@ -23,7 +23,8 @@ are mere definitions is general knowledge: nothing but the modes is known behind
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text
 
 _DEFINITIONS = (
     *(1, 2, 3, 4, 5, 6, 9, 13, 14, 15, 16, 17, 18, 20, 21, 22, 23, 24, 25, 27, 32),

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialects.dialect import Text
 from gcodejerk.nc.dialects.marlin import MARLIN
+from gcodejerk.nc.dialects.spelling import Text
 
 KLIPPER = replace(
     MARLIN,

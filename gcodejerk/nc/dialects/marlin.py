@@ -7,7 +7,8 @@ for all moves: G0 runs at it like G1.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 SILENT = (

@@ -8,16 +8,8 @@ subprogram is such a name.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import (
-    Arithmetic,
-    Dialect,
-    Drilling,
-    Effect,
-    NamedCycle,
-    Text,
-    Writing,
-    grouped,
-)
+from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, Effect, NamedCycle, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 

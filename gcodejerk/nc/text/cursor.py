@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from gcodejerk.nc.dialects.dialect import Text
+from gcodejerk.nc.dialects.spelling import Text
 
 LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
