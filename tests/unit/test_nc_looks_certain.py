@@ -29,6 +29,8 @@ HEADS = {
     "mach": b"G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 X0. Y0. Z50.\n",
     "grbl": b"G21 G90 G94 G17 G54 F100\nG0 X0 Y0 Z50\n",
     "linuxcnc": b"G21 G90 G94 G17 G40 G49 G54 G64 F100\nG0 X0 Y0 Z50 A10\n",
+    "fagor": b"G71 G90 G94 G17 G40 G44 G5 F100\nG0 X0 Y0 Z50\n",
+    "heidenhain-iso": b"%P G71 *\nN1 G17 G90 G40*\nN2 G00 X0 Y0 Z50*\n",
 }
 
 
@@ -117,6 +119,36 @@ NOT_CERTAIN = {
     "a programmed override": ("siemens", b"OVR=50\nG0 X9\nX8\n", Reason.FEED_SCALED),
     "the other language": ("siemens", b"G291\nG0 X9\nX8\n", Reason.NOT_UNDERSTOOD),
     "the way of a rotary axis": ("linuxcnc", b"G0 A5\n", Reason.ROTARY_WAY),
+    "a tool across another plane": (
+        "siemens", b"T1 D1\nG0 X0 Y0 Z50\nG18\nG0 Y9\n", Reason.START_UNKNOWN
+    ),
+    "polar coordinates": ("fagor", b"G0 R50 Q30\nG0 X9\n", Reason.START_UNKNOWN),
+    "an angle alone": ("fagor", b"G3 Q30\nG0 X9\n", Reason.START_UNKNOWN),
+    "the same of Fagor": ("fagor", b"G43\nG0 X0 Y0 Z50\nG18\nG0 Y9\n", Reason.START_UNKNOWN),
+    "words in machine coordinates": (
+        "heidenhain-iso", b"N3 G00 Z-1 M91*\nN4 G00 Z9*\n", Reason.START_UNKNOWN
+    ),
+    "another origin of the builder": (
+        "heidenhain-iso", b"N3 G00 X5 M92*\nN4 G00 X9*\n", Reason.START_UNKNOWN
+    ),
+    "a cycle called by M99": (
+        "heidenhain-iso", b"N3 G00 X5 M99*\nN4 G00 X9*\n", Reason.START_UNKNOWN
+    ),
+    "a cycle at every position": (
+        "heidenhain-iso", b"N3 M89*\nN4 G00 X5*\nN5 G00 X9*\n", Reason.NOT_UNDERSTOOD
+    ),
+    "a subprogram of a label": (
+        "heidenhain-iso", b"N3 L1,0*\nN4 G00 X5 Y5 Z5*\nN5 G00 X9*\n", Reason.NOT_UNDERSTOOD
+    ),
+    "so without the comma": (
+        "heidenhain-iso", b"N3 L1*\nN4 G00 G40 G90 X5 Y5 Z5*\nN5 G00 X9*\n",
+        Reason.NOT_UNDERSTOOD
+    ),
+    "a label": ("heidenhain-iso", b"N3 G98 L1*\nN4 G00 G40 X5*\nN5 G00 X9*\n", NO_DISTANCE),
+    "somebody jogs at G38": ("heidenhain-iso", b"N3 G38*\nN4 G00 X9*\n", Reason.START_UNKNOWN),
+    "a way longer by the radius": (
+        "heidenhain-iso", b"N3 G01 G43 Z5 F9*\nN4 G40*\nN5 G00 Z9*\n", Reason.START_UNKNOWN
+    ),
     "beside a linear one": ("linuxcnc", b"G0 X3 A5\n", Reason.ROTARY_WAY),
 }  # fmt: skip
 
@@ -149,6 +181,17 @@ STILL_CERTAIN = {
     "G92 E0 of a printer": ("marlin", b"G92 E0\nG0 X9\n"),
     "behind the laser": ("grbl", b"M3 S100\nG1 X5\nM5\nG0 X9\n"),
     "increments of a rotary axis": ("linuxcnc", b"G91 G0 A5\n"),
+    "an arc of a radius": ("fagor", b"G2 X5 Y5 R9\nG0 X9\n"),
+    "the same plane again": ("siemens", b"T1 D1\nG0 X0 Y0 Z50\nG17\nG0 Y9\n"),
+    "behind words in machine coordinates": (
+        "heidenhain-iso", b"N3 G00 Z-1 M91*\nN4 G00 X5 Z9*\nN5 G00 X9 Z5*\n"
+    ),
+    "behind a label": (
+        "heidenhain-iso", b"N3 G98 L1*\nN4 G00 G40 G90 X5*\nN5 G00 X9*\n"
+    ),
+    "behind a cycle called by M99": (
+        "heidenhain-iso", b"N3 G00 X5 M99*\nN4 G00 X5 Y5 Z9*\nN5 G00 X9*\n"
+    ),
     "a rotary axis that stays": ("linuxcnc", b"G0 X5 A10\n"),
 }  # fmt: skip
 

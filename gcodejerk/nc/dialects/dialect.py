@@ -35,6 +35,10 @@ PLANES: dict[int, tuple[str, str, str]] = {
 
 COMPENSATION = "cutter compensation"
 """Name, among the transforms, of one that most controls of the dialect do not have."""
+MACHINE_WORDS = "machine words"
+"""Group of the M codes that make the axis words of their block machine coordinates."""
+CYCLE_CALL = "cycle call"
+"""Group of the M codes that run a cycle behind the motion of their block."""
 HARMLESS = "harmless"
 """Group of the M codes, and first word of the groups of the G codes, that the machine file says
 move nothing and change nothing."""
@@ -183,6 +187,9 @@ class Dialect:
     uses: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Letter -> codes ("G43", "M66") one of which has to stand in the block or be in force; where
     the table is empty, every letter may stand everywhere."""
+    polar: str = ""
+    """Letters that say where a straight move leads, by angle and radius; an arc may have the last
+    of them, too, where axis words stand beside it, and a cycle has its words for itself."""
     strict: bool = False
     """Only one code may use the axis words, and a code that needs some has to have them."""
     centres_of_plane: bool = False
@@ -222,6 +229,8 @@ class Dialect:
     length_moves: bool = False
     """A change of the tool length may move the machine by itself, by a parameter, instead of
     renaming where it stands."""
+    length_turns: bool = False
+    """Another plane lays the length of a tool along other axes, and so renames where they stand."""
     length_word: str = ""
     """Address that chooses another tool length by itself while one is in force."""
     p_selects: frozenset[int] = frozenset()

@@ -4,6 +4,10 @@ Sources: SINUMERIK ONE NC programming 12/2019, pp. 43, 52, 170, 181; 802D sl / 8
 p. 3-42 (G53, G153 and SUPA suppress frames for one block). Comments begin with ``;`` alone, since
 parentheses hold arguments. What a name does that is not listed here is not known; a user's own
 subprogram is such a name.
+
+The length of a tool lies across the plane in force (Function Manual Tool Compensation, LENTOAX, p.
+2-151; NC programming p. 750), unless the setting data SD42940 says otherwise: behind another plane
+the same place has other coordinates.
 """
 
 from __future__ import annotations
@@ -164,6 +168,7 @@ SIEMENS = Dialect(
     path_has_to_be_stated=True,
     bars={2910: ("another language", True), 2900: ("another language", False)},
     tool_frame=frozenset("TD"),
+    length_turns=True,
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
     drilling=Drilling(named=_NAMED),

@@ -84,6 +84,13 @@ def _shift_tool(state: State, code: int, values: Values, lengths: Mapping[int, f
         _rename(state, "tool", unknown)
 
 
+def turn_length(state: State) -> None:
+    """The tool's length comes to lie along other axes."""
+    if any(length != 0.0 for length in state.tool):
+        state.lose("tool")
+        state.forget_positions()
+
+
 def numbered_system(number: float) -> int:
     """Key of the system that ``G54.1 P`` selects; 0 for one that nobody knows."""
     return 541_000 + int(number) if number > 0.0 else 0

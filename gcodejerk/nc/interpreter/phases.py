@@ -8,7 +8,13 @@ stands where it does.
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import PLANES, Dialect, Effect
+from gcodejerk.nc.dialects.dialect import (
+    CYCLE_CALL,
+    MACHINE_WORDS,
+    PLANES,
+    Dialect,
+    Effect,
+)
 from gcodejerk.nc.dialects.gcodes import G1, G40, G64
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
@@ -128,6 +134,8 @@ class Phases(Effects):
         if state.cycle is not None and g.get("distance", state.distance) != state.distance:
             # R and Z that stay in force across G90/G91 are read anew in a way not documented
             self._lose_depths()
+        if dialect.length_turns and g.get("plane", state.plane) != state.plane:
+            frames.turn_length(state)
         for group, code in g.items():
             if (name := GROUP_FIELDS.get(group)) is not None and group != "motion":
                 state.put(name, code)
@@ -221,8 +229,11 @@ class Phases(Effects):
         step.outputs = uses_outputs(codes)
 
     def _stop(self, codes: Codes, step: Step) -> None:
-        """M0, M1, M2, M30 and their kin: behind the motion of their block."""
+        """M0, M2, M30 and their kin, and M99 of Heidenhain: behind the motion of their block."""
         for m in codes.m:
+            if self.dialect.m_groups.get(m) == CYCLE_CALL:
+                step.cycle = True
+                self._effect("cycle", 0, codes.values, step)
             if self.dialect.m_groups.get(m) != "stop":
                 continue
             if m in _ENDS:
@@ -329,7 +340,9 @@ class Phases(Effects):
             go_straight(state, codes, step)
             step.fed = motion == G1 and self._counts_as_rapid(step)
             step.rapid = step.rapid or step.fed
-        if any(self._named(name) == "machine" for name in codes.names):
+        if any(self._named(name) == "machine" for name in codes.names) or any(
+            dialect.m_groups.get(m) == MACHINE_WORDS for m in codes.m
+        ):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))

@@ -6,7 +6,7 @@ Rule: as in `tracking`, what is not followed makes unknown all that it might hav
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import LINEAR, Effect
+from gcodejerk.nc.dialects.dialect import CYCLE_CALL, LINEAR, MACHINE_WORDS, Effect
 from gcodejerk.nc.dialects.gcodes import G28, G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.known import Known, Observation
@@ -72,10 +72,8 @@ class Codes(Known):
 
     def statement(self, line: Line) -> Observation:
         """A statement of Klartext that is no straight line: what it moves and forgets."""
-        unit, feed_unit = self.unit, self.feed_unit
         if "label" in line.effects:
-            self.forget()
-            self.unit, self.feed_unit = unit, feed_unit
+            self.come_to_label()
             return Observation()
         self.lose()
         self.g["motion"] = None
@@ -94,6 +92,25 @@ class Codes(Known):
         if "cycle" in line.effects:
             self.feed = NAN
         return Observation()
+
+    def come_to_label(self) -> None:
+        """Anything may hold that another way here leaves, but for the unit of the program."""
+        unit, feed_unit = self.unit, self.feed_unit
+        self.forget()
+        self.unit, self.feed_unit = unit, feed_unit
+
+    def end_elsewhere(self, line: Line, block: Sorted) -> Observation | None:
+        """A block that did not end where its words say, if that is so."""
+        groups = {self.dialect.m_groups.get(m) for m in block.m}
+        if CYCLE_CALL in groups:
+            self.lose()
+            self.g["motion"], self.feed = None, NAN
+            return Observation(against="a cycle runs in it")
+        if "machine" in line.effects or MACHINE_WORDS in groups:
+            # SUPA and M91: its words are no program coordinates
+            self.lose("".join(axis for k, axis in enumerate(AXES) if block.axes >> k & 1))
+            return Observation(against="a coordinate frame changes in it")
+        return None
 
     def turning(self, effect: Effect) -> None:
         """Take X as a diameter, or not."""
@@ -169,6 +186,8 @@ class Codes(Known):
     def modes(self, g: dict[str, int], values: dict[str, float]) -> None:
         """Execute modal codes."""
         dialect = self.dialect
+        if dialect.length_turns and "plane" in g and g["plane"] != self.g.get("plane"):
+            self.turn_tool()
         if "distance" in g and self.g.get("distance") != g["distance"]:
             self.level = self.r = NAN
         for group, code in g.items():
@@ -226,6 +245,8 @@ class Codes(Known):
             self.lose()
         elif effect == "data":
             self._data(values)
+        elif effect == "label":
+            self.come_to_label()
         elif effect == "flow":
             self.unknown_call()
 

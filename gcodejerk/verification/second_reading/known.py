@@ -327,6 +327,12 @@ class Known:
             NAN if counts or self.turned() else place - self.system[k] - self.g92[k] - self.tool[k]
         )
 
+    def turn_tool(self) -> None:
+        """Another plane: a tool that has a length, or may have one, reaches elsewhere."""
+        if self.tool != [0.0] * len(AXES):
+            self.tool = [NAN] * len(AXES)
+            self.lose()
+
     def cancel_length(self) -> None:
         """The tool length may have been cancelled."""
         for k, length in enumerate(self.tool):

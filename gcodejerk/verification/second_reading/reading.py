@@ -152,7 +152,7 @@ class Text:
         number = rb"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?![0-9.])" if decimals_matter else _NUMBER
         letters = "".join(a for a in AXES if a in dialect.letters and a not in dialect.increments)
         letters = "".join(a for a in letters if a not in dialect.tool_frame)
-        extra = "E" if dialect.one_command else "IJKR"
+        extra = "E" if dialect.one_command else "IJK" if dialect.polar else "IJKR"
         word = rb"(?:[" + (letters + extra).encode() + rb"][ \t]*" + number + rb"[ \t]*)"
         feed = rb"(?:F[ \t]*" + _NUMBER + rb"[ \t]*)?"
         line_number = rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?"

@@ -158,7 +158,8 @@ class Tracker(Drilling):
             self.in_contour(line)
             return Observation()
         block = Sorted()
-        if not block.sort(line, dialect, self.unit == INCH, self.facts.decimal_point):
+        told = self.unit == INCH, self.facts.decimal_point, self.g.get("motion")
+        if not block.sort(line, dialect, *told):
             return self._lost(line)
         if not dialect.modal_motion:
             self.g["motion"] = None
@@ -169,9 +170,7 @@ class Tracker(Drilling):
         if codes & dialect.refused:
             return self._run_or_refused(block)
         seen = self._run_block(block)
-        if "machine" in line.effects:
-            self.lose(_letters(block.axes))  # SUPA: its words are no program coordinates
-            seen = Observation(against="a coordinate frame changes in it")
+        seen = self.end_elsewhere(line, block) or seen
         if line.effects and seen.sure:
             seen.sure = False
         return seen
