@@ -122,6 +122,21 @@ NOT_CERTAIN = {
     "a tool across another plane": (
         "siemens", b"T1 D1\nG0 X0 Y0 Z50\nG18\nG0 Y9\n", Reason.START_UNKNOWN
     ),
+    "words in parentheses": ("marlin", b"G0 X5 (Z9)\nG0 Z5\n", Reason.START_UNKNOWN),
+    "small letters": ("marlin", b"G0 x5\nG0 X9 F6000\n", Reason.START_UNKNOWN),
+    "a small command": ("marlin", b"g0 X5\nG21\nG90\nG0 X9 F6000\n", Reason.START_UNKNOWN),
+    "inches that a build may lack": ("marlin", b"G20\nG0 X1\n", Reason.UNITS_UNKNOWN),
+    "settings that are loaded": ("marlin", b"M501\nG0 X9\n", Reason.START_UNKNOWN),
+    "a place in the file": ("marlin", b"M26 S0\nG0 X9\n", Reason.START_UNKNOWN),
+    "F in percent": ("marlin", b"M220 S50\nG0 X9\n", Reason.FEED_SCALED),
+    "so of Klipper": ("klipper", b"M220 S50\nG0 X9\n", Reason.FEED_SCALED),
+    "a padded code of Klipper": (
+        "klipper", b"G00 X5\nG90\nG0 X9 F6000\n", Reason.START_UNKNOWN
+    ),
+    "an arc that Klipper may lack": ("klipper", b"G2 X5 I3\nG0 X9\n", Reason.START_UNKNOWN),
+    "an object that is left out": (
+        "klipper", b"EXCLUDE_OBJECT_END NAME=A\nG0 X9\n", Reason.START_UNKNOWN
+    ),
     "polar coordinates": ("fagor", b"G0 R50 Q30\nG0 X9\n", Reason.START_UNKNOWN),
     "an angle alone": ("fagor", b"G3 Q30\nG0 X9\n", Reason.START_UNKNOWN),
     "the same of Fagor": ("fagor", b"G43\nG0 X0 Y0 Z50\nG18\nG0 Y9\n", Reason.START_UNKNOWN),
@@ -182,6 +197,9 @@ STILL_CERTAIN = {
     "behind the laser": ("grbl", b"M3 S100\nG1 X5\nM5\nG0 X9\n"),
     "increments of a rotary axis": ("linuxcnc", b"G91 G0 A5\n"),
     "an arc of a radius": ("fagor", b"G2 X5 Y5 R9\nG0 X9\n"),
+    "a comment on a line of its own": ("marlin", b"(a pocket)\nG0 X5\n"),
+    "F as it is": ("marlin", b"M220 S50\nM220 S100\nG0 X5\n"),
+    "mm behind inches": ("marlin", b"G20\nG21\nG0 X5 Y5 Z5 F6000\nG0 X6\n"),
     "the same plane again": ("siemens", b"T1 D1\nG0 X0 Y0 Z50\nG17\nG0 Y9\n"),
     "behind words in machine coordinates": (
         "heidenhain-iso", b"N3 G00 Z-1 M91*\nN4 G00 X5 Z9*\nN5 G00 X9 Z5*\n"

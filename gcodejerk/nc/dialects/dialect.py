@@ -248,6 +248,8 @@ class Dialect:
     P is given and not 0."""
     m_bars: Mapping[int, str] = field(default_factory=dict)
     """M code -> a name in `eligibility.BARS`, which begins unless P is 0."""
+    m_scales: frozenset[int] = frozenset()
+    """M codes that scale F, and with it rapids that run at F, to so many percent as S says."""
     tool_word_moves: bool = False
     """T may call a program of the builder's."""
     dark_rapids: bool = False

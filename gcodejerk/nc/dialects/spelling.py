@@ -15,8 +15,13 @@ class Text:
 
     klartext: bool = False
     """Lines are statements of Heidenhain Klartext; of the rest here only `line_limit` holds."""
-    parentheses: Literal["comment", "open comment", "code"] = "comment"
-    """A comment that has to close on its line; one that the line's end closes too; no comment."""
+    parentheses: Literal["comment", "open comment", "lone comment", "code"] = "comment"
+    """A comment that has to close on its line; one that the line's end closes too; one that is
+    none beside words, since what it holds may be read as words; no comment."""
+    capitals: bool = False
+    """Small letters outside of comments may be read as nothing."""
+    padded: bool = True
+    """``G01`` is G1; otherwise it is a code that nobody has."""
     semicolon: Literal["comment", "end", "error"] = "comment"
     """A comment; the end of the block, behind which only text may stand that is no block of its
     own; neither."""

@@ -115,6 +115,9 @@ class Phases(Effects):
             if m in dialect.m_bars:
                 on = _switched(codes.values.get("P", 1.0))
                 state.put("bars", {**state.bars, dialect.m_bars[m]: on})
+            if m in dialect.m_scales:
+                scaled = codes.values["S"] != 100.0 if "S" in codes.values else None
+                state.put("bars", {**state.bars, "feed override": scaled})
 
     def _tool_words(self, codes: Codes) -> None:
         """T, D and the like where they move the tool or its frame; G43 comes with the codes."""

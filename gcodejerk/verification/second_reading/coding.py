@@ -148,6 +148,9 @@ class Codes(Known):
         for m in block.m:
             if m in self.dialect.m_bars:
                 self.bars[self.dialect.m_bars[m]] = _switched(block.values.get("P", 1.0))
+            if m in self.dialect.m_scales:
+                percent = block.values.get("S", NAN)
+                self.bars["F is scaled"] = None if percent != percent else percent != 100.0
         return ends
 
     # Complex: one case for each group of M codes.
