@@ -37,6 +37,8 @@ COMPENSATION = "cutter compensation"
 """Name, among the transforms, of one that most controls of the dialect do not have."""
 MACHINE_WORDS = "machine words"
 """Group of the M codes that make the axis words of their block machine coordinates."""
+ANOTHER_LANGUAGE = "another language"
+"""Name, among the bars, of one that the table does not have."""
 CYCLE_CALL = "cycle call"
 """Group of the M codes that run a cycle behind the motion of their block."""
 HARMLESS = "harmless"
@@ -70,6 +72,8 @@ Effect = Literal[
     "shift",  # the axis words shift the frame, and nothing else turns it; none: it is as selected
     "further shift",  # the axis words shift it by so much more
     "turned frame",  # turns, scales or mirrors the frame that "shift" ends; bare, it ends it too
+    "further turn",  # the same on top of what is in force; bare, nobody knows
+    "turn",  # positions a spindle, which may be a rotary axis as well
     "watch",  # what is said here may act at any time from here on
     "transform",  # turns, scales or mirrors what follows, for good
     "home",  # moves the axes that it names, or all, to a place that is not known
@@ -187,6 +191,11 @@ class Dialect:
     uses: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Letter -> codes ("G43", "M66") one of which has to stand in the block or be in force; where
     the table is empty, every letter may stand everywhere."""
+    shifts_travel: bool = False
+    """By a setting of the control, the first increment behind a change of the frame travels that
+    change, too."""
+    spindle_turns: bool = False
+    """What M3 turns may be a rotary axis as well."""
     polar: str = ""
     """Letters that say where a straight move leads, by angle and radius; an arc may have the last
     of them, too, where axis words stand beside it, and a cycle has its words for itself."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import (
+    ANOTHER_LANGUAGE,
     CYCLE_CALL,
     MACHINE_WORDS,
     PLANES,
@@ -33,6 +34,7 @@ from gcodejerk.nc.interpreter.moves import (
 from gcodejerk.nc.interpreter.named_cycles import drill_behind
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.interpreter.rules import arc_words, takes_axes
+from gcodejerk.nc.interpreter.variables import forget_shared
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
@@ -42,7 +44,7 @@ _TAKES_WORDS: frozenset[Effect] = frozenset(
 )
 """Effects of a code beside which the axis words of the block are no straight move."""
 _NAME_TAKES_WORDS: frozenset[Effect] = (_TAKES_WORDS - {"flow"}) | {
-    *("frames", "transform", "shift", "further shift", "turned frame", "watch")
+    *("frames", "transform", "shift", "further shift", "turned frame", "further turn", "watch")
 }
 """The same of a name; one of flow that goes on to the next block leaves the words to the motion."""
 _TAKES_AXES: frozenset[Effect] = frozenset({"table", "local", "set", "frames", "data"})
@@ -126,6 +128,8 @@ class Phases(Effects):
             state.forget_positions()
         if dialect.length_word in values and "tool length" not in codes.g:
             frames.tool_length(state, 0, values, {}, dialect)
+        if dialect.tool_frame & {"T"} & set(values) and dialect.text.variables == "R":
+            forget_shared(state, dialect.arithmetic)
         if not dialect.tool_frame.isdisjoint(values):
             state.lose("tool")
             state.forget_positions()
@@ -147,6 +151,8 @@ class Phases(Effects):
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
                 on = _switched(codes.values.get("P", 0.0)) if begins == "P" else begins
+                if name == ANOTHER_LANGUAGE:
+                    state.forget(Reason.NOT_UNDERSTOOD)  # what its codes do and leave
                 state.put("bars", {**state.bars, name: on})
         if "distance" in g:
             state.put("distance_stated", True)
@@ -196,7 +202,7 @@ class Phases(Effects):
                 continue
             if effect == "feed override":
                 self.state.put("bars", {**self.state.bars, effect: True})
-            if effect in ("shift", "further shift", "turned frame"):
+            if effect in ("shift", "further shift", "turned frame", "further turn"):
                 self._program_frame(effect, codes)
             if effect == "feed group":
                 self._feed_group(codes.names)

@@ -6,7 +6,13 @@ Rule: as in `tracking`, what is not followed makes unknown all that it might hav
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import CYCLE_CALL, LINEAR, MACHINE_WORDS, Effect
+from gcodejerk.nc.dialects.dialect import (
+    ANOTHER_LANGUAGE,
+    CYCLE_CALL,
+    LINEAR,
+    MACHINE_WORDS,
+    Effect,
+)
 from gcodejerk.nc.dialects.gcodes import G28, G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.known import Known, Observation
@@ -36,13 +42,16 @@ class Codes(Known):
         if self.dialect.diameter_codes:
             self.diameter = None
 
+    # Complex: what TRANS, ATRANS, ROT and AROT have in common is nearly all.
     def program_shift(self, line: Line) -> Observation:
         """TRANS X5, ATRANS X5, ROT Z30; alone, each of them ends all that went before."""
         words = [(letter, number) for letter, number, _ in line.words if letter != "N"]
-        shift = len(line.effects) == 1 and line.effects[0] != "turned frame"
+        first = line.effects[0]
+        further = first in ("further shift", "further turn")
+        shift = len(line.effects) == 1 and first in ("shift", "further shift")
         turned = self.frames.get("a programmed frame", False) is not False
-        if not words and len(line.effects) == 1:
-            self.frames["a programmed frame"] = False
+        if not words and len(line.effects) == 1 and not further:
+            self.frames["a programmed frame"] = self.added = False
             self.g92 = self.rename(self.g92, [0.0] * len(AXES))
             if turned:
                 self.lose()
@@ -50,10 +59,12 @@ class Codes(Known):
         letters = [letter for letter, _ in words]
         plain = shift and set(letters) <= LINEAR and len(set(letters)) == len(letters)
         plain = plain and not line.relative and not ("X" in letters and self.diameter is not False)
-        replaces = line.effects[0] == "shift"
+        plain = plain and bool(words) and (further or self.added is False)
+        self.added = True if first == "further shift" else self.added
+        replaces = first == "shift"
         if not plain or (turned and not replaces):
-            self.frames["a programmed frame"] = True if not shift else None
-            self.g92 = [NAN] * len(AXES)
+            self.frames["a programmed frame"] = None if further else not shift
+            self.g92 = self.rename(self.g92, [NAN] * len(AXES))
             self.lose()
             return Observation()
         if turned:
@@ -161,6 +172,8 @@ class Codes(Known):
             group = self.dialect.m_groups.get(m)
             if group == "spindle" and m in (3, 4, 5):
                 self.spindle = m
+            if group == "spindle" and self.dialect.spindle_turns:
+                self.lose("".join(axis for axis in AXES if axis not in LINEAR))
             if group == "stop" and m in _ENDS:
                 ends = True
             elif m in _CALLS and group is not None:
@@ -204,6 +217,8 @@ class Codes(Known):
                     self.frames[name] = on
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
+                if name == ANOTHER_LANGUAGE:
+                    self.forget()
                 by_p = _switched(values.get("P", 0.0))
                 self.bars[name] = by_p if begins == "P" else bool(begins)
         if "units" in g:

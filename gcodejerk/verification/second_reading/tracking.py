@@ -30,7 +30,7 @@ _FRAMES: frozenset[Effect] = frozenset(
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
-_SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame"))
+_SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame", "further turn"))
 _READ: frozenset[Effect] = QUIET | _SHIFTS | frozenset[Effect](("frames", "swivel", "machine"))
 """Effects of names that are followed."""
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
@@ -257,9 +257,7 @@ class Tracker(Drilling):
         if dialect.length_word in values and "tool length" not in block.g:
             self.lengthen(0, NAN, block.axes)
         if not dialect.tool_frame.isdisjoint(values):
-            self.tool = [NAN] * len(AXES)
-            self.lose()
-            self.end_bar("tool data")
+            self.lose_tool(by_t="T" in values)
             seen.against = seen.against or "it changes the tool's offset"
 
     def _use_axes(self, block: Sorted, kinds: set[Effect], seen: Observation) -> None:
@@ -401,9 +399,9 @@ class Tracker(Drilling):
                 there = block.values[axis] * self.scale(axis)
                 how = block.relative.get(axis)
                 if how == "IC" or (how is None and distance == G91):
-                    there += self.at[k]
-                elif axis not in LINEAR:
-                    there = self.turn(k, there)
+                    there += self.stepping_from(k)
+                elif how is not None or distance is not None:
+                    there = self.absolutely(k, there)
                 self.at[k] = NAN if distance is None and how is None else there
 
     def _why_not(self, block: Sorted, seen: Observation) -> None:
