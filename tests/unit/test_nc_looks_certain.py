@@ -165,6 +165,10 @@ NOT_CERTAIN = {
     "a list of parameters": (
         "siemens", b"R1=5\nR[0]=SET(7,8)\nG0 X=R1\n", Reason.EXPRESSION
     ),
+    "a tolerance for the path": (
+        "siemens", b"G60\nCYCLE832(0.05,1,1)\nG0 X9\n", Reason.PATH_UNKNOWN
+    ),
+    "no tolerance any more": ("siemens", b"CYCLE832(0,1)\nG0 X9\n", Reason.PATH_UNKNOWN),
     "T may run a cycle": (
         "siemens", b"R1=5\nT2\nG0 X0 Y0 Z0\nG0 X=R1\n", Reason.EXPRESSION
     ),
@@ -188,6 +192,9 @@ NOT_CERTAIN = {
     ),
     "a cycle at every position of Klartext": (
         "klartext", b"3 M89\n4 L X+4 Y+4 Z+50 FMAX\n5 L X+8 FMAX\n", Reason.NOT_UNDERSTOOD
+    ),
+    "G91 behind a word": (
+        "heidenhain-iso", b"N3 G00 X5 G91 Y5*\nN4 G90*\nN5 G00 X9*\n", Reason.START_UNKNOWN
     ),
     "a subprogram of a label": (
         "heidenhain-iso", b"N3 L1,0*\nN4 G00 X5 Y5 Z5*\nN5 G00 X9*\n", Reason.NOT_UNDERSTOOD
@@ -240,6 +247,7 @@ STILL_CERTAIN = {
     "an absolute word behind a shift": (
         "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nG0 X5\nG91 X6\n"
     ),
+    "a path that blends still": ("siemens", b"CYCLE832(0.05,1,1)\nG0 X9\n"),
     "ATRANS behind TRANS": (
         "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nATRANS X5\nG0 X5\n"
     ),
@@ -280,6 +288,14 @@ def test_a_spindle_may_be_a_rotary_axis(turns):
     found = read(text % turns, "siemens", wraps=wraps)
     assert found[1:] == [Reason.START_UNKNOWN, None]
     assert read(text % b"M8", "siemens", wraps=wraps)[1:] == [None, None]
+
+
+@pytest.mark.parametrize("code", [b"G53", b"G153", b"SUPA"])
+def test_basic_frames_lie_between_machine_and_work_systems(code):
+    offsets = {"G54": {"X": 1.0, "Y": 1.0, "Z": 1.0}}
+    text = b"G54 G0 X0 Y0 Z50\n%s G0 Z3\nG0 Z9\nZ8\n" % code
+    found = read(text, "siemens", offsets=offsets)
+    assert found[1:] == [Reason.FRAME_CHANGE, Reason.START_UNKNOWN, None]
 
 
 def test_a_rapid_that_ends_in_a_stop_is_certain_itself():

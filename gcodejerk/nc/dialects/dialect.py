@@ -73,6 +73,7 @@ Effect = Literal[
     "further shift",  # the axis words shift it by so much more
     "turned frame",  # turns, scales or mirrors the frame that "shift" ends; bare, it ends it too
     "further turn",  # the same on top of what is in force; bare, nobody knows
+    "smoothing",  # selects a continuous path; without a first argument, or with 0, nobody knows
     "turn",  # positions a spindle, which may be a rotary axis as well
     "watch",  # what is said here may act at any time from here on
     "transform",  # turns, scales or mirrors what follows, for good
@@ -194,8 +195,13 @@ class Dialect:
     shifts_travel: bool = False
     """By a setting of the control, the first increment behind a change of the frame travels that
     change, too."""
+    base_frames: bool = False
+    """Between machine and work systems lie frames that the program does not name, and that G53 may
+    leave in force."""
     spindle_turns: bool = False
     """What M3 turns may be a rotary axis as well."""
+    distance_first: bool = False
+    """G90 and G91 may count for the words behind them alone."""
     polar: str = ""
     """Letters that say where a straight move leads, by angle and radius; an arc may have the last
     of them, too, where axis words stand beside it, and a cycle has its words for itself."""

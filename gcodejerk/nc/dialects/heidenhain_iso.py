@@ -8,7 +8,7 @@ TNC 360 ISO manual, list of G and M functions (p. 2): G38 stops the program, G43
 and shorten a way along an axis; M91 and M92 make the words of their block machine coordinates, M99
 calls a cycle, M89 calls it at every position from there on. What an M function does that is not
 here may last as well (M128), and nothing is rewritten behind one (`unknown_lasts`). ``L1,2`` calls
-a label.
+a label. What a G91 behind axis words means for those was not looked up.
 """
 
 from __future__ import annotations
@@ -72,6 +72,7 @@ HEIDENHAIN_ISO = Dialect(
     },
     letters="FSTXYZABCUVWHIJKLPQR",
     calls="L",
+    distance_first=True,
     transforms={
         **dict.fromkeys((430, 440), ("compensation along an axis", True)),
         400: ("compensation along an axis", False),

@@ -9,7 +9,10 @@ What an increment (G91, IC) travels behind a change of the frame, setting data s
 extension" of the programming manual. Where frames have a fine part (MD24000), ATRANS adds to it and
 TRANS leaves it (NC programming p. 315), elsewhere TRANS ends it: behind both, nobody knows. A
 spindle may be a C axis, which SPOS, M3, M19 and M70 turn as well. What the ISO dialect of G291
-leaves behind is not known; T may run a cycle of the builder's, which may set R parameters.
+leaves behind is not known. CYCLE832 selects one of G64 to G645, and whatever machine data say where
+its tolerance is 0 (general knowledge, not looked up). T may run a cycle of the builder's, which may
+set R parameters. G153 suppresses the basic frames, G53 leaves them in force (840Di sl, Fundamentals
+11/2006, p. 100): where either ends in the program's coordinates, only the control knows.
 
 The length of a tool lies across the plane in force (Function Manual Tool Compensation, LENTOAX, p.
 2-151; NC programming p. 750), unless the setting data SD42940 says otherwise: behind another plane
@@ -37,7 +40,7 @@ _SILENT = (
     *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
     *("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM", "SF", "SCC"),  # corners: the end stays
-    *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
+    *("DYNFINISH", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
     *("FNORM", "FIFOCTRL", "WAITM", "WAITMC", "SETM", "CLEARM"),  # F as it is; waiting for channels
 )
 _FRAMES = ("RPL", "ROT", "ROTS", "SCALE", "MIRROR")
@@ -93,6 +96,7 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys(_FRAMES, "turned frame"),
     **dict.fromkeys(_FURTHER, "further turn"),
     **dict.fromkeys(("SPOS", "SPOSA"), "turn"),
+    "CYCLE832": "smoothing",
     **dict.fromkeys(_WATCHES, "watch"),
     "TRAFOOF": "frames",
     **dict.fromkeys(_TURNED, "transform"),
@@ -188,6 +192,7 @@ SIEMENS = Dialect(
     length_turns=True,
     shifts_travel=True,
     spindle_turns=True,
+    base_frames=True,
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
     drilling=Drilling(named=_NAMED),

@@ -160,6 +160,8 @@ class _Sorter:
             self.codes.reject(word.text)
         elif group not in g or g[group] == G80:
             g[group] = code
+            late = group == "distance" and self._dialect.distance_first and self.codes.moved()
+            self.codes.fault = self.codes.fault or bool(late)
         elif code != G80:
             self.codes.fault = True
             g[group] = code

@@ -34,6 +34,10 @@ _DECLARED = re.compile(
 """A variable, the size of an array, and what it begins with."""
 
 
+CONTINUOUS = 64
+"""Path mode in which blocks blend."""
+
+
 class Effects:
     """Does to a state what codes and names do besides the motion."""
 
@@ -177,6 +181,14 @@ class Effects:
                 twice = sum(other == variable for _, (other, _) in found) > 1
                 value = NAN if twice else converted(values[k], self.declared[name])
             state.set_variable(variable, value)
+
+    def _smooth(self, names: list[Name]) -> None:
+        """CYCLE832(0.05,..) selects a continuous path; CYCLE832() whatever machine data say."""
+        for name in names:
+            if self._named(name) == "smoothing":
+                tolerance = name.arguments.strip(b"( \t)").partition(b",")[0].strip(b" \t")
+                if self.state.path != CONTINUOUS or not tolerance.strip(b"0."):
+                    self.state.lose("path")
 
     def _swivel(self, names: list[Name], step: Step) -> None:
         """CYCLE800(..) turns the plane, CYCLE800() turns it back; where the axes go, it says."""

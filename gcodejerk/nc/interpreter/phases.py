@@ -190,6 +190,7 @@ class Phases(Effects):
         self._declare(codes.names)
         self._assign_names(codes.names)
         self._swivel(codes.names, step)
+        self._smooth(codes.names)
         effects = [self._named(name) for name in codes.names]
         if "modal cycle" in effects:
             # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
@@ -342,6 +343,8 @@ class Phases(Effects):
         step.rapid = motion == dialect.rapid
         if dialect.effect(codes.g.get("non-modal")) == "machine":
             go_to_machine_position(state, codes.values)
+            if dialect.base_frames:
+                state.forget_positions(AXES.index(axis) for axis in codes.moved())
         elif motion in dialect.redrawn or motion is None:
             state.forget_positions(plane_axes(state))
             state.forget_positions(AXES.index(axis) for axis in codes.moved())

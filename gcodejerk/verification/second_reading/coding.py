@@ -117,8 +117,10 @@ class Codes(Known):
             self.lose()
             self.g["motion"], self.feed = None, NAN
             return Observation(against="a cycle runs in it")
-        if "machine" in line.effects or MACHINE_WORDS in groups:
-            # SUPA and M91: its words are no program coordinates
+        codes = {self.dialect.effect(code) for code in block.g.values()}
+        suppressed = self.dialect.base_frames and "machine" in codes
+        if "machine" in line.effects or MACHINE_WORDS in groups or suppressed:
+            # SUPA, M91, G153: its words are no program coordinates
             self.lose("".join(axis for k, axis in enumerate(AXES) if block.axes >> k & 1))
             return Observation(against="a coordinate frame changes in it")
         return None

@@ -84,6 +84,8 @@ class Line:
     """An assignment that may change offsets."""
     swivelled: bool = False
     """The plane is turned from here on."""
+    smoothed: bool = False
+    """A tolerance is given for the path from here on."""
     group: bool = False
     """F is from here on the speed of some axes only."""
     cycle: tuple[str, bytes] | None = None
@@ -360,6 +362,9 @@ class Text:
                 line.group = (match[2] or b"").strip(b"() \t") != b""
             if effect == "cycle":
                 line.cycle = match[1].decode(), match[2] or b""
+            if effect == "smoothing":
+                first = (match[2] or b"").strip(b"() \t").split(b",")[0]
+                line.smoothed = first.strip(b" \t0.") != b""
             if effect == "swivel":
                 line.swivelled = (match[2] or b"").strip(b"() \t") != b""
             if effect != "none":

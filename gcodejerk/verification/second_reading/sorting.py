@@ -76,6 +76,8 @@ class Sorted:
         groups = [dialect.m_groups.get(m) for m in self.m]
         if any(groups.count(group) > 1 for group in _SINGLE):
             return False
+        if dialect.distance_first and _distance_late(line, dialect):
+            return False
         alone = not dialect.one_command or len(self.g) + len(self.m) <= 1
         return alone or _modes_first(line, dialect)
 
@@ -126,6 +128,17 @@ def _modes_first(line: Line, dialect: Dialect) -> bool:
     last = max(letters.rfind("G"), letters.rfind("M"))
     front = [(letter, number) for letter, number, _ in line.words[:last] if letter != "N"]
     return all(a == "G" and round(number * 10.0) in dialect.in_turn for a, number in front)
+
+
+def _distance_late(line: Line, dialect: Dialect) -> bool:
+    """Whether G90 or G91 stands behind an axis word."""
+    moved = False
+    for letter, number, _ in line.words:
+        group = dialect.groups.get(round(number * 10.0)) if letter == "G" else None
+        if moved and group == "distance":
+            return True
+        moved = moved or letter in AXES
+    return False
 
 
 def _without_point(

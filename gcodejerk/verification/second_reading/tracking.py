@@ -31,7 +31,7 @@ _FRAMES: frozenset[Effect] = frozenset(
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
 _SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame", "further turn"))
-_READ: frozenset[Effect] = QUIET | _SHIFTS | frozenset[Effect](("frames", "swivel", "machine"))
+_READ = QUIET | _SHIFTS | frozenset[Effect](("frames", "swivel", "machine", "smoothing"))
 """Effects of names that are followed."""
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
@@ -166,6 +166,8 @@ class Tracker(Drilling):
         for effect in line.effects:
             if effect in QUIET:
                 self.turning(effect)
+            elif effect == "smoothing" and not (line.smoothed and self.path == 64):
+                self.path, self.p, self.q = None, NAN, NAN
         codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}
         if codes & dialect.refused:
             return self._run_or_refused(block)
