@@ -15,8 +15,9 @@ import numpy as np
 from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
 from gcodejerk.nc import Block, Dialect, Rapids, Word
-from gcodejerk.nc.dialects.dialect import Writing, code_name
+from gcodejerk.nc.dialects.dialect import code_name
 from gcodejerk.nc.dialects.gcodes import G90
+from gcodejerk.nc.dialects.spelling import Writing
 from gcodejerk.units import MM_PER_INCH
 
 COMMENT_LENGTH = 69

@@ -29,6 +29,9 @@ HEADS = {
     "mach": b"G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 X0. Y0. Z50.\n",
     "grbl": b"G21 G90 G94 G17 G54 F100\nG0 X0 Y0 Z50\n",
     "linuxcnc": b"G21 G90 G94 G17 G40 G49 G54 G64 F100\nG0 X0 Y0 Z50 A10\n",
+    "fagor": b"G71 G90 G94 G17 G40 G44 G5 F100\nG0 X0 Y0 Z50\n",
+    "klartext": b"0 BEGIN PGM P MM\n1 L X+0 Y+0 Z+50 R0 FMAX\n",
+    "heidenhain-iso": b"%P G71 *\nN1 G17 G90 G40*\nN2 G00 X0 Y0 Z50*\n",
 }
 
 
@@ -117,6 +120,94 @@ NOT_CERTAIN = {
     "a programmed override": ("siemens", b"OVR=50\nG0 X9\nX8\n", Reason.FEED_SCALED),
     "the other language": ("siemens", b"G291\nG0 X9\nX8\n", Reason.NOT_UNDERSTOOD),
     "the way of a rotary axis": ("linuxcnc", b"G0 A5\n", Reason.ROTARY_WAY),
+    "a tool across another plane": (
+        "siemens", b"T1 D1\nG0 X0 Y0 Z50\nG18\nG0 Y9\n", Reason.START_UNKNOWN
+    ),
+    "words in parentheses": ("marlin", b"G0 X5 (Z9)\nG0 Z5\n", Reason.START_UNKNOWN),
+    "small letters": ("marlin", b"G0 x5\nG0 X9 F6000\n", Reason.START_UNKNOWN),
+    "a small command": ("marlin", b"g0 X5\nG21\nG90\nG0 X9 F6000\n", Reason.START_UNKNOWN),
+    "inches that a build may lack": ("marlin", b"G20\nG0 X1\n", Reason.UNITS_UNKNOWN),
+    "settings that are loaded": ("marlin", b"M501\nG0 X9\n", Reason.START_UNKNOWN),
+    "a place in the file": ("marlin", b"M26 S0\nG0 X9\n", Reason.START_UNKNOWN),
+    "F in percent": ("marlin", b"M220 S50\nG0 X9\n", Reason.FEED_SCALED),
+    "so of Klipper": ("klipper", b"M220 S50\nG0 X9\n", Reason.FEED_SCALED),
+    "a padded code of Klipper": (
+        "klipper", b"G00 X5\nG90\nG0 X9 F6000\n", Reason.START_UNKNOWN
+    ),
+    "an arc that Klipper may lack": ("klipper", b"G2 X5 I3\nG0 X9\n", Reason.START_UNKNOWN),
+    "an object that is left out": (
+        "klipper", b"EXCLUDE_OBJECT_END NAME=A\nG0 X9\n", Reason.START_UNKNOWN
+    ),
+    "an increment behind a shift": (
+        "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nG91 G0 X5\nX6\n", Reason.START_UNKNOWN
+    ),
+    "the same by IC": (
+        "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nG0 X=IC(5)\nX6\n", Reason.START_UNKNOWN
+    ),
+    "ATRANS alone": (
+        "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nATRANS\nG0 X5\n", Reason.START_UNKNOWN
+    ),
+    "AROT alone": (
+        "siemens", b"TRANS\nG0 X0 Y0 Z50\nATRANS X10\nAROT\nG0 X5\n", Reason.ROTATION
+    ),
+    "TRANS behind ATRANS": (
+        "siemens", b"TRANS\nG0 X0 Y0 Z50\nATRANS X5\nTRANS X10\nG0 X5\n", Reason.START_UNKNOWN
+    ),
+    "modes of the other language": (
+        "siemens", b"G291\nG0 U5\nG290\nG0 X9\nX8\n", Reason.NOT_UNDERSTOOD
+    ),
+    "a list of values": (
+        "siemens", b"DEF REAL AA[3]\nAA[1]=5\nAA[0]=SET(7,8,9)\nG0 X=AA[1]\n", Reason.EXPRESSION
+    ),
+    "an array of one value": (
+        "siemens", b"DEF REAL AA[3]\nAA[1]=5\nAA=REP(2)\nG0 X=AA[1]\n", Reason.EXPRESSION
+    ),
+    "a list of parameters": (
+        "siemens", b"R1=5\nR[0]=SET(7,8)\nG0 X=R1\n", Reason.EXPRESSION
+    ),
+    "a tolerance for the path": (
+        "siemens", b"G60\nCYCLE832(0.05,1,1)\nG0 X9\n", Reason.PATH_UNKNOWN
+    ),
+    "no tolerance any more": ("siemens", b"CYCLE832(0,1)\nG0 X9\n", Reason.PATH_UNKNOWN),
+    "T may run a cycle": (
+        "siemens", b"R1=5\nT2\nG0 X0 Y0 Z0\nG0 X=R1\n", Reason.EXPRESSION
+    ),
+    "a frame along the tool": (
+        "siemens", b"TOFRAMEX\nG700 G90 G94 G17 G40 G64 F1\nG0 X0\nX5\n", Reason.ROTATION
+    ),
+    "polar coordinates": ("fagor", b"G0 R50 Q30\nG0 X9\n", Reason.START_UNKNOWN),
+    "an angle alone": ("fagor", b"G3 Q30\nG0 X9\n", Reason.START_UNKNOWN),
+    "the same of Fagor": ("fagor", b"G43\nG0 X0 Y0 Z50\nG18\nG0 Y9\n", Reason.START_UNKNOWN),
+    "words in machine coordinates": (
+        "heidenhain-iso", b"N3 G00 Z-1 M91*\nN4 G00 Z9*\n", Reason.START_UNKNOWN
+    ),
+    "another origin of the builder": (
+        "heidenhain-iso", b"N3 G00 X5 M92*\nN4 G00 X9*\n", Reason.START_UNKNOWN
+    ),
+    "a cycle called by M99": (
+        "heidenhain-iso", b"N3 G00 X5 M99*\nN4 G00 X9*\n", Reason.START_UNKNOWN
+    ),
+    "a cycle at every position": (
+        "heidenhain-iso", b"N3 M89*\nN4 G00 X5*\nN5 G00 X9*\n", Reason.NOT_UNDERSTOOD
+    ),
+    "a cycle at every position of Klartext": (
+        "klartext", b"3 M89\n4 L X+4 Y+4 Z+50 FMAX\n5 L X+8 FMAX\n", Reason.NOT_UNDERSTOOD
+    ),
+    "G91 behind a word": (
+        "heidenhain-iso", b"N3 G00 X5 G91 Y5*\nN4 G90*\nN5 G00 X9*\n", Reason.START_UNKNOWN
+    ),
+    "a subprogram of a label": (
+        "heidenhain-iso", b"N3 L1,0*\nN4 G00 X5 Y5 Z5*\nN5 G00 X9*\n", Reason.NOT_UNDERSTOOD
+    ),
+    "so without the comma": (
+        "heidenhain-iso", b"N3 L1*\nN4 G00 G40 G90 X5 Y5 Z5*\nN5 G00 X9*\n",
+        Reason.NOT_UNDERSTOOD
+    ),
+    "a label": ("heidenhain-iso", b"N3 G98 L1*\nN4 G00 G40 X5*\nN5 G00 X9*\n", NO_DISTANCE),
+    "somebody jogs at G38": ("heidenhain-iso", b"N3 G38*\nN4 G00 X9*\n", Reason.START_UNKNOWN),
+    "a way longer by the radius": (
+        "heidenhain-iso", b"N3 G01 G43 Z5 F9*\nN4 G40*\nN5 G00 Z9*\n", Reason.START_UNKNOWN
+    ),
     "beside a linear one": ("linuxcnc", b"G0 X3 A5\n", Reason.ROTARY_WAY),
 }  # fmt: skip
 
@@ -149,6 +240,30 @@ STILL_CERTAIN = {
     "G92 E0 of a printer": ("marlin", b"G92 E0\nG0 X9\n"),
     "behind the laser": ("grbl", b"M3 S100\nG1 X5\nM5\nG0 X9\n"),
     "increments of a rotary axis": ("linuxcnc", b"G91 G0 A5\n"),
+    "an arc of a radius": ("fagor", b"G2 X5 Y5 R9\nG0 X9\n"),
+    "a comment on a line of its own": ("marlin", b"(a pocket)\nG0 X5\n"),
+    "F as it is": ("marlin", b"M220 S50\nM220 S100\nG0 X5\n"),
+    "mm behind inches": ("marlin", b"G20\nG21\nG0 X5 Y5 Z5 F6000\nG0 X6\n"),
+    "an absolute word behind a shift": (
+        "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nG0 X5\nG91 X6\n"
+    ),
+    "a path that blends still": ("siemens", b"CYCLE832(0.05,1,1)\nG0 X9\n"),
+    "ATRANS behind TRANS": (
+        "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nATRANS X5\nG0 X5\n"
+    ),
+    "TRANS behind both": (
+        "siemens", b"ATRANS X5\nTRANS\nG0 X0 Y0 Z50\nTRANS X10\nG0 X5\n"
+    ),
+    "the same plane again": ("siemens", b"T1 D1\nG0 X0 Y0 Z50\nG17\nG0 Y9\n"),
+    "behind words in machine coordinates": (
+        "heidenhain-iso", b"N3 G00 Z-1 M91*\nN4 G00 X5 Z9*\nN5 G00 X9 Z5*\n"
+    ),
+    "behind a label": (
+        "heidenhain-iso", b"N3 G98 L1*\nN4 G00 G40 G90 X5*\nN5 G00 X9*\n"
+    ),
+    "behind a cycle called by M99": (
+        "heidenhain-iso", b"N3 G00 X5 M99*\nN4 G00 X5 Y5 Z9*\nN5 G00 X9*\n"
+    ),
     "a rotary axis that stays": ("linuxcnc", b"G0 X5 A10\n"),
 }  # fmt: skip
 
@@ -164,6 +279,23 @@ def test_the_machine_file_may_say_that_nobody_moves_an_axis_meanwhile(dialect):
     text = b"M0\nM1\nG0 X9.\n"
     assert read(text, dialect, resume="same", spindle="mill") == [None]
     assert read(text, dialect, resume="unknown", spindle="mill") == [Reason.START_UNKNOWN]
+
+
+@pytest.mark.parametrize("turns", [b"M3 S9", b"M19", b"M70", b"SPOS=90", b"SPOSA=90"])
+def test_a_spindle_may_be_a_rotary_axis(turns):
+    wraps = {"C": "none"}
+    text = b"G0 C0\n%s\nG0 C9\nC8\n"
+    found = read(text % turns, "siemens", wraps=wraps)
+    assert found[1:] == [Reason.START_UNKNOWN, None]
+    assert read(text % b"M8", "siemens", wraps=wraps)[1:] == [None, None]
+
+
+@pytest.mark.parametrize("code", [b"G53", b"G153", b"SUPA"])
+def test_basic_frames_lie_between_machine_and_work_systems(code):
+    offsets = {"G54": {"X": 1.0, "Y": 1.0, "Z": 1.0}}
+    text = b"G54 G0 X0 Y0 Z50\n%s G0 Z3\nG0 Z9\nZ8\n" % code
+    found = read(text, "siemens", offsets=offsets)
+    assert found[1:] == [Reason.FRAME_CHANGE, Reason.START_UNKNOWN, None]
 
 
 def test_a_rapid_that_ends_in_a_stop_is_certain_itself():

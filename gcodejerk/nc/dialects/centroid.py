@@ -21,7 +21,8 @@ were read before:
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 CYCLES = frozenset({730, 740, 760, 810, 820, 830, 840, 850, 890})

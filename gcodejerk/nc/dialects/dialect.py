@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.spelling import Text, Writing
 from gcodejerk.start import Start
 
 LINEAR = frozenset("XYZUVW")
@@ -34,6 +35,12 @@ PLANES: dict[int, tuple[str, str, str]] = {
 
 COMPENSATION = "cutter compensation"
 """Name, among the transforms, of one that most controls of the dialect do not have."""
+MACHINE_WORDS = "machine words"
+"""Group of the M codes that make the axis words of their block machine coordinates."""
+ANOTHER_LANGUAGE = "another language"
+"""Name, among the bars, of one that the table does not have."""
+CYCLE_CALL = "cycle call"
+"""Group of the M codes that run a cycle behind the motion of their block."""
 HARMLESS = "harmless"
 """Group of the M codes, and first word of the groups of the G codes, that the machine file says
 move nothing and change nothing."""
@@ -65,6 +72,9 @@ Effect = Literal[
     "shift",  # the axis words shift the frame, and nothing else turns it; none: it is as selected
     "further shift",  # the axis words shift it by so much more
     "turned frame",  # turns, scales or mirrors the frame that "shift" ends; bare, it ends it too
+    "further turn",  # the same on top of what is in force; bare, nobody knows
+    "smoothing",  # selects a continuous path; without a first argument, or with 0, nobody knows
+    "turn",  # positions a spindle, which may be a rotary axis as well
     "watch",  # what is said here may act at any time from here on
     "transform",  # turns, scales or mirrors what follows, for good
     "home",  # moves the axes that it names, or all, to a place that is not known
@@ -80,58 +90,6 @@ Effect = Literal[
     "feed override",  # scales F, and not G0
 ]
 """What a code, or a name such as ``TRANS``, does besides changing its modal group."""
-
-
-@dataclass(frozen=True, slots=True)
-class Text:
-    """How a line is written."""
-
-    klartext: bool = False
-    """Lines are statements of Heidenhain Klartext; of the rest here only `line_limit` holds."""
-    parentheses: Literal["comment", "open comment", "code"] = "comment"
-    """A comment that has to close on its line; one that the line's end closes too; no comment."""
-    semicolon: Literal["comment", "end", "error"] = "comment"
-    """A comment; the end of the block, behind which only text may stand that is no block of its
-    own; neither."""
-    slashes: bool = False
-    """``//`` begins a comment."""
-    python: bool = False
-    """A comment may run a program: ``(py, ...)``."""
-    live_comments: bool = False
-    """One that begins with a word and a comma may do something: ``(expr, ...)``, but for texts."""
-    delete: Literal["first", "numbered", "ignored", "none"] = "first"
-    """A ``/`` skips the block where the operator says so: in front of everything; there or behind
-    N, also with a level ``/1`` to ``/9``; the ``/`` is thrown away and the block runs; an error."""
-    o_word: Literal["flow", "program", "error"] = "error"
-    """``o100 while [..]``; ``O1234`` names a program (and so does ``:1234``); neither."""
-    percent: Literal["lone", "leader", "named", "error"] = "lone"
-    """A ``%`` stands alone; the number of a program and comments may stand on its line, which is
-    not read; a name may follow it; it is an error."""
-    leader: bool = False
-    """What stands in front of the first ``%`` is not read, and the first line may be the name of
-    the file."""
-    names: bool = False
-    """Words may have names, and arguments in parentheses: ``CYCLE81(..)``."""
-    equals: bool = False
-    """A value may follow an equals sign: ``X=IC(5)``, ``T1=5``."""
-    variables: Literal["#", "R", "Q", "none"] = "none"
-    """What a variable begins with."""
-    open_expressions: bool = False
-    """An assignment takes an expression without brackets: ``#1=#2+1``."""
-    keywords: tuple[str, ...] = ()
-    """Words of program flow that hold no number: ``GOTO``."""
-    blanks: Literal["anywhere", "between"] = "between"
-    """Blanks count nowhere, also within numbers; or they stand between words only."""
-    checksum: bool = False
-    """``*123`` may end a line."""
-    strings: bool = False
-    """A word may hold a name: ``T="DRILL 8.5"``."""
-    hexadecimal: bool = False
-    """A zero in front of an X begins a hexadecimal number: ``Y0X10`` is Y16."""
-    end: bytes = b""
-    """What ends every block."""
-    line_limit: int = 512
-    """Longest line that the controller reads, in bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,22 +167,6 @@ class Arithmetic:
 
 
 @dataclass(frozen=True, slots=True)
-class Writing:
-    """How a stream is spelled in the dialect, and what its control keeps of a number."""
-
-    comment: tuple[bytes, bytes] = (b"(", b")")
-    standstill: bytes = b"G4 P0"
-    """A block that waits until the machine stands."""
-    line_limit: int = 0
-    """Longest line that is written, in bytes; 0: the longest that the control reads."""
-    digits: int = 15
-    """Most digits of a number of a point, leading zeros left out."""
-    doubles: bool = False
-    """The control computes with the decimals of a double: steps finer than an axis's resolution are
-    kept, and not rounded one by one."""
-
-
-@dataclass(frozen=True, slots=True)
 class Dialect:
     """One way of writing and reading programs."""
 
@@ -250,6 +192,19 @@ class Dialect:
     uses: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Letter -> codes ("G43", "M66") one of which has to stand in the block or be in force; where
     the table is empty, every letter may stand everywhere."""
+    shifts_travel: bool = False
+    """By a setting of the control, the first increment behind a change of the frame travels that
+    change, too."""
+    base_frames: bool = False
+    """Between machine and work systems lie frames that the program does not name, and that G53 may
+    leave in force."""
+    spindle_turns: bool = False
+    """What M3 turns may be a rotary axis as well."""
+    distance_first: bool = False
+    """G90 and G91 may count for the words behind them alone."""
+    polar: str = ""
+    """Letters that say where a straight move leads, by angle and radius; an arc may have the last
+    of them, too, where axis words stand beside it, and a cycle has its words for itself."""
     strict: bool = False
     """Only one code may use the axis words, and a code that needs some has to have them."""
     centres_of_plane: bool = False
@@ -289,6 +244,8 @@ class Dialect:
     length_moves: bool = False
     """A change of the tool length may move the machine by itself, by a parameter, instead of
     renaming where it stands."""
+    length_turns: bool = False
+    """Another plane lays the length of a tool along other axes, and so renames where they stand."""
     length_word: str = ""
     """Address that chooses another tool length by itself while one is in force."""
     p_selects: frozenset[int] = frozenset()
@@ -306,6 +263,8 @@ class Dialect:
     P is given and not 0."""
     m_bars: Mapping[int, str] = field(default_factory=dict)
     """M code -> a name in `eligibility.BARS`, which begins unless P is 0."""
+    m_scales: frozenset[int] = frozenset()
+    """M codes that scale F, and with it rapids that run at F, to so many percent as S says."""
     tool_word_moves: bool = False
     """T may call a program of the builder's."""
     dark_rapids: bool = False

@@ -19,7 +19,8 @@ src/GCodes/GCodes2.cpp (HandleGcode, HandleMcode). What is different from Marlin
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, Writing, code_names, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Effect, code_names, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 SILENT = (

@@ -10,12 +10,16 @@ its tool changes, no more; behind every other code nothing is rewritten (`Dialec
 - G70 and G71 are inch and mm, G5, G7 and G50 how corners are passed. G53 ends the zero offset for
   good, G58 and G59 are different among the models (not here), as G10 to G14 (mirrors), G20, G72
   (scaling), G73 (rotation), G74 (home) and G93 are not.
+- R and Q are polar coordinates, ``G0 R50 Q30`` (8055-M p. 48, 8070 p. 68); R of an arc that names
+  axes is its radius.
+- A tool's length lies across the plane in force, so that another plane renames every place.
 - T and D change the tool's offset.
 """
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, Text, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text
 
 CYCLES = frozenset(range(810, 900, 10))
 _EFFECTS: dict[int, Effect] = {
@@ -63,11 +67,13 @@ FAGOR = Dialect(
         }
     ),
     defaults={"compensation": 400},
+    polar="QR",
     effects=_EFFECTS,
     units={700: True, 710: False},
     feed_modes={940: 94, 950: 95},
     paths={50: 64, 70: 61, 500: 64},
     tool_frame=frozenset("TD"),
+    length_turns=True,
     macro_change=True,
     unknown_lasts=True,
     drilling=Drilling(CYCLES, CYCLES, own_group=True, repeats="", missing="unknown"),

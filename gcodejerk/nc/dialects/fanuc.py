@@ -20,15 +20,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialects.dialect import (
-    Arithmetic,
-    Dialect,
-    Drilling,
-    Effect,
-    Text,
-    Writing,
-    grouped,
-)
+from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 CYCLES = frozenset({730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890})
 SYSTEMS = (540, 550, 560, 570, 580, 590)

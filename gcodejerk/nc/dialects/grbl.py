@@ -12,7 +12,8 @@ and macros are named so that nothing is taken for certain behind them. M7 needs 
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import COMPENSATION, Dialect, Text, Writing, code_names, grouped
+from gcodejerk.nc.dialects.dialect import COMPENSATION, Dialect, code_names, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 

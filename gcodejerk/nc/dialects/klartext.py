@@ -15,7 +15,8 @@ are mere definitions is general knowledge: nothing but the modes is known behind
 
 - LBL may be come to from elsewhere, so nothing is known behind it; behind CALL LBL, CALL PGM,
   PLANE, FUNCTION, TRANS, cycles that turn, mirror or scale, and every M function that is not here
-  (M128, M140), nothing is rewritten (`unknown_lasts`).
+  (M128, M140; M89, which calls a cycle behind every move from there on), nothing is rewritten
+  (`unknown_lasts`).
 - A TOOL CALL changes the frame, and may move. M91 and M92 make the words of their block machine
   coordinates.
 - It is read only: streams go to a CSV table.
@@ -23,7 +24,8 @@ are mere definitions is general knowledge: nothing but the modes is known behind
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text
 
 _DEFINITIONS = (
     *(1, 2, 3, 4, 5, 6, 9, 13, 14, 15, 16, 17, 18, 20, 21, 22, 23, 24, 25, 27, 32),

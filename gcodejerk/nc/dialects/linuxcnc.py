@@ -7,16 +7,8 @@ Sources: its manual ("G-code overview" with the modal groups and the order of ex
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import (
-    PLANES,
-    Arithmetic,
-    Dialect,
-    Drilling,
-    Text,
-    Writing,
-    code_names,
-    grouped,
-)
+from gcodejerk.nc.dialects.dialect import PLANES, Arithmetic, Dialect, Drilling, code_names, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 CYCLES = frozenset({730, 740, 760, *range(810, 900, 10)})

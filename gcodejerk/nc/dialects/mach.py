@@ -8,8 +8,9 @@ detail was not verified, so nothing is taken as known behind them.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, grouped
 from gcodejerk.nc.dialects.linuxcnc import FUNCTIONS
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 CYCLES = frozenset({730, *range(810, 900, 10)})

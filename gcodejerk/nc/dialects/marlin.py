@@ -3,18 +3,25 @@
 Sources: the Marlin documentation (gcode pages); MarlinFirmware/Marlin issues 7165 (no code is
 modal: every line states its own) and 24625 (``G0Y0X10`` is read as a hexadecimal number). F is one
 for all moves: G0 runs at it like G1.
+
+What a build has to switch on, and many do not (src/gcode/parser.cpp, src/gcode/gcode.h; config/
+extras.h): comments in parentheses, without which ``G0 X5 (Z9)`` goes to Z9; small letters, without
+which ``G0 x5`` names no axis; G20, without which lengths stay mm. M501 and M502 load settings, the
+home offsets among them; M23, M24 and M26 go on in another file, or elsewhere in this one; M220
+scales F until it is set to 100.
 """
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Effect, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
 SILENT = (
-    *(7, 8, 9, 17, 20, 21, 22, 23, 24, 25, 26, 27, 31, 42, 73, 75, 76, 77, 78),
+    *(7, 8, 9, 17, 20, 21, 22, 27, 31, 42, 73, 75, 76, 77, 78),
     *(82, 83, 85, 92, 104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 114, 115, 117, 118),
     *(119, 140, 141, 145, 149, 150, 155, 190, 191, 201, 203, 204, 205, 220, 221, 226, 250),
-    *(256, 280, 300, 301, 302, 303, 304, 305, 355, 400, 500, 501, 502, 503, 504, 572, 593, 900),
+    *(256, 280, 300, 301, 302, 303, 304, 305, 355, 400, 500, 503, 504, 572, 593, 900),
     *(906, 907, 908, 909, 910, 911, 912, 913, 914),
 )
 """M codes that move nothing and change no frame."""
@@ -34,7 +41,8 @@ MARLIN = Dialect(
     title="Marlin 2",
     sources=("marlinfw.org: gcode pages", "MarlinFirmware/Marlin issues 7165, 24625"),
     text=Text(
-        parentheses="comment",
+        parentheses="lone comment",
+        capitals=True,
         semicolon="comment",
         delete="none",
         o_word="error",
@@ -67,6 +75,8 @@ MARLIN = Dialect(
     dark_rapids=True,
     incremental_set=True,
     feed_on_rapids=True,
+    refused=frozenset({"G20"}),
+    m_scales=frozenset({220}),
     tool_frame=frozenset("T"),
     other_m="positions",
     redrawn=frozenset({50}),

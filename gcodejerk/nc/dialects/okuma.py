@@ -16,7 +16,8 @@ needs to be followed between its tool changes, no more; behind every other code 
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, Text, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, grouped
+from gcodejerk.nc.dialects.spelling import Text
 
 CYCLES = frozenset({730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 890})
 _EFFECTS: dict[int, Effect] = {

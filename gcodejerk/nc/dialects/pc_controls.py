@@ -22,9 +22,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, Text, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, grouped
 from gcodejerk.nc.dialects.grbl import SYSTEMS
 from gcodejerk.nc.dialects.rs274 import RS274
+from gcodejerk.nc.dialects.spelling import Text
 
 CYCLES = frozenset({730, *range(810, 900, 10)})
 EFFECTS: dict[int, Effect] = {

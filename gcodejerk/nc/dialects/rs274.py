@@ -14,10 +14,11 @@ say differently of G0 holds here too (`apart`, of Centroid).
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, Text, Writing, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, grouped
 from gcodejerk.nc.dialects.grbl import GRBL, SYSTEMS
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 from gcodejerk.nc.dialects.mach import MACH
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 MEMBERS = (LINUXCNC, GRBL, MACH)
 

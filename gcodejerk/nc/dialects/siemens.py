@@ -4,33 +4,47 @@ Sources: SINUMERIK ONE NC programming 12/2019, pp. 43, 52, 170, 181; 802D sl / 8
 p. 3-42 (G53, G153 and SUPA suppress frames for one block). Comments begin with ``;`` alone, since
 parentheses hold arguments. What a name does that is not listed here is not known; a user's own
 subprogram is such a name.
+
+What an increment (G91, IC) travels behind a change of the frame, setting data say: SD42440, "G91
+extension" of the programming manual. Where frames have a fine part (MD24000), ATRANS adds to it and
+TRANS leaves it (NC programming p. 315), elsewhere TRANS ends it: behind both, nobody knows. A
+spindle may be a C axis, which SPOS, M3, M19 and M70 turn as well. What the ISO dialect of G291
+leaves behind is not known. CYCLE832 selects one of G64 to G645, and whatever machine data say where
+its tolerance is 0 (general knowledge, not looked up). T may run a cycle of the builder's, which may
+set R parameters. G153 suppresses the basic frames, G53 leaves them in force (840Di sl, Fundamentals
+11/2006, p. 100): where either ends in the program's coordinates, only the control knows.
+
+The length of a tool lies across the plane in force (Function Manual Tool Compensation, LENTOAX, p.
+2-151; NC programming p. 750), unless the setting data SD42940 says otherwise: behind another plane
+the same place has other coordinates.
 """
 
 from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import (
+    ANOTHER_LANGUAGE,
     Arithmetic,
     Dialect,
     Drilling,
     Effect,
     NamedCycle,
-    Text,
-    Writing,
     grouped,
 )
+from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 
 _SILENT = (
     *("MSG", "LIMS", "SETMS", "STOPRE", "SOFT", "BRISK", "DRIVE", "FFWON", "FFWOF"),
     *("COMPON", "COMPOF", "COMPCAD", "COMPCURV", "CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
-    *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "SPOS", "SPOSA", "RTLION", "ADIS", "ADISPOS"),
+    *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
     *("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM", "SF", "SCC"),  # corners: the end stays
-    *("DYNFINISH", "CYCLE832", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
+    *("DYNFINISH", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
     *("FNORM", "FIFOCTRL", "WAITM", "WAITMC", "SETM", "CLEARM"),  # F as it is; waiting for channels
 )
-_FRAMES = ("RPL", "ROT", "AROT", "ROTS", "AROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR")
+_FRAMES = ("RPL", "ROT", "ROTS", "SCALE", "MIRROR")
+_FURTHER = ("AROT", "AROTS", "ASCALE", "AMIRROR")
 _WATCHES = ("ID", "IDS", "WHEN", "WHENEVER", "EVERY", "FROM", "DO")
 """Synchronized actions: ``ID=1 WHEN $AA_IW[X]>50 DO POS[Y]=10``."""
 _TURNED = (
@@ -41,8 +55,8 @@ _TURNED = (
         "TRAANG",
         "TRAORI",
         "TRACON",
-        "TOFRAME",
-        "TOROT",
+        *("TOFRAME", "TOFRAMEX", "TOFRAMEY", "TOFRAMEZ"),
+        *("TOROT", "TOROTX", "TOROTY", "TOROTZ"),
         "PAROT",
         "RTLIOF",
     ),
@@ -80,6 +94,9 @@ NAMES: dict[str, Effect] = {
     "TRANS": "shift",
     "ATRANS": "further shift",
     **dict.fromkeys(_FRAMES, "turned frame"),
+    **dict.fromkeys(_FURTHER, "further turn"),
+    **dict.fromkeys(("SPOS", "SPOSA"), "turn"),
+    "CYCLE832": "smoothing",
     **dict.fromkeys(_WATCHES, "watch"),
     "TRAFOOF": "frames",
     **dict.fromkeys(_TURNED, "transform"),
@@ -170,8 +187,12 @@ SIEMENS = Dialect(
     # G70 and G71 leave F in the unit of the control, G700 and G710 do not (NC programming p. 170).
     lengths_only=frozenset({700, 710}),
     path_has_to_be_stated=True,
-    bars={2910: ("another language", True), 2900: ("another language", False)},
+    bars={2910: (ANOTHER_LANGUAGE, True), 2900: (ANOTHER_LANGUAGE, False)},
     tool_frame=frozenset("TD"),
+    length_turns=True,
+    shifts_travel=True,
+    spindle_turns=True,
+    base_frames=True,
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),
     drilling=Drilling(named=_NAMED),

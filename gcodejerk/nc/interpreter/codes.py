@@ -95,7 +95,7 @@ def sort_words(
     codes = sorter.codes
     for word in block.words:
         value = sorter.computed(word) if word.value is None else word.value
-        if word.letter in dialect.calls:
+        if word.letter in sorter.calls:
             codes.calls.append(Name(word.text.decode("latin-1").upper(), b""))
         elif value is None:
             codes.reject(word.text)
@@ -135,6 +135,8 @@ class _Sorter:
         """Letters whose number has no decimal point, where it may need one."""
         self._block, self._dialect = block, dialect
         self._inch, self._variables = inch, variables
+        self.calls = "" if dialect.calls and _is_label(block, dialect) else dialect.calls
+        """Letters that call a subprogram."""
 
     def computed(self, word: Word) -> float | None:
         """The number of a word that is an expression; None where it is that of a code."""
@@ -158,6 +160,8 @@ class _Sorter:
             self.codes.reject(word.text)
         elif group not in g or g[group] == G80:
             g[group] = code
+            late = group == "distance" and self._dialect.distance_first and self.codes.moved()
+            self.codes.fault = self.codes.fault or bool(late)
         elif code != G80:
             self.codes.fault = True
             g[group] = code
@@ -207,6 +211,12 @@ def _in_turn(block: Block, dialect: Dialect) -> bool:
         and round(word.value * 10.0) in dialect.in_turn
         for word in words[:last]
     )
+
+
+def _is_label(block: Block, dialect: Dialect) -> bool:
+    """Whether the block is a place that calls lead to: ``G98 L1``."""
+    codes = [round(w.value * 10.0) for w in block.words if w.letter == "G" and w.value is not None]
+    return any(dialect.effect(code) == "label" for code in codes)
 
 
 def _states_units(block: Block, dialect: Dialect) -> bool:

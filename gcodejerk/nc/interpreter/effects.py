@@ -18,7 +18,7 @@ from gcodejerk.nc.interpreter.flow_words import known_behind
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.named_cycles import certain_call, come_back
 from gcodejerk.nc.interpreter.rapids import USES_FEED
-from gcodejerk.nc.interpreter.variables import converted, named_assignment
+from gcodejerk.nc.interpreter.variables import converted, fills, named_assignment
 from gcodejerk.nc.text.block import Name
 from gcodejerk.nc.text.tokenizer import CHECKSUM
 from gcodejerk.start import Start
@@ -32,6 +32,10 @@ _DECLARED = re.compile(
     re.IGNORECASE,
 )
 """A variable, the size of an array, and what it begins with."""
+
+
+CONTINUOUS = 64
+"""Path mode in which blocks blend."""
 
 
 class Effects:
@@ -110,6 +114,8 @@ class Effects:
             state.put("feed", NAN)
         elif effect == "home":
             state.forget_positions()
+        elif effect == "turn":
+            frames.turn_spindle(state)
         elif effect == "label":
             units = [(name, getattr(state, name)) for name in ("unit", "feed_unit")]
             state.forget()
@@ -125,7 +131,10 @@ class Effects:
         # That a default is in force, nobody has said; its offset, the machine file may have.
         stated = state.system == code and bool(state.system_stated)
         step.system_certain = bool(code) and (stated or code in state.offsets)
+        before = state.g5x
         frames.select_system(state, code)
+        if self.dialect.shifts_travel:
+            frames.note_shift(state, before, state.g5x)
         state.put("system_stated", True)
 
     def _declare(self, names: list[Name]) -> None:
@@ -157,6 +166,9 @@ class Effects:
         rules, state = self.dialect.arithmetic, self.state
         found = [(n.name, parts) for n in names if (parts := named_assignment(n)) is not None]
         found = [(name, parts) for name, parts in found if name in self.declared]
+        if any(fills(text) for _, (_, text) in found):
+            state.forget_variables()
+            return
         values = [evaluate(text, state.variables, rules) for _, (_, text) in found]
         for k, (name, (variable, _)) in enumerate(found):
             if variable.endswith("["):
@@ -170,6 +182,14 @@ class Effects:
                 value = NAN if twice else converted(values[k], self.declared[name])
             state.set_variable(variable, value)
 
+    def _smooth(self, names: list[Name]) -> None:
+        """CYCLE832(0.05,..) selects a continuous path; CYCLE832() whatever machine data say."""
+        for name in names:
+            if self._named(name) == "smoothing":
+                tolerance = name.arguments.strip(b"( \t)").partition(b",")[0].strip(b" \t")
+                if self.state.path != CONTINUOUS or not tolerance.strip(b"0."):
+                    self.state.lose("path")
+
     def _swivel(self, names: list[Name], step: Step) -> None:
         """CYCLE800(..) turns the plane, CYCLE800() turns it back; where the axes go, it says."""
         for name in names:
@@ -181,19 +201,24 @@ class Effects:
 
     # Complex: what TRANS, ATRANS and ROT have in common is nearly all.
     def _program_frame(self, effect: Effect, codes: Codes) -> None:
-        """TRANS shifts the frame, ATRANS by more, ROT turns it; each of them alone ends it all."""
+        """TRANS shifts the frame, ATRANS by more, ROT turns it; TRANS or ROT alone ends it all."""
         state, values = self.state, codes.values
+        further = effect in ("further shift", "further turn")
         bare = len(codes.names) == 1 and not codes.moved() and not values
         known = len(codes.names) == 1 and set(values) <= LINEAR and not codes.functions
         known = known and not codes.g and not codes.m and not codes.unknown
+        known = known and not (bare and further)
+        bare = bare and not further
         ends = bare or effect == "shift"
-        if not ends and effect == "turned frame":
+        if not ends and effect in ("turned frame", "further turn"):
             self._transform("programmed frame", on=True)
             return
         if ends:
             self._transform("programmed frame", on=False)
         if not ends and state.transforms.get("programmed frame", False) is not False:
             known = False
+        if not bare and not further and state.added is not False:
+            known = False  # what ATRANS has added may stay
         shift = [0.0] * len(AXES) if ends else list(state.g92)
         for axis, letter in enumerate(AXES):
             if letter in values and not bare:
@@ -201,6 +226,8 @@ class Effects:
         if state.diameter is not False and "X" in values:
             known = False  # a diameter, or no diameter?
         frames.shift_program(state, shift if known or bare else [NAN] * len(AXES))
+        if bare or further:
+            state.put("added", further)
 
     def _transform(self, name: str, on: bool) -> None:
         """Begin or end a rotation, scaling, mirroring or polar frame."""

@@ -10,7 +10,13 @@ import math
 from dataclasses import dataclass, field
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import COMPENSATION, LINEAR, Dialect, Effect
+from gcodejerk.nc.dialects.dialect import (
+    COMPENSATION,
+    LINEAR,
+    MACHINE_WORDS,
+    Dialect,
+    Effect,
+)
 from gcodejerk.nc.dialects.gcodes import G1, G40
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
@@ -32,7 +38,7 @@ _FRAME_CHANGES: frozenset[Effect] = frozenset(
             "restore",
             "local",
         ),
-        *("table", "frames", "home", "shift", "further shift", "turned frame"),
+        *("table", "frames", "home", "shift", "further shift", "turned frame", "further turn"),
     }
 )
 """Effects that, in the block of a rapid, move the origin that its numbers refer to."""
@@ -152,6 +158,8 @@ def why_left_alone(
     g = codes.g
     effects = {dialect.effect(code) for code in g.values()}
     effects |= {dialect.names.get(name.name, "none") for name in codes.names}
+    if any(dialect.m_groups.get(m) == MACHINE_WORDS for m in codes.m):
+        effects.add("machine")
     if ended:
         return Reason.AFTER_END
     if block.block_delete:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import Dialect, Effect
+from gcodejerk.nc.dialects.dialect import LINEAR, Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G90
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -31,7 +31,16 @@ def _rename(state: State, field: str, after: list[float]) -> None:
 
 def shift_program(state: State, shift: list[float]) -> None:
     """Shift the frame by so much from the work system, TRANS and its kin. [mm]."""
+    before = state.g92
     _rename(state, "g92", shift)
+    note_shift(state, before, shift)
+
+
+def note_shift(state: State, before: list[float], after: list[float]) -> None:
+    """Note which axes have not been told an absolute place since the frame was shifted."""
+    shifted = [k for k, (old, new) in enumerate(zip(before, after, strict=True)) if old != new]
+    if shifted:
+        state.put("shifted", {**state.shifted, **{AXES[k]: True for k in shifted}})
 
 
 def tool_length(
@@ -82,6 +91,18 @@ def _shift_tool(state: State, code: int, values: Values, lengths: Mapping[int, f
         _rename(state, "tool", after)
     else:
         _rename(state, "tool", unknown)
+
+
+def turn_length(state: State) -> None:
+    """The tool's length comes to lie along other axes."""
+    if any(length != 0.0 for length in state.tool):
+        state.lose("tool")
+        state.forget_positions()
+
+
+def turn_spindle(state: State) -> None:
+    """A spindle turns, which may be a rotary axis as well."""
+    state.forget_positions(k for k, axis in enumerate(AXES) if axis not in LINEAR)
 
 
 def numbered_system(number: float) -> int:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G91
 from gcodejerk.nc.interpreter.eligibility import Step
+from gcodejerk.nc.interpreter.frames import turn_spindle
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.moves import change_tool, lose_tool_length
 from gcodejerk.nc.interpreter.rapids import USES_FEED
@@ -51,6 +52,8 @@ def run_m_code(
     group = dialect.m_groups.get(m)
     if m in (3, 4, 5) and group == "spindle":
         state.put("spindle", m)
+    if group == "spindle" and dialect.spindle_turns:
+        turn_spindle(state)
     if group is None or m == 6 or group == "user":
         # A tool change may go anywhere, and so may a program of the user's.
         forget_shared(state, dialect.arithmetic)

@@ -99,7 +99,8 @@ FIELDS = (
     Field("cycle_level", "number", NAN),
     Field("modal_cycle", "mode"),
     *(Field(name, "axes") for name in ("position", "g5x", "g92", "tool", "home")),
-    *(Field(name, "named") for name in ("transforms", "bars")),
+    *(Field(name, "named") for name in ("transforms", "bars", "shifted")),
+    Field("added", "mode", False),
     *(Field(name, "table") for name in ("offsets", "variables")),
     *(
         Field(name, "once", False)
@@ -114,7 +115,7 @@ FIELDS = (
 )
 """What a state holds."""
 BY_NAME = {field.name: field for field in FIELDS}
-_NO_GROUP = ("feed_whole", "cycle", "modal_cycle", "system_stated")
+_NO_GROUP = ("feed_whole", "cycle", "modal_cycle", "system_stated", "added")
 MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in _NO_GROUP)
 """Fields that hold one modal group each."""
 _FRAME = ("g5x", "g92", "tool")
@@ -186,6 +187,11 @@ class State:
     """Rotation, scaling, mirroring..."""
     bars: dict[str, bool | None]
     """What besides makes rapids ineligible while it is in force, by `eligibility.BARS`."""
+    shifted: dict[str, bool | None]
+    """Axes of which no absolute word has told the place since their frame was shifted, where that
+    matters (`Dialect.shifts_travel`)."""
+    added: bool | None
+    """A shift was added to that of the program (ATRANS) since it began anew."""
     offsets: dict[int, list[float]]
     variables: dict[str, float]
     """Variables whose value is certain, by `expressions.variable_name`."""

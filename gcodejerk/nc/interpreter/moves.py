@@ -28,13 +28,21 @@ def go_straight(state: State, codes: Codes, step: Step) -> None:
             value = values[letter] * state.scale(axis)
             function = codes.functions.get(letter)
             if function == "IC" or (function is None and state.distance == G91):
-                value = state.position[axis] + value
+                value = _before_increment(state, axis) + value
             elif function in (None, "AC") and (function or state.distance is not None):
                 if letter not in LINEAR:
                     value = _turn(state, axis, value, step)
+                if letter in state.shifted:
+                    state.put("shifted", {**state.shifted, letter: False})
             else:
                 value = NAN  # the shortest way, or this way round: the machine decides
             state.move(axis, value)
+
+
+def _before_increment(state: State, axis: int) -> float:
+    """Where an increment counts from: it may travel a shift of the frame, too, or not."""
+    shifted = state.shifted.get(AXES[axis], False)
+    return state.position[axis] if shifted is False else NAN
 
 
 def _turn(state: State, axis: int, angle: float, step: Step) -> float:

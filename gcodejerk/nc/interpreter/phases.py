@@ -8,7 +8,14 @@ stands where it does.
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import PLANES, Dialect, Effect
+from gcodejerk.nc.dialects.dialect import (
+    ANOTHER_LANGUAGE,
+    CYCLE_CALL,
+    MACHINE_WORDS,
+    PLANES,
+    Dialect,
+    Effect,
+)
 from gcodejerk.nc.dialects.gcodes import G1, G40, G64
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
@@ -27,6 +34,7 @@ from gcodejerk.nc.interpreter.moves import (
 from gcodejerk.nc.interpreter.named_cycles import drill_behind
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, NO_FEED, USES_FEED
 from gcodejerk.nc.interpreter.rules import arc_words, takes_axes
+from gcodejerk.nc.interpreter.variables import forget_shared
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
@@ -36,7 +44,7 @@ _TAKES_WORDS: frozenset[Effect] = frozenset(
 )
 """Effects of a code beside which the axis words of the block are no straight move."""
 _NAME_TAKES_WORDS: frozenset[Effect] = (_TAKES_WORDS - {"flow"}) | {
-    *("frames", "transform", "shift", "further shift", "turned frame", "watch")
+    *("frames", "transform", "shift", "further shift", "turned frame", "further turn", "watch")
 }
 """The same of a name; one of flow that goes on to the next block leaves the words to the motion."""
 _TAKES_AXES: frozenset[Effect] = frozenset({"table", "local", "set", "frames", "data"})
@@ -109,6 +117,9 @@ class Phases(Effects):
             if m in dialect.m_bars:
                 on = _switched(codes.values.get("P", 1.0))
                 state.put("bars", {**state.bars, dialect.m_bars[m]: on})
+            if m in dialect.m_scales:
+                scaled = codes.values["S"] != 100.0 if "S" in codes.values else None
+                state.put("bars", {**state.bars, "feed override": scaled})
 
     def _tool_words(self, codes: Codes) -> None:
         """T, D and the like where they move the tool or its frame; G43 comes with the codes."""
@@ -117,6 +128,8 @@ class Phases(Effects):
             state.forget_positions()
         if dialect.length_word in values and "tool length" not in codes.g:
             frames.tool_length(state, 0, values, {}, dialect)
+        if dialect.tool_frame & {"T"} & set(values) and dialect.text.variables == "R":
+            forget_shared(state, dialect.arithmetic)
         if not dialect.tool_frame.isdisjoint(values):
             state.lose("tool")
             state.forget_positions()
@@ -128,6 +141,8 @@ class Phases(Effects):
         if state.cycle is not None and g.get("distance", state.distance) != state.distance:
             # R and Z that stay in force across G90/G91 are read anew in a way not documented
             self._lose_depths()
+        if dialect.length_turns and g.get("plane", state.plane) != state.plane:
+            frames.turn_length(state)
         for group, code in g.items():
             if (name := GROUP_FIELDS.get(group)) is not None and group != "motion":
                 state.put(name, code)
@@ -136,6 +151,8 @@ class Phases(Effects):
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
                 on = _switched(codes.values.get("P", 0.0)) if begins == "P" else begins
+                if name == ANOTHER_LANGUAGE:
+                    state.forget(Reason.NOT_UNDERSTOOD)  # what its codes do and leave
                 state.put("bars", {**state.bars, name: on})
         if "distance" in g:
             state.put("distance_stated", True)
@@ -173,6 +190,7 @@ class Phases(Effects):
         self._declare(codes.names)
         self._assign_names(codes.names)
         self._swivel(codes.names, step)
+        self._smooth(codes.names)
         effects = [self._named(name) for name in codes.names]
         if "modal cycle" in effects:
             # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
@@ -185,7 +203,7 @@ class Phases(Effects):
                 continue
             if effect == "feed override":
                 self.state.put("bars", {**self.state.bars, effect: True})
-            if effect in ("shift", "further shift", "turned frame"):
+            if effect in ("shift", "further shift", "turned frame", "further turn"):
                 self._program_frame(effect, codes)
             if effect == "feed group":
                 self._feed_group(codes.names)
@@ -221,8 +239,11 @@ class Phases(Effects):
         step.outputs = uses_outputs(codes)
 
     def _stop(self, codes: Codes, step: Step) -> None:
-        """M0, M1, M2, M30 and their kin: behind the motion of their block."""
+        """M0, M2, M30 and their kin, and M99 of Heidenhain: behind the motion of their block."""
         for m in codes.m:
+            if self.dialect.m_groups.get(m) == CYCLE_CALL:
+                step.cycle = True
+                self._effect("cycle", 0, codes.values, step)
             if self.dialect.m_groups.get(m) != "stop":
                 continue
             if m in _ENDS:
@@ -322,6 +343,8 @@ class Phases(Effects):
         step.rapid = motion == dialect.rapid
         if dialect.effect(codes.g.get("non-modal")) == "machine":
             go_to_machine_position(state, codes.values)
+            if dialect.base_frames:
+                state.forget_positions(AXES.index(axis) for axis in codes.moved())
         elif motion in dialect.redrawn or motion is None:
             state.forget_positions(plane_axes(state))
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
@@ -329,7 +352,9 @@ class Phases(Effects):
             go_straight(state, codes, step)
             step.fed = motion == G1 and self._counts_as_rapid(step)
             step.rapid = step.rapid or step.fed
-        if any(self._named(name) == "machine" for name in codes.names):
+        if any(self._named(name) == "machine" for name in codes.names) or any(
+            dialect.m_groups.get(m) == MACHINE_WORDS for m in codes.m
+        ):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))

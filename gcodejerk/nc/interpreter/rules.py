@@ -42,7 +42,7 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     mode = dialect.feed_modes.get(g["feed mode"]) if "feed mode" in g else state.feed_mode
     if mode == 93 and motion not in (None, 0, G80) and axes and "F" not in values:
         return False
-    return _words_used(codes, motion, state, dialect)
+    return _cartesian(codes, motion, dialect) and _words_used(codes, motion, state, dialect)
 
 
 def _lenient_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
@@ -77,6 +77,14 @@ def _takes_machine_position(codes: Codes, motion: int | None, state: State) -> b
     """Whether G53 may stand beside this motion, in these modes."""
     absolute = codes.g.get("distance", state.distance) != G91
     return motion in (0, 10) and state.compensation in _OFF and absolute
+
+
+def _cartesian(codes: Codes, motion: int | None, dialect: Dialect) -> bool:
+    """Whether axis words alone say where the block leads; a cycle has its words for itself."""
+    if "cycle" in codes.g:
+        return True
+    radius = dialect.polar[-1:] if motion in dialect.arcs and codes.moved() else ""
+    return not any(letter in codes.values and letter != radius for letter in dialect.polar)
 
 
 def _words_used(codes: Codes, motion: int | None, state: State, dialect: Dialect) -> bool:

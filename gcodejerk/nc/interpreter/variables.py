@@ -22,6 +22,7 @@ _INCREMENT_DECIMALS = (3, 4)
 _POSITIONS = frozenset("XYZABCUVWIJKR")
 _R_NAME = re.compile(r"R[0-9]+")
 _SET = re.compile(rb"[ \t]*(?:\[([^\]]*)\])?[ \t]*=(?!=)(.*)", re.DOTALL)
+_FILLS = re.compile(rb"[ \t]*(?:SET|REP)[ \t]*\(", re.IGNORECASE)
 _READ = re.compile(rb"#([0-9]+|<[^<>]*>|[#\[])")
 _PREDEFINED = """
 VMAJOR VMINOR LINE MOTION_MODE PLANE CCOMP METRIC IMPERIAL ABSOLUTE INCREMENTAL INVERSE_TIME
@@ -124,10 +125,20 @@ def converted(value: float, kind: str) -> float:
     return NAN if half and not (value > 0.0 and value + 0.5 == whole) else float(whole)
 
 
+def fills(text: bytes) -> bool:
+    """Whether what a variable is set to goes on into those behind it: ``SET(1,2)``, ``REP(0)``.
+
+    Siemens, Job planning (828D, 07/2010) p. 46: from the element that is named to the end of the
+    list, or of the array.
+    """
+    return _FILLS.match(text) is not None
+
+
 def assign(block: Block, values: Iterable[float], state: State, rules: Arithmetic) -> None:
     """Set the variables of a block."""
+    filled = rules.brackets == "()" and any(fills(text) for text in block.assigned)
     for target, value in zip(block.assigns, values, strict=True):
-        if not target:
+        if not target or filled:
             state.forget_variables()
             continue
         name = _name(target)

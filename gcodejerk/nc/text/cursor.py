@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from gcodejerk.nc.dialects.dialect import Text
+from gcodejerk.nc.dialects.spelling import Text
 
 LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
@@ -198,3 +198,8 @@ class Cursor:
                 self.at = match.end()
                 self.number()
         self.assigned[-1] = self.text[begin : self.at]
+
+
+def shown(byte: bytes) -> str:
+    """A byte in a message: itself, or its number where it would not be seen."""
+    return f"'{byte.decode()}'" if 0x20 < byte[0] < 0x7F else f"byte 0x{byte[0]:02x}"

@@ -40,8 +40,8 @@ _ASSIGNED = re.compile(rb"Q[LRS]?[0-9]+[ \t]*=", re.IGNORECASE)
 _UNITS = re.compile(rb".*[ \t](MM|INCH)[ \t]*", re.IGNORECASE)
 _TOOL = re.compile(rb"[ \t]+(?:([0-9]+)(?:\.[0-9]+)?(?![0-9])|\"[^\"]*\"|Q)", re.IGNORECASE)
 _SIDES = {b"0": 40.0, b"L": 41.0, b"R": 42.0}
-_CALLS = (89, 99)
-"""M functions that call the cycle defined last, behind the motion of their block or of all."""
+_CALL = 99
+"""M function that calls the cycle defined last, behind the motion of its block."""
 _MACHINE = (91, 92)
 
 
@@ -162,7 +162,7 @@ class _Line:
     def _function(self, match: re.Match[bytes]) -> None:
         """Take an M function."""
         number = int(match[1])
-        if number in _CALLS:
+        if number == _CALL:
             self.names.append(Name("CYCL CALL", b""))
         elif number in _MACHINE:
             self.names.append(Name("M91", b""))

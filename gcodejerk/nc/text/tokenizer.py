@@ -11,12 +11,20 @@ differs between dialects (comments, block delete, blanks within numbers, names, 
 from __future__ import annotations
 
 import re
-from functools import lru_cache
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.text.block import Block, Name, Word
-from gcodejerk.nc.text.cursor import BLANKS, CLOSED_NUMBER, LARGEST, SHAPE, Cursor, SyntaxProblem
+from gcodejerk.nc.text.cursor import (
+    BLANKS,
+    CLOSED_NUMBER,
+    LARGEST,
+    SHAPE,
+    Cursor,
+    SyntaxProblem,
+    shown,
+)
 from gcodejerk.nc.text.klartext import parse_klartext
+from gcodejerk.nc.text.spelled import check_comments, check_word, keyword_pattern
 
 CHECKSUM = "*"
 """Name of a checksum among the names of a block."""
@@ -74,7 +82,7 @@ class _Line(Cursor):
         begin, text = self.at, self.text
         if text[begin] == 0x28:  # (
             end = text.find(b")", begin)
-            strict = self.rules.parentheses == "comment"
+            strict = self.rules.parentheses in ("comment", "lone comment")
             if end < 0 and strict:
                 raise SyntaxProblem("comment is not closed", begin)
             if strict and text.find(b"(", begin + 1, end) >= 0:
@@ -148,6 +156,8 @@ class _Line(Cursor):
         if letter == "N" and (value is None or not self.text[begin + 1 :].lstrip()[:1].isdigit()):
             raise SyntaxProblem("N without a plain number", begin)
         text = self.text[begin : self.at]
+        if self.rules.capitals or not self.rules.padded:
+            check_word(self.rules, text, begin)
         whole = value is not None and b"." not in text
         self.words.append(Word(letter, value, begin, self.at, text, whole, function))
 
@@ -266,7 +276,7 @@ class _Line(Cursor):
 
     def keyword(self) -> bool:
         """Take a keyword of program flow and all that follows it, if one stands here."""
-        pattern = _keywords(self.rules.keywords)
+        pattern = keyword_pattern(self.rules.keywords)
         match = pattern.match(self.text, self.at) if pattern else None
         if not match:
             return False
@@ -323,7 +333,7 @@ class _Line(Cursor):
         elif byte == b"%":
             self.percent_mark()
         elif not self._rare(byte):
-            raise SyntaxProblem(f"{_shown(byte)} has no meaning here", self.at)
+            raise SyntaxProblem(f"{shown(byte)} has no meaning here", self.at)
 
     def _letter(self, byte: bytes) -> None:
         """Take an O-word, a keyword, a word with a name, or a word."""
@@ -376,20 +386,6 @@ class _Line(Cursor):
         return True
 
 
-@lru_cache(maxsize=16)
-def _keywords(words: tuple[str, ...]) -> re.Pattern[bytes] | None:
-    """Any of these words, not followed by another letter."""
-    if not words:
-        return None
-    every = b"|".join(word.encode() for word in sorted(words, key=len, reverse=True))
-    return re.compile(rb"(" + every + rb")(?![A-Za-z_])", re.IGNORECASE)
-
-
-def _shown(byte: bytes) -> str:
-    """A byte in a message: itself, or its number where it would not be seen."""
-    return f"'{byte.decode()}'" if 0x20 < byte[0] < 0x7F else f"byte 0x{byte[0]:02x}"
-
-
 def parse_line(text: bytes, dialect: Dialect) -> Block:
     """Read one line without its line end.
 
@@ -431,6 +427,9 @@ def _parse_carefully(text: bytes, dialect: Dialect) -> Block:
         while line.skip():
             mark = line.at
             line.rest()
+        mark = len(text)  # nothing is left that was not read as a word
+        if line.words or line.names:
+            check_comments(dialect.text, text, line.comments)
     except SyntaxProblem as found:
         problem, column, rest = found.problem, found.at + 1, text[mark:]
     return Block(

@@ -6,7 +6,13 @@ Rule: as in `tracking`, what is not followed makes unknown all that it might hav
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import LINEAR, Effect
+from gcodejerk.nc.dialects.dialect import (
+    ANOTHER_LANGUAGE,
+    CYCLE_CALL,
+    LINEAR,
+    MACHINE_WORDS,
+    Effect,
+)
 from gcodejerk.nc.dialects.gcodes import G28, G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.known import Known, Observation
@@ -36,13 +42,16 @@ class Codes(Known):
         if self.dialect.diameter_codes:
             self.diameter = None
 
+    # Complex: what TRANS, ATRANS, ROT and AROT have in common is nearly all.
     def program_shift(self, line: Line) -> Observation:
         """TRANS X5, ATRANS X5, ROT Z30; alone, each of them ends all that went before."""
         words = [(letter, number) for letter, number, _ in line.words if letter != "N"]
-        shift = len(line.effects) == 1 and line.effects[0] != "turned frame"
+        first = line.effects[0]
+        further = first in ("further shift", "further turn")
+        shift = len(line.effects) == 1 and first in ("shift", "further shift")
         turned = self.frames.get("a programmed frame", False) is not False
-        if not words and len(line.effects) == 1:
-            self.frames["a programmed frame"] = False
+        if not words and len(line.effects) == 1 and not further:
+            self.frames["a programmed frame"] = self.added = False
             self.g92 = self.rename(self.g92, [0.0] * len(AXES))
             if turned:
                 self.lose()
@@ -50,10 +59,12 @@ class Codes(Known):
         letters = [letter for letter, _ in words]
         plain = shift and set(letters) <= LINEAR and len(set(letters)) == len(letters)
         plain = plain and not line.relative and not ("X" in letters and self.diameter is not False)
-        replaces = line.effects[0] == "shift"
+        plain = plain and bool(words) and (further or self.added is False)
+        self.added = True if first == "further shift" else self.added
+        replaces = first == "shift"
         if not plain or (turned and not replaces):
-            self.frames["a programmed frame"] = True if not shift else None
-            self.g92 = [NAN] * len(AXES)
+            self.frames["a programmed frame"] = None if further else not shift
+            self.g92 = self.rename(self.g92, [NAN] * len(AXES))
             self.lose()
             return Observation()
         if turned:
@@ -72,10 +83,8 @@ class Codes(Known):
 
     def statement(self, line: Line) -> Observation:
         """A statement of Klartext that is no straight line: what it moves and forgets."""
-        unit, feed_unit = self.unit, self.feed_unit
         if "label" in line.effects:
-            self.forget()
-            self.unit, self.feed_unit = unit, feed_unit
+            self.come_to_label()
             return Observation()
         self.lose()
         self.g["motion"] = None
@@ -94,6 +103,27 @@ class Codes(Known):
         if "cycle" in line.effects:
             self.feed = NAN
         return Observation()
+
+    def come_to_label(self) -> None:
+        """Anything may hold that another way here leaves, but for the unit of the program."""
+        unit, feed_unit = self.unit, self.feed_unit
+        self.forget()
+        self.unit, self.feed_unit = unit, feed_unit
+
+    def end_elsewhere(self, line: Line, block: Sorted) -> Observation | None:
+        """A block that did not end where its words say, if that is so."""
+        groups = {self.dialect.m_groups.get(m) for m in block.m}
+        if CYCLE_CALL in groups:
+            self.lose()
+            self.g["motion"], self.feed = None, NAN
+            return Observation(against="a cycle runs in it")
+        codes = {self.dialect.effect(code) for code in block.g.values()}
+        suppressed = self.dialect.base_frames and "machine" in codes
+        if "machine" in line.effects or MACHINE_WORDS in groups or suppressed:
+            # SUPA, M91, G153: its words are no program coordinates
+            self.lose("".join(axis for k, axis in enumerate(AXES) if block.axes >> k & 1))
+            return Observation(against="a coordinate frame changes in it")
+        return None
 
     def turning(self, effect: Effect) -> None:
         """Take X as a diameter, or not."""
@@ -131,6 +161,9 @@ class Codes(Known):
         for m in block.m:
             if m in self.dialect.m_bars:
                 self.bars[self.dialect.m_bars[m]] = _switched(block.values.get("P", 1.0))
+            if m in self.dialect.m_scales:
+                percent = block.values.get("S", NAN)
+                self.bars["F is scaled"] = None if percent != percent else percent != 100.0
         return ends
 
     # Complex: one case for each group of M codes.
@@ -141,6 +174,8 @@ class Codes(Known):
             group = self.dialect.m_groups.get(m)
             if group == "spindle" and m in (3, 4, 5):
                 self.spindle = m
+            if group == "spindle" and self.dialect.spindle_turns:
+                self.lose("".join(axis for axis in AXES if axis not in LINEAR))
             if group == "stop" and m in _ENDS:
                 ends = True
             elif m in _CALLS and group is not None:
@@ -169,6 +204,8 @@ class Codes(Known):
     def modes(self, g: dict[str, int], values: dict[str, float]) -> None:
         """Execute modal codes."""
         dialect = self.dialect
+        if dialect.length_turns and "plane" in g and g["plane"] != self.g.get("plane"):
+            self.turn_tool()
         if "distance" in g and self.g.get("distance") != g["distance"]:
             self.level = self.r = NAN
         for group, code in g.items():
@@ -182,6 +219,8 @@ class Codes(Known):
                     self.frames[name] = on
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
+                if name == ANOTHER_LANGUAGE:
+                    self.forget()
                 by_p = _switched(values.get("P", 0.0))
                 self.bars[name] = by_p if begins == "P" else bool(begins)
         if "units" in g:
@@ -226,6 +265,8 @@ class Codes(Known):
             self.lose()
         elif effect == "data":
             self._data(values)
+        elif effect == "label":
+            self.come_to_label()
         elif effect == "flow":
             self.unknown_call()
 

@@ -44,6 +44,7 @@ _DEF = re.compile(rb"(?:N[0-9]+[ \t]*)?DEF[ \t]+(REAL|INT|BOOL)[ \t]+(.*)")
 _ITEM = re.compile(rb"[ \t]*([A-Z_][A-Z_][A-Z0-9_]*)[ \t]*(\[[^\]]*\])?[ \t]*(=[ \t]*)?")
 _RADIUS = re.compile(rb"(?<![A-Z0-9_])CR[ \t]*=[ \t]*[-+]?[0-9.]+")
 _TURN = re.compile(rb"(?<![A-Z0-9_])RPL[ \t]*=[ \t]*[-+]?[0-9.]+")
+_LISTS = re.compile(rb"=[ \t]*(?:SET|REP)[ \t]*\(")
 _COMPUTED = re.compile(
     rb"(?<![A-Z0-9_$])(?:R|[A-Z_][A-Z_][A-Z0-9_]*)[ \t]*\[[^\]]*[^0-9 \t\]][^\]]*\][ \t]*=(?!=)"
 )
@@ -322,7 +323,7 @@ class Computer:
                 known.pop(key, None)
         if not self.named and re.search(rb"#[ \t]*[#\[].*=", text):
             return None
-        if self.named and _COMPUTED.search(text):
+        if self.named and (_COMPUTED.search(text) or _LISTS.search(text)):
             return None
         return found
 

@@ -161,7 +161,7 @@ def _other(found: Statement, name: str, said: str, dialect: Dialect) -> None:
 
 def _function(found: Statement, number: int) -> None:
     """An M function; some are statements of their own."""
-    if number in (89, 99):
+    if number == 99:
         found.effects.append("cycle")
     elif number in (91, 92):
         found.effects.append("machine")

@@ -21,14 +21,14 @@ from gcodejerk.verification.second_reading.reading import NAN
 
 KINDS = {
     "g": "modes",
-    **dict.fromkeys(("frames", "bars"), "frames"),
+    **dict.fromkeys(("frames", "bars", "untold"), "frames"),
     **dict.fromkeys(("at", "system", "g92", "tool"), "axes"),
     **dict.fromkeys(("systems", "lengths", "home", "variables"), "table"),
     **dict.fromkeys(("feed", "level", "r"), "number"),
     **dict.fromkeys(("p", "q"), "tolerance"),
     **dict.fromkeys(("doubt", "turns", "habits", "strayed"), "ever"),
     **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter"), "mode"),
-    **dict.fromkeys(("selected", "told"), "mode"),
+    **dict.fromkeys(("selected", "told", "added"), "mode"),
     **dict.fromkeys(("cycle", "modal", "feed_whole", "spindle"), "mode"),
     **dict.fromkeys(("dialect", "facts", "fixed", "dark", "burns"), "given"),
     # where in the file the reading is; a line that may be skipped changes none of these for good
@@ -129,6 +129,10 @@ class Known:
         """Rotations and their kin: whether in force."""
         self.bars: dict[str, bool | None] = {}
         """What else forbids to rewrite rapids."""
+        self.untold: dict[str, bool | None] = {}
+        """Axes whose frame was shifted since an absolute word, where that matters."""
+        self.added: bool | None = False
+        """ATRANS has added to the program's shift."""
         self.ended = False
         self.opened = False
         """A ``%`` began the program."""
@@ -204,7 +208,8 @@ class Known:
             self.diameter = None
         self.lose_offsets()
         self.systems, self.lengths, self.home, self.variables = {}, {}, {}, {}
-        self.told = None
+        self.told = self.added = None
+        self.untold = dict.fromkeys(self.untold)
         self.frames, self.bars = dict.fromkeys(self.frames), dict.fromkeys(self.bars)
 
     def forget_shared(self) -> None:
@@ -235,7 +240,18 @@ class Known:
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
             if old != new:
                 self.at[k] += old - new
+                if self.dialect.shifts_travel:
+                    self.untold[AXES[k]] = True
         return after
+
+    def stepping_from(self, k: int) -> float:
+        """Where an increment counts from; behind a shift, setting data say."""
+        return NAN if self.untold.get(AXES[k], False) is not False else self.at[k]
+
+    def absolutely(self, k: int, there: float) -> float:
+        """Where an axis ends that was told a place."""
+        self.untold.pop(AXES[k], None)
+        return there if AXES[k] in LINEAR else self.turn(k, there)
 
     def lengthen(self, code: int, number: float, named: int) -> None:
         """Put a tool length in force: that of the machine file under an H number, or none."""
@@ -303,6 +319,7 @@ class Known:
     def end_run(self, k: int, there: float) -> None:
         """An axis ends a run of which only its last word is known, not how many turns it made."""
         self.at[k] = there
+        self.untold.pop(AXES[k], None)
         if AXES[k] not in LINEAR:
             counts = self.facts.wraps.get(AXES[k]) in ("shortest", "sign")
             self.at[k] = NAN if counts else self.turn(k, there)
@@ -326,6 +343,20 @@ class Known:
         return (
             NAN if counts or self.turned() else place - self.system[k] - self.g92[k] - self.tool[k]
         )
+
+    def turn_tool(self) -> None:
+        """Another plane: a tool that has a length, or may have one, reaches elsewhere."""
+        if self.tool != [0.0] * len(AXES):
+            self.tool = [NAN] * len(AXES)
+            self.lose()
+
+    def lose_tool(self, *, by_t: bool) -> None:
+        """Another tool, or another offset of it; T may run a cycle of the builder's."""
+        if by_t and self.dialect.text.variables == "R":
+            self.forget_shared()
+        self.tool = [NAN] * len(AXES)
+        self.lose()
+        self.end_bar("tool data")
 
     def cancel_length(self) -> None:
         """The tool length may have been cancelled."""

@@ -56,6 +56,7 @@ _FLOW = re.compile(
     rb"\b(?:GOTO|IF|WHILE|REPEAT|RPT|LOOP|FOR|CASE|UNTIL|GOSUB|CALL)(?![A-Z_])", re.IGNORECASE
 )
 """The same where the words of flow are not known, behind which comments are left out."""
+_PADDED = re.compile(rb"(?<![A-Z_])[GM](?:[ \t]|0[0-9])", re.IGNORECASE)
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
 _SPINDLE = re.compile(rb"\$(-?[0-9]+)\.?(?![-+0-9.#\[])")
@@ -83,6 +84,8 @@ class Line:
     """An assignment that may change offsets."""
     swivelled: bool = False
     """The plane is turned from here on."""
+    smoothed: bool = False
+    """A tolerance is given for the path from here on."""
     group: bool = False
     """F is from here on the speed of some axes only."""
     cycle: tuple[str, bytes] | None = None
@@ -119,7 +122,7 @@ class Text:
         self.dialect = dialect
         rules = dialect.text
         parts = []
-        if rules.parentheses == "comment":
+        if rules.parentheses in ("comment", "lone comment"):
             parts.append(rb"\([^()]*\)")
         elif rules.parentheses == "open comment":
             parts.append(rb"\([^)]*(?:\)|$)")
@@ -152,14 +155,15 @@ class Text:
         number = rb"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?![0-9.])" if decimals_matter else _NUMBER
         letters = "".join(a for a in AXES if a in dialect.letters and a not in dialect.increments)
         letters = "".join(a for a in letters if a not in dialect.tool_frame)
-        extra = "E" if dialect.one_command else "IJKR"
+        extra = "E" if dialect.one_command else "IJK" if dialect.polar else "IJKR"
         word = rb"(?:[" + (letters + extra).encode() + rb"][ \t]*" + number + rb"[ \t]*)"
         feed = rb"(?:F[ \t]*" + _NUMBER + rb"[ \t]*)?"
         line_number = rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?"
-        arcs = b"".join(b"%d" % (code // 10) for code in dialect.arcs if code in (20, 30))
-        code = rb"G0?[1" + arcs + rb"](?![0-9.])[ \t]*"
+        told = sorted({20, 30} & dialect.arcs - dialect.redrawn)
+        arcs = b"".join(b"%d" % (code // 10) for code in told)
+        code = rb"G" + (rb"0?" if rules.padded else rb"") + rb"[1" + arcs + rb"](?![0-9.])[ \t]*"
         comment = rb"(?:\((?![ \t]*[pP][yY])[^()\r\n]*\)[ \t]*)?"
-        comment = b"" if rules.parentheses == "code" else comment
+        comment = b"" if rules.parentheses in ("code", "lone comment") else comment
         rest = word + rb"+" + feed + comment + rb"\r?\n"
         free = code if not dialect.modal_motion else rb"(?:" + code + rb")?"
         lines = rb"(?:" + line_number + free + rest + rb")"
@@ -227,9 +231,14 @@ class Text:
         if len(text) > rules.line_limit or runs_python:
             line.understood = False
             return line
+        beside = b"(" in text.partition(b";")[0]
         if self.comments is not None:
             text = self.comments.sub(b"\0", text)
-        text = text.strip(b" \t\0").upper()
+        text = text.strip(b" \t\0")
+        if text and self._misspelled(text, beside):
+            line.understood = False
+            return line
+        text = text.upper()
         if first and rules.leader and _FILE_NAME.fullmatch(text):
             return line
         text = self._mark(text, line)
@@ -246,6 +255,15 @@ class Text:
                 text = _SPINDLE.sub(b"\0", text)
             self._words(text.replace(b"\0", b" "), line)
         return line
+
+    def _misspelled(self, text: bytes, beside: bool) -> bool:
+        """Whether the control may see other words than stand here; `beside` parentheses."""
+        rules = self.dialect.text
+        return (
+            (beside and rules.parentheses == "lone comment")
+            or (rules.capitals and text != text.upper())
+            or (not rules.padded and _PADDED.search(text) is not None)
+        )
 
     def _mark(self, text: bytes, line: Line) -> bytes:
         """Take out the mark of block delete."""
@@ -344,6 +362,9 @@ class Text:
                 line.group = (match[2] or b"").strip(b"() \t") != b""
             if effect == "cycle":
                 line.cycle = match[1].decode(), match[2] or b""
+            if effect == "smoothing":
+                first = (match[2] or b"").strip(b"() \t").split(b",")[0]
+                line.smoothed = first.strip(b" \t0.") != b""
             if effect == "swivel":
                 line.swivelled = (match[2] or b"").strip(b"() \t") != b""
             if effect != "none":

@@ -30,8 +30,18 @@ class Sorted:
         self.axes = 0
         self.feed_whole = False
 
-    def sort(self, line: Line, dialect: Dialect, inch: bool, decimals: str | None) -> bool:
-        """Sort; whether every word has a meaning that is known, and none stands twice."""
+    def sort(
+        self,
+        line: Line,
+        dialect: Dialect,
+        inch: bool,
+        decimals: str | None,
+        motion: int | None = None,
+    ) -> bool:
+        """Sort; whether every word has a meaning that is known, and none stands twice.
+
+        The motion that is in force matters where words may be polar.
+        """
         if not self._codes(line, dialect):
             return False
         self.relative = line.relative
@@ -49,6 +59,8 @@ class Sorted:
                 read = None if dwells else decimals
                 number = _without_point(number, axis or letter, dialect, read, inch=inch)
             self._put(letter, axis, number)
+        if dialect.polar and "cycle" not in self.g and not self._cartesian(dialect, motion):
+            return False
         # axis words beside a code of the builder's may be its own
         return not (self.axes and any(group.startswith(HARMLESS) for group in self.g))
 
@@ -63,6 +75,8 @@ class Sorted:
                 self.m.append(int(number))
         groups = [dialect.m_groups.get(m) for m in self.m]
         if any(groups.count(group) > 1 for group in _SINGLE):
+            return False
+        if dialect.distance_first and _distance_late(line, dialect):
             return False
         alone = not dialect.one_command or len(self.g) + len(self.m) <= 1
         return alone or _modes_first(line, dialect)
@@ -83,11 +97,19 @@ class Sorted:
     def _may_stand(self, letter: str, dialect: Dialect) -> bool:
         """Whether a letter is known, and neither it nor its axis stood in the line before."""
         axis = dialect.increments.get(letter)
-        if letter in dialect.calls or letter in self.values or (axis or letter) in self.increments:
+        if letter in self.values or (axis or letter) in self.increments:
+            return False
+        effects = {dialect.effect(code) for code in self.g.values()} if dialect.calls else set()
+        if letter in dialect.calls and "label" not in effects:
             return False
         if letter not in dialect.letters and axis is None and not dialect.one_command:
             return False
         return axis not in self.values
+
+    def _cartesian(self, dialect: Dialect, motion: int | None) -> bool:
+        """Whether no radius and no angle says where the block leads; an arc has a radius."""
+        arc = self.g.get("motion", motion) in dialect.arcs and self.axes != 0
+        return set(dialect.polar[: -1 if arc else None]).isdisjoint(self.values)
 
     def _put(self, letter: str, axis: str | None, number: float) -> None:
         """Enter a word that is no code; `axis` where it is always an increment of one."""
@@ -106,6 +128,17 @@ def _modes_first(line: Line, dialect: Dialect) -> bool:
     last = max(letters.rfind("G"), letters.rfind("M"))
     front = [(letter, number) for letter, number, _ in line.words[:last] if letter != "N"]
     return all(a == "G" and round(number * 10.0) in dialect.in_turn for a, number in front)
+
+
+def _distance_late(line: Line, dialect: Dialect) -> bool:
+    """Whether G90 or G91 stands behind an axis word."""
+    moved = False
+    for letter, number, _ in line.words:
+        group = dialect.groups.get(round(number * 10.0)) if letter == "G" else None
+        if moved and group == "distance":
+            return True
+        moved = moved or letter in AXES
+    return False
 
 
 def _without_point(

@@ -30,8 +30,8 @@ _FRAMES: frozenset[Effect] = frozenset(
 )
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
-_SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame"))
-_READ: frozenset[Effect] = QUIET | _SHIFTS | frozenset[Effect](("frames", "swivel", "machine"))
+_SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame", "further turn"))
+_READ = QUIET | _SHIFTS | frozenset[Effect](("frames", "swivel", "machine", "smoothing"))
 """Effects of names that are followed."""
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
@@ -158,20 +158,21 @@ class Tracker(Drilling):
             self.in_contour(line)
             return Observation()
         block = Sorted()
-        if not block.sort(line, dialect, self.unit == INCH, self.facts.decimal_point):
+        told = self.unit == INCH, self.facts.decimal_point, self.g.get("motion")
+        if not block.sort(line, dialect, *told):
             return self._lost(line)
         if not dialect.modal_motion:
             self.g["motion"] = None
         for effect in line.effects:
             if effect in QUIET:
                 self.turning(effect)
+            elif effect == "smoothing" and not (line.smoothed and self.path == 64):
+                self.path, self.p, self.q = None, NAN, NAN
         codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}
         if codes & dialect.refused:
             return self._run_or_refused(block)
         seen = self._run_block(block)
-        if "machine" in line.effects:
-            self.lose(_letters(block.axes))  # SUPA: its words are no program coordinates
-            seen = Observation(against="a coordinate frame changes in it")
+        seen = self.end_elsewhere(line, block) or seen
         if line.effects and seen.sure:
             seen.sure = False
         return seen
@@ -258,9 +259,7 @@ class Tracker(Drilling):
         if dialect.length_word in values and "tool length" not in block.g:
             self.lengthen(0, NAN, block.axes)
         if not dialect.tool_frame.isdisjoint(values):
-            self.tool = [NAN] * len(AXES)
-            self.lose()
-            self.end_bar("tool data")
+            self.lose_tool(by_t="T" in values)
             seen.against = seen.against or "it changes the tool's offset"
 
     def _use_axes(self, block: Sorted, kinds: set[Effect], seen: Observation) -> None:
@@ -402,9 +401,9 @@ class Tracker(Drilling):
                 there = block.values[axis] * self.scale(axis)
                 how = block.relative.get(axis)
                 if how == "IC" or (how is None and distance == G91):
-                    there += self.at[k]
-                elif axis not in LINEAR:
-                    there = self.turn(k, there)
+                    there += self.stepping_from(k)
+                elif how is not None or distance is not None:
+                    there = self.absolutely(k, there)
                 self.at[k] = NAN if distance is None and how is None else there
 
     def _why_not(self, block: Sorted, seen: Observation) -> None:

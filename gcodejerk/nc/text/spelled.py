@@ -1,0 +1,61 @@
+"""Spellings that only some controls know: their keywords, and what they read as something else.
+
+Rule: a line that a control may read otherwise is a problem; what it makes of it, nobody is sure of.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from functools import lru_cache
+
+from gcodejerk.nc.dialects.spelling import Text
+from gcodejerk.nc.text.cursor import SyntaxProblem
+
+_UNPADDED = re.compile(rb"[A-Z](?:0|[1-9][0-9]*)(?:\.[1-9])?", re.IGNORECASE)
+
+
+def check_word(rules: Text, text: bytes, begin: int) -> None:
+    """Refuse a small letter, or a code with a zero in front, where that makes another word of it.
+
+    Parameters
+    ----------
+    rules : Text
+        The dialect's.
+    text : bytes
+        The word.
+    begin : int
+        Where it stands in its line.
+    """
+    if rules.capitals and text[:1].islower():
+        raise SyntaxProblem("a small letter may be read as nothing", begin)
+    if not rules.padded and text[:1] in b"GMgm" and not _UNPADDED.fullmatch(text):
+        raise SyntaxProblem(f"'{text.decode('latin-1')}' is no code in this form", begin)
+
+
+def check_comments(rules: Text, text: bytes, comments: Iterable[tuple[int, int]]) -> None:
+    """Refuse parentheses in a line of words, where what they hold may be read as words.
+
+    Parameters
+    ----------
+    rules : Text
+        The dialect's.
+    text : bytes
+        The line.
+    comments : iterable of tuple of int
+        Where its comments stand.
+    """
+    if rules.parentheses != "lone comment":
+        return
+    for begin, _ in comments:
+        if text[begin : begin + 1] == b"(":
+            raise SyntaxProblem("a comment beside words may be read as words", begin)
+
+
+@lru_cache(maxsize=16)
+def keyword_pattern(words: tuple[str, ...]) -> re.Pattern[bytes] | None:
+    """Any of these words, not followed by another letter."""
+    if not words:
+        return None
+    every = b"|".join(word.encode() for word in sorted(words, key=len, reverse=True))
+    return re.compile(rb"(" + every + rb")(?![A-Za-z_])", re.IGNORECASE)
