@@ -327,10 +327,10 @@ class Known:
             NAN if counts or self.turned() else place - self.system[k] - self.g92[k] - self.tool[k]
         )
 
-    def cancel_length(self) -> None:
-        """The tool length may have been cancelled."""
+    def cancel_length(self, named: int = 0) -> None:
+        """The tool length may have been cancelled, along the axes named, or along all."""
         for k, length in enumerate(self.tool):
-            if length != 0.0:
+            if length != 0.0 and (not named or named >> k & 1):
                 self.tool[k] = self.at[k] = NAN
 
     def shift(
