@@ -14,6 +14,7 @@ COMPENSATION, CHANGE = Reason.CUTTER_COMPENSATION, Reason.FRAME_CHANGE
 PLACES = {"G54": {"X": 0.0, "Y": 0.0, "Z": -200.0}}
 HOME = {"X": 0.0, "Y": 0.0, "Z": 0.0}
 MIRRORED = "G51.1 X0. Y0.\nG1 X5. Y5.\n"
+DRILLED = "G98 G81 X1. Z-5. R2. F9.\n"
 COMPENSATED = "G41 D1 G1 X5. Y5.\nX9.\n"
 KIN = ("mitsubishi", "syntec", "mazatrol-eia", "iso-mill")
 HEADS.update(dict.fromkeys((*KIN, "centroid"), HEADS["fanuc"]))
@@ -83,6 +84,16 @@ NOT_CERTAIN = {
     "another unit in the midst": ("fanuc", "G20\nG0 X2.\n", START, {}),
     "so of a lathe": ("fanuc-lathe-a", "G20\nG0 X2.\n", START, {}),
     "of Mitsubishi": ("mitsubishi", "G20\nG0 X2.\n", START, {}),
+    "G98 behind another length": ("fanuc", DRILLED + "G43 H1 X5.\nG80\nG0 Z9.\n", START, {}),
+    "behind another system": ("fanuc", DRILLED + "G55 X5.\nG80\nG0 Z9.\n", START, {}),
+    "behind G52": ("haas", DRILLED + "G52 Z5.\nX5.\nG80\nG0 Z9.\n", START, {}),
+    "behind G92": ("haas", DRILLED + "G92 Z5.\nX5.\nG80\nG0 Z9.\n", START, {}),
+    "behind G43 of Mach": ("mach", DRILLED + "G43 H1\nX5.\nG80\nG0 Z9.\n", START, {}),
+    "behind G28": ("fanuc", DRILLED + "G28 Z9.\nX5.\nG80\nG0 Z9.\n", START, {}),
+    "T within a cycle": ("fanuc", DRILLED + "T2 X5.\nG80\nG0 Z9.\n", START, {}),
+    "Y beside a dwell": ("fanuc", "G0 Y5. G4 P1.\nY9.\n", START, {}),
+    "X beside a dwell": ("haas", "G0 X5. G4 P1.\nX9.\n", START, {}),
+    "Z beside a dwell of a lathe": ("fanuc-lathe-a", "G0 Z5. G4 P1.\nZ9.\n", START, {}),
     "parameters of Centroid": (
         "centroid", f"G10 P81 R5.\n{MODES}G0 X1. Y1. Z1.\nX2.\n", Reason.SYSTEM_WRITTEN, {}
     ),
@@ -119,6 +130,13 @@ STILL_CERTAIN = {
     "the same unit again": ("fanuc", "G21\nG0 X2.\n", {}),
     "two places in the other": ("fanuc", "G20\nG0 X2.\nX3.\n", {}),
     "G53 without a length": ("fanuc", "G53 Z0.\nG0 Z9.\n", {"offsets": PLACES}),
+    "drilled in one system": ("fanuc", DRILLED + "G54 X5.\nG80\nG0 Z9.\n", {}),
+    "a dwell within a cycle": ("fanuc", DRILLED + "G4 X1.\nX5.\nG80\nG0 Z9.\n", {}),
+    "a dwell of X": ("fanuc", "G4 X1.\nG0 X9.\n", {}),
+    "a dwell of U": ("fanuc-lathe-a", "G4 U1.\nG0 X9.\n", {}),
+    "G99 in another system": (
+        "fanuc", "G99 " + DRILLED[4:] + "G55 X5.\nG80\nG0 Z9.\n", {}
+    ),
     "drilled in G17": ("fanuc", "G99 G81 X9. Y-5. Z2. R3. F9.\nG80\nG0 Z5.\n", {}),
 }  # fmt: skip
 

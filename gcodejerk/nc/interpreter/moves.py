@@ -67,6 +67,7 @@ def go_to_machine_position(state: State, values: dict[str, float], dialect: Dial
 def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:
     """G28 and G30: to a stored point that the program does not tell, but the machine file may."""
     named = codes.moved() or AXES
+    state.put("cycle_level", NAN)
     if dialect.tool_cancelled_by_return != "no":
         every = dialect.tool_cancelled_by_return == "all"
         lose_tool_length(state, [k for k, axis in enumerate(AXES) if every or axis in named])

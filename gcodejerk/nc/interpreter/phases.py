@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import PLANES, Dialect, Effect
-from gcodejerk.nc.dialects.gcodes import G1, G40, G64, G80
+from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G64, G80
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes
@@ -115,6 +115,7 @@ class Phases(Effects):
         state, dialect, values = self.state, self.dialect, codes.values
         if dialect.tool_word_moves and "T" in values and self._tool_change is None:
             state.forget_positions()
+            state.put("cycle_level", NAN)
         if dialect.length_word in values and "tool length" not in codes.g:
             frames.tool_length(state, 0, values, {}, dialect)
         if not dialect.tool_frame.isdisjoint(values):
@@ -220,6 +221,10 @@ class Phases(Effects):
             return
         g, dialect = codes.g, self.dialect
         self._select_motion(codes)
+        if g.get("non-modal") == G4:
+            # X alone is a time; whether an axis moves beside the dwell, nobody says
+            time = set() if "P" in codes.values or "motion" in g else {"X"}
+            self.state.forget_positions(AXES.index(axis) for axis in codes.moved() - time)
         contour = g.get("non-modal") in dialect.contours
         self._contour = codes.values.get("Q") if contour else None
         if dialect.one_command and not g and step.words and not codes.m:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, Effect
-from gcodejerk.nc.dialects.gcodes import G28, G40, G54_1, G64, G91
+from gcodejerk.nc.dialects.gcodes import G4, G28, G40, G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.known import Known, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line
@@ -168,6 +168,13 @@ class Codes(Known):
                 self.forget()
         return ends
 
+    def dwell(self, block: Sorted) -> None:
+        """Lose the axes that may move beside G4; X alone is its time."""
+        if G4 in block.g.values():
+            timed = "P" not in block.values and "motion" not in block.g
+            named = [axis for k, axis in enumerate(AXES) if block.axes >> k & 1]
+            self.lose("".join(axis for axis in named if axis != "X" or not timed))
+
     def modes(self, g: dict[str, int], values: dict[str, float]) -> None:
         """Execute modal codes."""
         dialect = self.dialect
@@ -270,6 +277,7 @@ class Codes(Known):
 
     def go_home(self, block: Sorted) -> None:
         """G28 leads to where the machine file says, G30 and its kin to an unknown place."""
+        self.level = NAN
         cancels = self.dialect.tool_cancelled_by_return
         if cancels != "no":
             self.cancel_length(block.axes if cancels == "named" else 0)

@@ -219,7 +219,7 @@ class Known:
 
     def lose_offsets(self) -> None:
         """Lose what lies between machine and program coordinates."""
-        size = len(AXES)
+        size, self.level = len(AXES), NAN
         self.system, self.g92, self.tool = [NAN] * size, [NAN] * size, [NAN] * size
 
     def scale(self, axis: str) -> float:
@@ -235,6 +235,7 @@ class Known:
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
             if old != new:
                 self.at[k] += old - new
+                self.level = NAN
         return after
 
     def lengthen(self, code: int, number: float, named: int) -> None:
@@ -338,7 +339,7 @@ class Known:
     ) -> None:
         """G92 and its kin, G52, G10."""
         if "set" in kinds:
-            dialect = self.dialect
+            dialect, self.level = self.dialect, NAN
             if not values and not increments and dialect.bare_set == "zero":
                 values = dict.fromkeys(AXES, 0.0)
             elif not values and not increments and dialect.bare_set == "unknown":

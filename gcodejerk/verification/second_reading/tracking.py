@@ -256,6 +256,7 @@ class Tracker(Drilling):
         dialect, values = self.dialect, block.values
         if dialect.tool_word_moves and "T" in values and self.facts.tool_change is None:
             self.lose()
+            self.level = NAN
         if dialect.length_word in values and "tool length" not in block.g:
             self.lengthen(0, NAN, block.axes)
         if not dialect.tool_frame.isdisjoint(values):
@@ -273,6 +274,7 @@ class Tracker(Drilling):
                 self.lose()
             if "cycle" in kinds and "non-modal" in g and g["non-modal"] in dialect.contours:
                 self.contour = block.values.get("Q", NAN) if "P" in block.values else None
+            self.dwell(block)
             seen.against = seen.against or "its words are for something else than a move"
         elif block.axes or "motion" in g or "cycle" in g or kinds & _FRAMES:
             self._move(block, kinds, seen)
