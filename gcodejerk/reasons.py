@@ -115,8 +115,10 @@ EXPLAINED: dict[Reason, Explanation] = {
         "out",
     ),
     Reason.CUTTER_COMPENSATION: Explanation(
-        "G41 or G42 is, or may be, in force: the real path differs from the programmed one",
-        "put G40 in front of the rapid; where nobody says G40 at all, into `program.startup`",
+        "G41 or G42 is, or may be, in force, or (Fanuc and kin) ends with the next move in its "
+        "plane: the real path differs from the programmed one",
+        "put G40 in front of the rapid, on a Fanuc beside a feed move in the plane; where nobody "
+        "says G40 at all, into `program.startup`",
     ),
     Reason.ROTATION: Explanation(
         "an axis word is not the motion of that axis",

@@ -177,6 +177,11 @@ CASES = [
         KNOWN + "G41 D1\nG1 X9.\n" + AT, KNOWN + "G41 D1\nG1 X9.\nG40\nG1 X12.\n" + AT,
     ),
     Case(
+        Reason.CUTTER_COMPENSATION, "G40 with a move", FANUC,
+        KNOWN + "G41 D1 G1 X9. F100.\nX11.\nG40\nG0 Z77.\n",
+        KNOWN + "G41 D1 G1 X9. F100.\nX11.\nG40 X12. Y5.\nG0 Z77.\n",
+    ),
+    Case(
         Reason.CUTTER_COMPENSATION, "startup", "heidenhain-iso", HEIDENHAIN,
         machine={"controller": "csv"}, then=program(startup="G40") | {"controller": "csv"},
     ),

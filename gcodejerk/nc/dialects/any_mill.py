@@ -18,10 +18,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gcodejerk.nc.dialects import iso_mill, rs274
-from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Text
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling
 from gcodejerk.nc.dialects.iso_mill import ISO_MILL
 from gcodejerk.nc.dialects.pc_controls import EFFECTS
 from gcodejerk.nc.dialects.rs274 import RS274
+from gcodejerk.nc.dialects.spelling import Text
 
 MEMBERS = (*rs274.MEMBERS, *iso_mill.MEMBERS)
 
@@ -64,14 +65,19 @@ ANY_MILL = replace(
     bars=_BARS,
     drilling=Drilling(_CYCLES, _CYCLES, missing="unknown"),
     redrawn=frozenset({800}),
-    # Siemens is no member, and a program of it may have nothing that says so: D is a length there.
+    # Siemens is no member, and a program of it may have nothing that says so: D is a length there,
+    # which a plane turns, an increment behind another work system may travel more, M3 may turn C.
     tool_frame=frozenset({"D"}),
+    length_turns=True,
+    shifts_travel=True,
+    spindle_turns=True,
+    units_once=True,
     uses={},
     strict=False,
     whole_numbers="machine",
     length_moves=True,
     tool_word_moves=True,
-    tool_cancelled_by_return=True,
+    tool_cancelled_by_return="all",
     macro_change=True,
     unknown_lasts=True,
     harmless=RS274.harmless & ISO_MILL.harmless,

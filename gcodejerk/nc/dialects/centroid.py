@@ -98,6 +98,7 @@ CENTROID = Dialect(
         **dict.fromkeys((433, 434), ("tool centre point", True)),
         490: ("tool centre point", False),
     },
+    bars={100: ("parameters written", True)},  # G10 P
     drilling=Drilling(CYCLES, CYCLES, own_group=True, repeats="KL", missing="unknown"),
     harmless=frozenset(
         {0, 40, 90, 170, 180, 190, 200, 210, 400, 610, 640, 800, 900, 910, 930, 940, 980, 990}

@@ -233,8 +233,7 @@ class Dialect:
     """Codes ("G64", "M6") that some of its controls refuse, and others run. Where one is refused,
     its whole block changes nothing, and the sender waits for somebody, who may move the axes."""
     feed_of_mixed: bool = False
-    """What F means where linear and rotary axes move together is known: it is the speed of the
-    linear ones."""
+    """Where linear and rotary axes move together, F is certainly the speed of the linear ones."""
     feed_on_rapids: bool = False
     """G0 runs at F, like G1."""
     tool_frame: frozenset[str] = frozenset()
@@ -242,8 +241,7 @@ class Dialect:
     length_axes: str = AXES
     """Axes that a tool length may shift."""
     length_moves: bool = False
-    """A change of the tool length may move the machine by itself, by a parameter, instead of
-    renaming where it stands."""
+    """A change of the tool length may move the machine by itself, by a parameter."""
     length_turns: bool = False
     """Another plane lays the length of a tool along other axes, and so renames where they stand."""
     length_word: str = ""
@@ -254,6 +252,8 @@ class Dialect:
     """G92 without axis words: changes nothing; makes every position zero; nobody knows."""
     incremental_set: bool = False
     """G92 means the same in G91."""
+    units_once: bool = False
+    """Another unit in the midst of a program leaves no position and no offset certain."""
     feed_before_units: bool = False
     """F counts in the unit in force in front of a block that also states one."""
     lengths_only: frozenset[int] = frozenset()
@@ -277,8 +277,8 @@ class Dialect:
     """Controls usually start in exact stop, by their machine data."""
     lathe: Literal["no", "yes", "either"] = "no"
     """Whether programs of lathes are written so, in which X is a diameter."""
-    tool_cancelled_by_return: bool = False
-    """G28 cancels the tool length."""
+    tool_cancelled_by_return: Literal["no", "named", "all"] = "no"
+    """G28, G30 and G53 cancel the tool length of the axes that they name; or G28 that of all."""
     bare_return: bool = False
     """G28 without axis words moves all axes; otherwise nobody knows."""
     packed_repeats: bool = False

@@ -9,6 +9,12 @@ Parameters by number without a page, the order of M codes and the check of the p
 are general knowledge that was not looked up: they are used to leave rapids alone, and to stop.
 What stands between the first % and the end of its line is skipped (B-63524EN/01 p. 649; leader
 section, B-64014EN/03 p. 21).
+G20 and G21 must not be switched during a program (B-63944EN/02 p. 192): what becomes of offsets is
+not known. G53, G28 and G30 cancel the vector of a tool length (B-63844EN/02 p. 204). The axis words
+beside G51.1 and G50.1 are those that are mirrored and no longer mirrored (ISO dialect of Siemens,
+3-65). Whether cycles drill along Z in G18 and G19, too (5101#0), whether G60 is modal (5431#0) and
+which codes of the list of the 30i turn or shift for good, is general knowledge, used to leave
+rapids alone.
 A thread (G32, G33) ends at its words and stays there: Haas lathes, G32 ("no automatic position
 return is performed at the end"); ADT-CNC4620 programming manual p. 27 (X, Z: end of the thread).
 Of threads of changing lead (G34) no page was found.
@@ -20,7 +26,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, Effect, grouped
+from gcodejerk.nc.dialects.dialect import (
+    COMPENSATION,
+    Arithmetic,
+    Dialect,
+    Drilling,
+    Effect,
+    grouped,
+)
 from gcodejerk.nc.dialects.spelling import Text, Writing
 
 CYCLES = frozenset({730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890})
@@ -28,16 +41,27 @@ SYSTEMS = (540, 550, 560, 570, 580, 590)
 _FUNCTIONS = "ABS ACOS ASIN ATAN COS EXP FIX FUP LN ROUND SIN SQRT TAN"
 _JUMPS = ("GOTO", "IF", "THEN", "WHILE", "DO", "END", "SETVN", "POPEN", "PCLOS", "DPRNT", "BPRNT")
 
+_TOOL_CENTRE = (431, 433, 434, 435)
+"""Tool lengths along an axis that turns, until G49."""
+_TURNS = (683, 684)
+"""Tilted planes, besides G68.2, until G69."""
+_SPACE = (412, 413, 414, 415, 416, 422, 424, 425, 426)
+"""Cutter compensation in space, until G40."""
+_LASTING = (70, 411, 421, 542, 543, 544)
+"""An axis that does not move, one that turns with the path, offsets that follow rotary axes."""
+
 _EFFECTS: dict[int, Effect] = {
     40: "words",  # G4 X1.5 is a dwell of 1.5 s
     **dict.fromkeys((270, 280, 300), "return"),
     290: "home",
     310: "home",  # skip: ends where a probe answers
-    600: "home",  # single-direction positioning overshoots
+    600: "cycle",  # single-direction positioning overshoots, and may be modal (5431#0)
     **dict.fromkeys(SYSTEMS, "system"),
     541: "numbered system",
     **dict.fromkeys((430, 440, 490), "length"),
-    **dict.fromkeys((434, 435), "frames"),
+    **dict.fromkeys((*_TOOL_CENTRE, *_TURNS, *_SPACE, *_LASTING), "frames"),
+    **dict.fromkeys((501, 511), "words"),  # which axes are mirrored
+    **dict.fromkeys((721, 722), "flow"),  # copies of a subprogram, turned or shifted
     100: "data",
     520: "frames",
     530: "machine",
@@ -78,8 +102,8 @@ FANUC = Dialect(
             "distance": (900, 910),
             "feed mode": (930, 940, 950),
             "units": (200, 210),
-            "compensation": (400, 410, 420),
-            "tool length": (430, 434, 435, 440, 490),
+            "compensation": (400, 410, 420, *_SPACE),
+            "tool length": (430, 440, 490, *_TOOL_CENTRE),
             "cycle": (800, *sorted(CYCLES)),
             "retract": (980, 990),
             "system": (*SYSTEMS, 541),
@@ -88,14 +112,16 @@ FANUC = Dialect(
             "stroke limit": (220, 230),
             "scaling": (500, 510),
             "mirror": (501, 511),
-            "rotation": (680, 682, 690),
+            "rotation": (680, 682, *_TURNS, 690),
             "polar": (150, 160),
             "polar interpolation": (121, 131),
             "cylinder": (71,),
+            "lasting": _LASTING,
             "look-ahead": (51, 80),
             "modal macro": (660, 661, 670),
             "diameter switch": (109,),
             "non-modal": (
+                *(721, 722),
                 *(40, 50, 90, 100, 110, 270, 280, 290, 300, 310, 520, 530, 600, 650),
                 *(920, 921),
             ),
@@ -127,23 +153,34 @@ FANUC = Dialect(
     tool_word_moves=True,  # 6001#5: T calls O9000
     p_selects=frozenset(SYSTEMS),
     transforms={
-        **dict.fromkeys((680, 682), ("rotation", True)),
+        **dict.fromkeys((680, 682, *_TURNS), ("rotation", True)),
         690: ("rotation", False),
+        **dict.fromkeys(_SPACE, (COMPENSATION, True)),
+        400: (COMPENSATION, False),
+        **dict.fromkeys(_LASTING, ("a frame for good", True)),
         **{510: ("scaling", True), 500: ("scaling", False)},
         **{511: ("mirror", True), 501: ("mirror", False)},
         **{160: ("polar", True), 150: ("polar", False)},
         **{121: ("polar interpolation", True), 131: ("polar interpolation", False)},
         71: ("cylinder", True),
         109: ("diameter switch", True),
-        **dict.fromkeys((434, 435), ("tool centre point", True)),
+        **dict.fromkeys(_TOOL_CENTRE, ("tool centre point", True)),
         490: ("tool centre point", False),
         670: ("modal macro", False),
     },
+    units_once=True,
+    bars={400: ("compensation that ends", True)},
+    tool_cancelled_by_return="named",
     whole_numbers="machine",
     packed_repeats=True,
     other_m="positions",
     drilling=Drilling(
-        CYCLES, frozenset({760, 870, 880}), own_group=True, repeats="KL", missing="unknown"
+        CYCLES,
+        frozenset({760, 870, 880}),
+        only_in_xy=CYCLES,  # 5101#0
+        own_group=True,
+        repeats="KL",
+        missing="unknown",
     ),
     # Custom macro B: AND binds like *, OR and XOR like +. Local #1 to #33, common #100 to #999.
     # <Vacant> equals no number (M700V manual p. 314, as Fanuc's), EQ is for whole numbers there.
@@ -234,6 +271,7 @@ _LATHE = replace(
     drilling=Drilling(),
     length_moves=False,
     tool_word_moves=False,
+    tool_cancelled_by_return="no",
     length_word="",
     lathe="yes",
 )

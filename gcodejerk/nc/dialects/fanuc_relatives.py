@@ -37,6 +37,7 @@ _EFFECTS: dict[int, Effect] = {
     **dict.fromkeys((430, 440, 490), "length"),
     100: "data",
     **dict.fromkeys((520, 530, 920), "frames"),
+    **dict.fromkeys((501, 511), "words"),
     650: "flow",
 }
 _GROUPS = {
@@ -85,7 +86,7 @@ def _read_in_part(
         units=inches,
         feed_modes={940: 94, 950: 95},
         transforms={code: ISO_MILL.transforms[code] for code in _OWN & set(ISO_MILL.transforms)},
-        bars={},
+        bars={code: bar for code, bar in ISO_MILL.bars.items() if code in _OWN},
         other_m="unknown",
         macro_change=True,
         unknown_lasts=True,

@@ -4,7 +4,7 @@ Names and nothing else: what a code does in a language, its table says. The seco
 this module for that reason.
 """
 
-G0, G1 = 0, 10
+G0, G1, G4 = 0, 10, 40
 G17, G18, G19 = 170, 180, 190
 G20, G21 = 200, 210
 G28 = 280

@@ -4,7 +4,8 @@ Sources: Haas, "Help with the decimal points" (setting 162; ``X5`` is 0.0005 inc
 gcodes.net, G28 (without axes it moves all of them; it cancels the tool length); VF 96-8000 p. 182
 (positions between holes are rapids). Whether G0 goes straight is a setting: `positioning`. G100 to
 G103, G112, G113, G253 to G255, G268 and G269 are general knowledge that was not looked up; they are
-used to leave rapids alone.
+used to leave rapids alone. G141, compensation in space, is of the group of G40 (NGC mill operator's
+manual).
 
 M codes that move no axis, by the lists of M codes of the mill manuals 96-8000 and 96-8200: chip
 conveyor (M31, M33), coolant spigot (M34, M35), gear (M41, M42; p. 215), air blast and air gun (M73,
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialects.dialect import grouped
+from gcodejerk.nc.dialects.dialect import COMPENSATION, grouped
 from gcodejerk.nc.dialects.fanuc import FANUC
 
 _EXTRA_SYSTEMS = tuple(range(1100, 1300, 10))
@@ -46,7 +47,8 @@ HAAS = replace(
                 "polar interpolation": (1120, 1130),
                 "work offset": (2540, 2550),
                 "feature": (2680, 2690),
-                "tool length": (1410, 1430, 2340),
+                "compensation": (1410,),  # in space
+                "tool length": (1430, 2340),
             }
         ),
     },
@@ -57,6 +59,7 @@ HAAS = replace(
         1540: "numbered system",
         **dict.fromkeys((310, 350, 360, 370, 1360), "home"),
         **dict.fromkeys((1410, 1430, 2340), "frames"),
+        **dict.fromkeys((1000, 1010), "words"),  # which axes are mirrored
     },
     transforms={
         **FANUC.transforms,
@@ -65,7 +68,8 @@ HAAS = replace(
         **{1120: ("polar interpolation", True), 1130: ("polar interpolation", False)},
         **{2540: ("dynamic work offset", True), 2550: ("dynamic work offset", False)},
         **{2680: ("feature", True), 2690: ("feature", False)},
-        **dict.fromkeys((1410, 1430, 2340), ("tool centre point", True)),
+        1410: (COMPENSATION, True),
+        **dict.fromkeys((1430, 2340), ("tool centre point", True)),
     },
     m_groups={
         **FANUC.m_groups,
@@ -73,12 +77,12 @@ HAAS = replace(
         **dict.fromkeys(_STANDING_M, "auxiliary"),
     },
     # G103 P1 lets the control look only one block ahead, so that no stream is blended.
-    bars={1030: ("look-ahead", "P")},
+    bars={**FANUC.bars, 1030: ("look-ahead", "P")},
     # L repeats; K is the least depth of a peck (G73 and G83, 96-8000 pp. 185, 191).
     drilling=replace(FANUC.drilling, repeats="L"),
     packed_repeats=False,
     tool_word_moves=False,
-    tool_cancelled_by_return=True,
+    tool_cancelled_by_return="all",
     bare_return=True,
     harmless=FANUC.harmless | {1030, 1870},
 )

@@ -41,6 +41,6 @@ ISO_MILL = replace(
     drilling=replace(FANUC.drilling, repeats="", maybe_repeats="KL"),
     packed_repeats=False,
     tool_word_moves=True,
-    tool_cancelled_by_return=True,
+    tool_cancelled_by_return="all",
     harmless=FANUC.harmless & HAAS.harmless,
 )

@@ -89,7 +89,12 @@ MACH = Dialect(
     redrawn=frozenset({310, 320, 330, 760}),
     other_m="positions",
     drilling=Drilling(
-        CYCLES, frozenset({870, 880}), own_group=False, repeats="L", missing="unknown"
+        CYCLES,
+        frozenset({870, 880}),
+        only_in_xy=CYCLES,
+        own_group=False,
+        repeats="L",
+        missing="unknown",
     ),
     # NIST RS274/NGC, which has no comparisons.
     arithmetic=Arithmetic(

@@ -65,6 +65,7 @@ class Calls:
             self.lose()
             runner.log.feed_event(USES_FEED)
             runner.state.forget()
+            runner.executor.lengths.clear()
             return True
         if call.m == 97:
             # It may also be run into from the line in front of it, which then is at rest or not.

@@ -278,5 +278,6 @@ class Effects:
     def _leave(self, step: Step) -> None:
         """Run a program that is not followed."""
         self.state.forget()
+        self.lengths.clear()
         step.feed_event = USES_FEED
         step.leaves = True

@@ -46,10 +46,13 @@ _FRAME_CHANGES: frozenset[Effect] = frozenset(
 
 _SELECTIONS: frozenset[Effect] = frozenset({"system", "numbered system"})
 
+ENDING = "compensation that ends"
+"""Name of a bar: G40 has been read, and what it leaves of the offset goes with the next move."""
 BARS = {
     "offsets written": Reason.SYSTEM_WRITTEN,  # until a work system is selected
     "tool data written": Reason.SYSTEM_WRITTEN,  # until a tool length is
     "parameters written": Reason.SYSTEM_WRITTEN,  # for good
+    ENDING: Reason.CUTTER_COMPENSATION,  # until a move in its plane
     "look-ahead": Reason.LOOK_AHEAD,
     "feed group": Reason.FEED_GROUP,
     "feed override": Reason.FEED_SCALED,

@@ -24,6 +24,8 @@ def _rename(state: State, field: str, after: list[float]) -> None:
     """Give one of the three offsets new values and every axis its new name."""
     before = getattr(state, field)
     state.put(field, after)
+    if any(old != new for old, new in zip(before, after, strict=True)):  # NaN differs from itself
+        state.put("cycle_level", NAN)  # where G98 comes back to, under the old name or the new
     for axis, (old, new) in enumerate(zip(before, after, strict=True)):
         if old != new:
             state.move(axis, state.position[axis] + (old - new))
@@ -194,6 +196,7 @@ def set_names(state: State, codes: Codes, dialect: Dialect) -> None:
             state.forget_positions()
             state.lose("g92")
     after = list(state.g92)
+    state.put("cycle_level", NAN)
     unknown = state.distance != G90 and not dialect.incremental_set
     for axis, letter in enumerate(AXES):
         if letter in codes.increments or (unknown and letter in values):

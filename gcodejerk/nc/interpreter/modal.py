@@ -288,7 +288,7 @@ class State:
 
     def forget_frame(self) -> None:
         """Forget what lies between machine and program coordinates."""
-        for name in _FRAME:
+        for name in (*_FRAME, "cycle_level"):
             self.lose(name)
 
     def forget(self, because: Reason = Reason.NOT_FOLLOWED) -> None:

@@ -7,7 +7,7 @@ known and the way is not.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect
@@ -62,8 +62,10 @@ def _turn(state: State, axis: int, angle: float, step: Step) -> float:
     return end
 
 
-def go_to_machine_position(state: State, values: dict[str, float]) -> None:
+def go_to_machine_position(state: State, values: dict[str, float], dialect: Dialect) -> None:
     """G53: the axis words are machine coordinates."""
+    if dialect.tool_cancelled_by_return != "no":
+        lose_tool_length(state, [k for k, axis in enumerate(AXES) if axis in values])
     for axis, letter in enumerate(AXES):
         if letter in values:
             at = _named_place(state, axis, values[letter] * state.scale(axis))
@@ -72,9 +74,11 @@ def go_to_machine_position(state: State, values: dict[str, float]) -> None:
 
 def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:
     """G28 and G30: to a stored point that the program does not tell, but the machine file may."""
-    if dialect.tool_cancelled_by_return:
-        lose_tool_length(state)
     named = codes.moved() or AXES
+    state.put("cycle_level", NAN)
+    if dialect.tool_cancelled_by_return != "no":
+        every = dialect.tool_cancelled_by_return == "all"
+        lose_tool_length(state, [k for k, axis in enumerate(AXES) if every or axis in named])
     known = codes.g.get("non-modal") == G28 and (codes.moved() or dialect.bare_return)
     home = state.home if known else [NAN] * len(AXES)
     for axis, letter in enumerate(AXES):
@@ -90,10 +94,10 @@ def _named_place(state: State, axis: int, machine: float) -> float:
     return NAN if turns else machine - state.shift(axis)
 
 
-def lose_tool_length(state: State) -> None:
-    """Forget the tool length, and where the axes stand that it may shift."""
-    shifted = [axis for axis, length in enumerate(state.tool) if length != 0.0]
-    state.put("tool", [NAN if axis in shifted else 0.0 for axis in range(len(AXES))])
+def lose_tool_length(state: State, axes: Iterable[int] = range(len(AXES))) -> None:
+    """Forget the tool length along these axes, and where those stand that it may shift."""
+    shifted = [axis for axis in axes if state.tool[axis] != 0.0]
+    state.put("tool", [NAN if k in shifted else length for k, length in enumerate(state.tool)])
     state.forget_positions(shifted)
 
 

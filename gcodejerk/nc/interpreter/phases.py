@@ -16,13 +16,13 @@ from gcodejerk.nc.dialects.dialect import (
     Dialect,
     Effect,
 )
-from gcodejerk.nc.dialects.gcodes import G1, G40, G64
+from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G64, G80
 from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.cycles import begin_cycle, run_cycle
 from gcodejerk.nc.interpreter.effects import Effects
-from gcodejerk.nc.interpreter.eligibility import Step
+from gcodejerk.nc.interpreter.eligibility import ENDING, Step
 from gcodejerk.nc.interpreter.mcodes import run_m_code
 from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.interpreter.moves import (
@@ -126,6 +126,7 @@ class Phases(Effects):
         state, dialect, values = self.state, self.dialect, codes.values
         if dialect.tool_word_moves and "T" in values and self._tool_change is None:
             state.forget_positions()
+            state.put("cycle_level", NAN)
         if dialect.length_word in values and "tool length" not in codes.g:
             frames.tool_length(state, 0, values, {}, dialect)
         if dialect.tool_frame & {"T"} & set(values) and dialect.text.variables == "R":
@@ -138,6 +139,7 @@ class Phases(Effects):
     def _modal_groups(self, codes: Codes) -> None:
         """G codes whose number is the mode, transforms and bars: before the words they change."""
         state, g, dialect = self.state, codes.g, self.dialect
+        compensated = state.compensation != G40
         if state.cycle is not None and g.get("distance", state.distance) != state.distance:
             # R and Z that stay in force across G90/G91 are read anew in a way not documented
             self._lose_depths()
@@ -147,9 +149,15 @@ class Phases(Effects):
             if (name := GROUP_FIELDS.get(group)) is not None and group != "motion":
                 state.put(name, code)
             if code in dialect.transforms:
-                self._transform(*dialect.transforms[code])
+                turned, starts = dialect.transforms[code]
+                for each in _mirrored(turned, codes) if group == "mirror" else [turned]:
+                    self._transform(each, starts)
+            if group == "mirror" and codes.moved():
+                state.forget_positions()
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
+                if name == ENDING and not compensated:
+                    continue
                 on = _switched(codes.values.get("P", 0.0)) if begins == "P" else begins
                 if name == ANOTHER_LANGUAGE:
                     state.forget(Reason.NOT_UNDERSTOOD)  # what its codes do and leave
@@ -176,6 +184,11 @@ class Phases(Effects):
                 state.put(name, NAN)
             if state.cycle is not None:
                 self._lose_depths()
+            if state.unit is not None and self.dialect.units_once:
+                self.lengths.clear()
+                state.offsets = {}
+                state.forget_frame()
+                state.forget_positions()
         state.put("unit", unit)
 
     def _g_effects(self, codes: Codes, step: Step) -> None:
@@ -226,6 +239,10 @@ class Phases(Effects):
             return
         g, dialect = codes.g, self.dialect
         self._select_motion(codes)
+        if g.get("non-modal") == G4:
+            # X alone is a time; whether an axis moves beside the dwell, nobody says
+            time = set() if "P" in codes.values or "motion" in g else {"X"}
+            self.state.forget_positions(AXES.index(axis) for axis in codes.moved() - time)
         contour = g.get("non-modal") in dialect.contours
         self._contour = codes.values.get("Q") if contour else None
         if dialect.one_command and not g and step.words and not codes.m:
@@ -251,6 +268,18 @@ class Phases(Effects):
             elif m in _STOPS and not self._stays:
                 # Meanwhile somebody may have moved the axes by hand.
                 self.state.forget_positions()
+        if self._may_move(codes) and not self.dialect.strict:
+            # In front of the block's own motion, or behind it? The builder says.
+            returns = self.dialect.effect(codes.g.get("non-modal")) == "return"
+            named = codes.moved() or (AXES if returns else ())
+            self.state.forget_positions(AXES.index(axis) for axis in named)
+
+    def _may_move(self, codes: Codes) -> bool:
+        """Whether a tool change or a program of the builder's stands in the block."""
+        dialect = self.dialect
+        if any(m == 6 or dialect.m_groups.get(m) in (None, "user") for m in codes.m):
+            return True
+        return dialect.tool_word_moves and "T" in codes.values and self._tool_change is None
 
     def _dwells(self, codes: Codes) -> bool:
         """Whether a code takes all words of the block for itself, F among them."""
@@ -290,7 +319,7 @@ class Phases(Effects):
             if cycle is not None and dialect.drilling.own_group and "R" in codes.values:
                 self._drill_at_r(codes)
             return
-        if state.motion is None and cycle is None:
+        if state.motion in (None, G80) and cycle is None:
             state.forget_positions()
             state.put("cycle", None)
             step.feed_event = USES_FEED
@@ -342,7 +371,7 @@ class Phases(Effects):
         state, dialect, motion = self.state, self.dialect, self.state.motion
         step.rapid = motion == dialect.rapid
         if dialect.effect(codes.g.get("non-modal")) == "machine":
-            go_to_machine_position(state, codes.values)
+            go_to_machine_position(state, codes.values, dialect)
             if dialect.base_frames:
                 state.forget_positions(AXES.index(axis) for axis in codes.moved())
         elif motion in dialect.redrawn or motion is None:
@@ -358,6 +387,8 @@ class Phases(Effects):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))
+        elif motion in (dialect.rapid, G1) and _in_plane(codes, state):
+            frames.end_bar(state, ENDING)
         if any(on is not False for on in state.transforms.values()) and not (
             motion not in dialect.redrawn and drill_behind(state, step.start)
         ):
@@ -392,6 +423,16 @@ class Phases(Effects):
             return code
         state.put("cycle", None)
         return None
+
+
+def _mirrored(name: str, codes: Codes) -> list[str]:
+    """Names of the mirrors that G51.1 X0. Y0. begins, or G50.1 ends: one for each axis."""
+    return [f"{name} {axis}" for axis in sorted(codes.moved())] or [name]
+
+
+def _in_plane(codes: Codes, state: State) -> bool:
+    """Whether a block moves an axis that cutter compensation may displace."""
+    return not codes.moved().isdisjoint(AXES[axis] for axis in plane_axes(state))
 
 
 def _switched(number: float) -> bool | None:

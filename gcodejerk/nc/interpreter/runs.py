@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LINEAR, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G40, G90, G91
-from gcodejerk.nc.interpreter.eligibility import BARS
+from gcodejerk.nc.interpreter.eligibility import BARS, ENDING
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
@@ -44,6 +44,7 @@ def can_run(state: State) -> bool:
         and (state.unit is not None or not state.lost)
         and state.touched is None
         and state.cycle is None
+        and state.bars.get(ENDING, False) is False
         and not any(on is not False for on in state.transforms.values())
     )
 

@@ -13,7 +13,7 @@ from gcodejerk.nc.dialects.dialect import (
     MACHINE_WORDS,
     Effect,
 )
-from gcodejerk.nc.dialects.gcodes import G28, G54_1, G64, G91
+from gcodejerk.nc.dialects.gcodes import G4, G28, G40, G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.known import Known, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line
@@ -23,6 +23,8 @@ SELECTIONS: frozenset[Effect] = frozenset(("system", "numbered system"))
 QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
 STATEMENTS: frozenset[Effect] = frozenset(("home", "cycle", "label"))
 """Effects of statements of Klartext."""
+LEFT_OVER = "compensation that ends"
+"""What forbids rapids between G40 and the next move in the plane."""
 _CALLS = (47, 96, 97, 98, 198)
 _ENDS = (2, 17, 30, 99)
 _OUTPUTS = (*range(62, 69), *range(100, 200))
@@ -201,6 +203,13 @@ class Codes(Known):
                 self.forget()
         return ends
 
+    def dwell(self, block: Sorted) -> None:
+        """Lose the axes that may move beside G4; X alone is its time."""
+        if G4 in block.g.values():
+            timed = "P" not in block.values and "motion" not in block.g
+            named = [axis for k, axis in enumerate(AXES) if block.axes >> k & 1]
+            self.lose("".join(axis for axis in named if axis != "X" or not timed))
+
     def modes(self, g: dict[str, int], values: dict[str, float]) -> None:
         """Execute modal codes."""
         dialect = self.dialect
@@ -208,11 +217,15 @@ class Codes(Known):
             self.turn_tool()
         if "distance" in g and self.g.get("distance") != g["distance"]:
             self.level = self.r = NAN
+        was_off = self.g.get("compensation") == G40
         for group, code in g.items():
             if group not in ("motion", "non-modal", "cycle"):
                 self.g[group] = code
             if code in dialect.transforms:
                 name, on = dialect.transforms[code]
+                if group == "mirror":
+                    self._mirror(name, on, values)
+                    continue
                 if on or self.frames.get(name, False) is not False:
                     self.lose()
                 if on or name in self.frames:
@@ -221,6 +234,8 @@ class Codes(Known):
                 name, begins = dialect.bars[code]
                 if name == ANOTHER_LANGUAGE:
                     self.forget()
+                if name == LEFT_OVER and was_off:
+                    continue
                 by_p = _switched(values.get("P", 0.0))
                 self.bars[name] = by_p if begins == "P" else bool(begins)
         if "units" in g:
@@ -230,12 +245,26 @@ class Codes(Known):
             self.p = values.get("P", NAN) if g["path"] == G64 else NAN
             self.q = values.get("Q", NAN) if g["path"] == G64 else NAN
 
+    def _mirror(self, name: str, on: bool, values: dict[str, float]) -> None:
+        """Mirror the axes named, or no longer; without any, nobody knows which."""
+        axes = [axis for axis in AXES if axis in values]
+        if axes or on or name in self.frames:
+            self.lose()
+        for axis in axes:
+            self.frames[f"{name} along {axis}"] = on
+        if not axes and (on or name in self.frames):
+            self.frames[name] = on
+
     def _units(self, code: int, *, beside_feed: bool) -> None:
         """Take a unit of lengths, and of F where the dialect does not keep the two apart."""
         dialect = self.dialect
         unit = INCH if dialect.units[code] else 1.0
         if unit != self.unit:
             self.p = self.q = self.level = self.r = NAN
+            if dialect.units_once and self.unit is not None:
+                self.lose()
+                self.lose_offsets()
+                self.systems, self.lengths = {}, {}
         if code not in dialect.lengths_only:
             sure = unit == 1.0 or not dialect.feed_before_units
             if unit != self.feed_unit and not (self.feed_unit is None and beside_feed and sure):
@@ -289,8 +318,10 @@ class Codes(Known):
 
     def go_home(self, block: Sorted) -> None:
         """G28 leads to where the machine file says, G30 and its kin to an unknown place."""
-        if self.dialect.tool_cancelled_by_return:
-            self.cancel_length()
+        self.level = NAN
+        cancels = self.dialect.tool_cancelled_by_return
+        if cancels != "no":
+            self.cancel_length(block.axes if cancels == "named" else 0)
         knows = G28 in block.g.values() and (block.axes or self.dialect.bare_return)
         for k, axis in enumerate(AXES):
             if block.axes and not block.axes >> k & 1:
@@ -298,6 +329,24 @@ class Codes(Known):
             self.at[k] = self.stand(k, self.home.get(axis, NAN)) if knows else NAN
         if self.turned():
             self.lose()
+
+    def tool_moves(self, block: Sorted) -> bool:
+        """Whether something of the builder's moves, in front of the block's motion or behind it."""
+        groups = [self.dialect.m_groups.get(m) for m in block.m]
+        chosen = "T" in block.values and self.facts.tool_change is None
+        called = chosen and self.dialect.tool_word_moves
+        return called or 6 in block.m or None in groups or "user" in groups
+
+    def go_to_machine_position(self, block: Sorted) -> None:
+        """G53: the words are machine coordinates."""
+        for k, axis in enumerate(AXES):
+            if axis in block.values:
+                if self.dialect.tool_cancelled_by_return != "no" and self.tool[k] != 0.0:
+                    self.tool[k] = NAN
+                there = block.values[axis] * self.scale(axis)
+                there -= self.system[k] + self.g92[k] + self.tool[k]
+                known = self.g.get("distance") != G91 and not self.turned()
+                self.at[k] = there if known else NAN
 
     def _data(self, values: dict[str, float]) -> None:
         """G10: offsets (L2, L20), tool data (L1, L3, L10 to L13), or parameters."""

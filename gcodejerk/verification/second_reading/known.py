@@ -224,7 +224,7 @@ class Known:
 
     def lose_offsets(self) -> None:
         """Lose what lies between machine and program coordinates."""
-        size = len(AXES)
+        size, self.level = len(AXES), NAN
         self.system, self.g92, self.tool = [NAN] * size, [NAN] * size, [NAN] * size
 
     def scale(self, axis: str) -> float:
@@ -242,6 +242,7 @@ class Known:
                 self.at[k] += old - new
                 if self.dialect.shifts_travel:
                     self.untold[AXES[k]] = True
+                self.level = NAN
         return after
 
     def stepping_from(self, k: int) -> float:
@@ -358,10 +359,10 @@ class Known:
         self.lose()
         self.end_bar("tool data")
 
-    def cancel_length(self) -> None:
-        """The tool length may have been cancelled."""
+    def cancel_length(self, named: int = 0) -> None:
+        """The tool length may have been cancelled, along the axes named, or along all."""
         for k, length in enumerate(self.tool):
-            if length != 0.0:
+            if length != 0.0 and (not named or named >> k & 1):
                 self.tool[k] = self.at[k] = NAN
 
     def shift(
@@ -369,7 +370,7 @@ class Known:
     ) -> None:
         """G92 and its kin, G52, G10."""
         if "set" in kinds:
-            dialect = self.dialect
+            dialect, self.level = self.dialect, NAN
             if not values and not increments and dialect.bare_set == "zero":
                 values = dict.fromkeys(AXES, 0.0)
             elif not values and not increments and dialect.bare_set == "unknown":

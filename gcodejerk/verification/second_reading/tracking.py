@@ -16,7 +16,7 @@ from gcodejerk.nc.dialects.dialect import LINEAR, Effect
 from gcodejerk.nc.dialects.gcodes import G1, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
-from gcodejerk.verification.second_reading.coding import QUIET, SELECTIONS
+from gcodejerk.verification.second_reading.coding import LEFT_OVER, QUIET, SELECTIONS
 from gcodejerk.verification.second_reading.drilling import Drilling
 from gcodejerk.verification.second_reading.known import NEAR, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line, Run
@@ -54,6 +54,7 @@ class Tracker(Drilling):
             and not self.ended
             and self.contour is None
             and self.g.get("compensation") is not None
+            and self.bars.get(LEFT_OVER, False) is False
             and not any(on is not False for on in self.frames.values())
         )
 
@@ -256,6 +257,7 @@ class Tracker(Drilling):
         dialect, values = self.dialect, block.values
         if dialect.tool_word_moves and "T" in values and self.facts.tool_change is None:
             self.lose()
+            self.level = NAN
         if dialect.length_word in values and "tool length" not in block.g:
             self.lengthen(0, NAN, block.axes)
         if not dialect.tool_frame.isdisjoint(values):
@@ -271,6 +273,7 @@ class Tracker(Drilling):
                 self.lose()
             if "cycle" in kinds and "non-modal" in g and g["non-modal"] in dialect.contours:
                 self.contour = block.values.get("Q", NAN) if "P" in block.values else None
+            self.dwell(block)
             seen.against = seen.against or "its words are for something else than a move"
         elif block.axes or "motion" in g or "cycle" in g or kinds & _FRAMES:
             self._move(block, kinds, seen)
@@ -282,6 +285,9 @@ class Tracker(Drilling):
         if not self._stays():
             stops = [m for m in block.m if m in _STOPS and self.dialect.m_groups.get(m) == "stop"]
             self.lose(AXES if stops else "")
+        if self.tool_moves(block) and not self.dialect.strict:
+            home = any(self.dialect.effect(code) == "return" for code in block.g.values())
+            self.lose(AXES if home and not block.axes else _letters(block.axes))
         if ends:
             self.forget()
             self.ended = self.depth == 0  # in a branch it may not run
@@ -347,7 +353,7 @@ class Tracker(Drilling):
             return
         elsewhere = "machine" in kinds or motion in self.dialect.redrawn
         if "machine" in kinds:
-            self._go_to_machine_position(block)
+            self.go_to_machine_position(block)
         elif motion in self.dialect.redrawn:
             self.lose(self.in_plane())
             self.lose(_letters(block.axes))
@@ -382,15 +388,6 @@ class Tracker(Drilling):
             return True
         return block.g.get("tool length") not in (None, G43, G49) and block.axes != 0
 
-    def _go_to_machine_position(self, block: Sorted) -> None:
-        """G53: the words are machine coordinates."""
-        for k, axis in enumerate(AXES):
-            if axis in block.values:
-                there = block.values[axis] * self.scale(axis)
-                there -= self.system[k] + self.g92[k] + self.tool[k]
-                known = self.g.get("distance") != G91 and not self.turned()
-                self.at[k] = there if known else NAN
-
     def _go(self, block: Sorted) -> None:
         """To where the words say."""
         distance = self.g.get("distance")
@@ -411,6 +408,8 @@ class Tracker(Drilling):
         compensated = self.g.get("compensation") != G40
         if compensated:
             self.lose(self.in_plane())
+        elif self.g.get("motion") in (0, G1) and set(self.in_plane()) & set(_letters(block.axes)):
+            self.end_bar(LEFT_OVER)
         if self.turned() and not self.drilled_behind(seen):
             self.lose()
         seen.against = seen.against or self._barred(block, seen)
