@@ -381,9 +381,7 @@ class Phases(Effects):
             go_straight(state, codes, step)
             step.fed = motion == G1 and self._counts_as_rapid(step)
             step.rapid = step.rapid or step.fed
-        if any(self._named(name) == "machine" for name in codes.names) or any(
-            dialect.m_groups.get(m) == MACHINE_WORDS for m in codes.m
-        ):
+        if self._in_machine_words(codes):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))
@@ -393,6 +391,12 @@ class Phases(Effects):
             motion not in dialect.redrawn and drill_behind(state, step.start)
         ):
             state.forget_positions()
+
+    def _in_machine_words(self, codes: Codes) -> bool:
+        """Whether a name or an M code makes the axis words machine coordinates."""
+        groups = (self.dialect.m_groups.get(m) for m in codes.m)
+        named = (self._named(name) for name in codes.names)
+        return "machine" in named or MACHINE_WORDS in groups
 
     def _counts_as_rapid(self, step: Step) -> bool:
         """Whether a straight feed move is one that the user has said to be a rapid."""

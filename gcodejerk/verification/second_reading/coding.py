@@ -222,28 +222,31 @@ class Codes(Known):
             if group not in ("motion", "non-modal", "cycle"):
                 self.g[group] = code
             if code in dialect.transforms:
-                name, on = dialect.transforms[code]
-                if group == "mirror":
-                    self._mirror(name, on, values)
-                    continue
-                if on or self.frames.get(name, False) is not False:
-                    self.lose()
-                if on or name in self.frames:
-                    self.frames[name] = on
-            if code in dialect.bars:
-                name, begins = dialect.bars[code]
-                if name == ANOTHER_LANGUAGE:
-                    self.forget()
-                if name == LEFT_OVER and was_off:
-                    continue
-                by_p = _switched(values.get("P", 0.0))
-                self.bars[name] = by_p if begins == "P" else bool(begins)
+                self._transform(*dialect.transforms[code], group == "mirror", values)
+            if code in dialect.bars and not (dialect.bars[code][0] == LEFT_OVER and was_off):
+                self._bar(*dialect.bars[code], values)
         if "units" in g:
             self._units(g["units"], beside_feed="F" in values)
         if "path" in g:
             self.path = dialect.paths.get(g["path"])
             self.p = values.get("P", NAN) if g["path"] == G64 else NAN
             self.q = values.get("Q", NAN) if g["path"] == G64 else NAN
+
+    def _transform(self, name: str, on: bool, by_axis: bool, values: dict[str, float]) -> None:
+        """Turn, scale or mirror what follows, or no longer."""
+        if by_axis:
+            self._mirror(name, on, values)
+            return
+        if on or self.frames.get(name, False) is not False:
+            self.lose()
+        if on or name in self.frames:
+            self.frames[name] = on
+
+    def _bar(self, name: str, begins: bool | str, values: dict[str, float]) -> None:
+        """Begin or end what forbids to rewrite; what another language leaves is not known."""
+        if name == ANOTHER_LANGUAGE:
+            self.forget()
+        self.bars[name] = _switched(values.get("P", 0.0)) if begins == "P" else bool(begins)
 
     def _mirror(self, name: str, on: bool, values: dict[str, float]) -> None:
         """Mirror the axes named, or no longer; without any, nobody knows which."""
