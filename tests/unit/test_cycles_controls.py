@@ -17,7 +17,7 @@ from gcodejerk.verification.cycles.expansion import check_expansion
 
 SETTINGS = CycleSettings(chip_retract=0.5, peck_clearance=0.4, clear_above_r=1.0, boring_out="feed")
 START = Start(startup="G90 G94 G17 G21", decimal_point="standard", cycles=SETTINGS)
-HEAD = b"G54 G90 G17 G21\nG0 G43 H1 Z20.\nX0. Y0.\nF100.\n"
+HEAD = b"G54 G90 G98 G17 G21\nG0 G43 H1 Z20.\nX0. Y0.\nF100.\n"
 END = b"G80\nM30\n"
 
 

@@ -21,6 +21,7 @@ HEADS.update(dict.fromkeys((*KIN, "centroid"), HEADS["fanuc"]))
 
 # What stands in front of the last rapid, the reason for which that one is left alone, and facts.
 NOT_CERTAIN = {
+    "a cycle that may come back to R": ("fanuc", "G81 X1. Z-5. R2.\nG80\nG0 Z9.\n", START, {}),
     "the axes of a mirror are no move": ("fanuc", MIRRORED + "G50.1 X0. Y0.\nG0 X5.\n", START, {}),
     "nor those of Haas": ("haas", "G101 X0.\nG100 X0.\nG0 X5.\n", START, {}),
     "nor without a mirror": ("fanuc", "G50.1 X7.\nG0 X5.\n", START, {}),

@@ -139,7 +139,6 @@ FANUC = Dialect(
     # Marked as the state after power-on in the list of G codes; what 3402 chooses is not here.
     defaults={
         "compensation": 400,
-        "retract": 980,
         "system": 540,
         "path": 640,
     },
