@@ -350,6 +350,8 @@ class Walker:
         if not state.ended:
             return [(at + 1, state)]
         returns = _RETURNS.search(upper) is not None
+        if self.routes.named and self._calls and not returns:
+            raise LostError  # M2 and M30 of a subprogram go back to its caller on some controls
         if returns and self._calls:
             if _ALONE.fullmatch(upper) is None:
                 before.stray()
