@@ -19,7 +19,7 @@ from gcodejerk.nc.flow.o_words import Passes
 from gcodejerk.nc.flow.script import Script
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.interpreter.modal import State
-from gcodejerk.nc.interpreter.runner import Runner
+from gcodejerk.nc.interpreter.runner import Finding, Runner
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.block import Line
 from gcodejerk.start import Start
@@ -30,6 +30,10 @@ _NAMED = re.compile(
     rb"(?<![A-Z0-9_])(?:GOTO[FBC]?|FOR|WHILE|LOOP|REPEATB?|IF|PROC)(?![A-Z0-9_])|%_N_",
     re.IGNORECASE,
 )
+_BY_NUMBER = re.compile(
+    rb"(?<![A-Z0-9_])REPEATB?[ \t]+(?:[A-Z_][A-Z0-9_]*[ \t]+)?N?[0-9]+(?![A-Z0-9_=])", re.IGNORECASE
+)
+"""``REPEATB N10``: of a stream only its first block bears the number."""
 _MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[", re.IGNORECASE)
 
 
@@ -157,6 +161,13 @@ class FollowingReader(Reader):
     def _replay_all(self) -> None:
         """Take all lines one by one."""
         self.percent = None
+        lines = (line for line, _ in self._kept)
+        repeated = (line.number for line in lines if _BY_NUMBER.search(line.text))
+        if self.dialect.text.names and (number := next(repeated, None)) is not None:
+            state = self.runner.state
+            state.put("bars", {**state.bars, "unknown code": True})
+            told = "it repeats blocks by their numbers: not followed, nothing is rewritten"
+            self.runner.syntax_problems.append(Finding(number, told))
         blocks, started, insert_at = self.blocks, self.started, self.insert_at
         self.blocks, self.started = 0, False
         for line, first in [*self._kept, *self._behind]:

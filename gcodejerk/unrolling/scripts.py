@@ -35,6 +35,7 @@ _STEPS = 10
 NOT_KNOWN = "how it goes on depends on what is not known"
 NOT_FOLLOWED = "it jumps, loops or calls in a way that is not followed (docs/flow.md)"
 _LABEL = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*[ \t]*:(?!=)[ \t]*")
+_REMARK = re.compile(rb"\([^()]*\)?")
 _RETURNS = (17.0, 99.0)
 _MODAL_MACROS = frozenset((660, 661))
 
@@ -51,6 +52,8 @@ class ExactFollower(Follower):
         self._scopes = 0
         """Calls that run whose subprograms have variables of their own."""
         self._origin: Line | None = None
+        self.called: set[int] = set()
+        """First lines of the subprograms that have run."""
         self.reached: set[int] = set()
         """Lines of flow that have run."""
         self._seen: set[float] = set()
@@ -110,7 +113,13 @@ class ExactFollower(Follower):
             block = op.line.block
             pairs = zip(block.assigns, block.assigned, strict=True)
             text = b" ".join(b"#" + name.encode() + b"=" + value for name, value in pairs)
+            before = len(self.trace)
             self._take(Line(text, op.line.begin, op.line.number, op.line.terminator, block), state)
+            remarks = _REMARK.findall(self.script.lines[at].text)
+            if remarks and len(self.trace) > before:
+                # #3000 and #3006 show theirs to the operator.
+                last = self.trace[-1]
+                self.trace[-1] = Written(b" ".join([last.text, *remarks]), last.line)
         super()._set(at, op, state, ways)
 
     def _count(self, at: int, op: Op, state: State, ways: Ways) -> None:
@@ -125,6 +134,8 @@ class ExactFollower(Follower):
         line, sub = self.script.lines[at], self.script.called(op.name)
         if sub is not None and sub.saves:
             raise LeftAloneError("a subprogram gives back modes (SAVE)", self._at)
+        if sub is not None:
+            self.called.add(sub.first)
         before, scopes = self._origin, self._scopes
         if line.number < ELSEWHERE:
             self._origin = line
@@ -268,7 +279,13 @@ class ScriptUnroller(FollowingReader):
             done += 1
         else:
             return None
-        end = unit.last if exact.lost else len(script.lines)
+        kept = exact.lost or any(
+            each.first >= unit.last
+            and each.first not in exact.called
+            and script.lines[each.first].number < ELSEWHERE
+            for each in script.units
+        )
+        end = unit.last if kept else len(script.lines)
         last = [each for each in script.lines[at:end] if each.number < ELSEWHERE][-1]
         writing = self.dialect.writing
         marks = (b"(", b")") if writing is None else writing.comment

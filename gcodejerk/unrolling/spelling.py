@@ -19,7 +19,7 @@ from gcodejerk.nc.text.block import Line
 from gcodejerk.unrolling.pieces import LeftAloneError
 
 _VARIABLE = re.compile(rb"#[ \t]*(?:([0-9][0-9 \t]*)|(<[^<>]*>)|([#\[]))")
-_SHOWS = re.compile(rb"[(;][ \t]*(?:PRINT|DEBUG|LOG)[ \t]*,", re.IGNORECASE)
+_SHOWS = re.compile(rb"[(;][ \t]*(?:PRINT|DEBUG|LOG|ABORT)[ \t]*,", re.IGNORECASE)
 _SHOWN = re.compile(rb"#(?:([0-9]+)|(<[^<>]*>))")
 
 
@@ -76,8 +76,8 @@ def spelled(line: Line, variables: Mapping[str, float], rules: Arithmetic) -> by
     if not shows and not _own(code, rules):
         return text
 
-    def value_of(expression: bytes) -> bytes:
-        if not _own(expression, rules):
+    def value_of(expression: bytes, own: bool = False) -> bytes:
+        if not (own or _own(expression, rules)):
             return expression
         value = evaluate(expression, variables, rules)
         if value != value:
@@ -92,7 +92,10 @@ def spelled(line: Line, variables: Mapping[str, float], rules: Arithmetic) -> by
         name = variable_name(target.encode("latin-1"))
         if not target:
             raise LeftAloneError("a subprogram sets a variable that is computed", line.number)
-        if not is_local(name, rules):
+        if is_local(name, rules):
+            # Left out: where LinuxCNC would stop with an error, nothing would tell any more.
+            value_of(expression, own=True)
+        else:
             parts.append(b"#" + target.encode("latin-1") + b"=" + value_of(expression))
     parts += [_shown(comment, line, variables, rules) for comment in comments]
     if not parts:

@@ -123,13 +123,11 @@ def unroll(
             break
     pieces = reader.pieces()
     left = reader.left
+    place = _place([data, *(start.subprograms[file] for file in reader.used)])
     if len(data) > MOST_BYTES:
         pieces, left = [], [(1, LeftAloneError(f"more than {MOST_BYTES // 10**6} MB", 1))]
-    elif chosen.text.o_word == "flow" and (
-        match := _PLACE.search(data.translate(None, b" \t").lower())
-    ):
-        read = match[0].decode()
-        pieces, left = [], [(1, LeftAloneError(f"the program reads #{read}", 1))]
+    elif chosen.text.o_word == "flow" and place:
+        pieces, left = [], [(1, LeftAloneError(f"the program reads #{place}", 1))]
     again = target if pieces else None
     source.seek(begin)
     lines = put_together(source, again, pieces, program.newline)
@@ -149,6 +147,12 @@ def unroll(
         lines,
         reader.used if pieces else (),
     )
+
+
+def _place(texts: Sequence[bytes]) -> str:
+    """A variable that says where in the flow LinuxCNC is, which one of these texts reads."""
+    found = (_PLACE.search(text.translate(None, b" \t").lower()) for text in texts)
+    return next((match[0].decode() for match in found if match), "")
 
 
 def has_flow(dialect: Dialect) -> bool:

@@ -26,6 +26,8 @@ _NAME = re.compile(rb"(?<![A-Za-z0-9_$])[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
 _WHOLE = frozenset("GMTHDNOSPL")
 _POINTED = frozenset("XYZABCUVWIJKRFQ")
 _DECIMALS = 6
+_DWELL = 40
+"""G4."""
 
 
 def worded(line: Line, state: State, dialect: Dialect, declared: Mapping[str, str]) -> bytes | None:
@@ -73,12 +75,13 @@ def worded(line: Line, state: State, dialect: Dialect, declared: Mapping[str, st
     if block.block_delete:
         raise LeftAloneError("the operator may skip a line of a macro", line.number)
     parts, inch = [], state.unit == MM_PER_INCH
+    counted = _counted(line, state, dialect)
     for word in block.words:
         if word.value is not None:
             parts.append(word.text)
             continue
         value = word_value(word, state.variables, rules, inch)
-        number = _word(word, value, line, state, dialect)
+        number = _word(word, value, line, dialect, counted if own(word.text) else "")
         parts.append(number if own(word.text) else word.text)
     for target, expression in zip(block.assigns, block.assigned, strict=True):
         name = variable_name(target.encode("latin-1"))
@@ -107,12 +110,22 @@ def _short(value: float, line: Line) -> bytes:
     return number_text(value)
 
 
-def _word(word: Word, value: float, line: Line, state: State, dialect: Dialect) -> bytes:
+def _counted(line: Line, state: State, dialect: Dialect) -> str:
+    """Letters whose numbers are no lengths in a block, and are read by how they are written.
+
+    Haas takes P with a decimal point for seconds, and a K with one is an error on a Fanuc.
+    """
+    codes = {round(w.value * 10) for w in line.block.words if w.letter == "G" and w.value}
+    if state.cycle is not None or codes & dialect.cycles:
+        return dialect.drilling.repeats + "P"
+    return "P" if _DWELL in codes else ""
+
+
+def _word(word: Word, value: float, line: Line, dialect: Dialect, counted: str) -> bytes:
     """A word with its number."""
     letter = word.letter
-    counts = letter in dialect.drilling.repeats and state.cycle is not None
     pointed = letter in _POINTED or letter in dialect.increments
-    if counts or not (pointed or letter in _WHOLE):
+    if letter in counted or not (pointed or letter in _WHOLE):
         raise LeftAloneError(f"what a computed {letter} means is not certain here", line.number)
     number = _short(value, line)
     if not pointed and b"." in number:

@@ -383,10 +383,13 @@ class Follower:
         if ended is None:
             ways.go(at + 1, runner.state)
             return
+        codes = {word.value for word in line.block.words if word.letter == "M"}
+        if self._is_named and self._calls and not codes & {*_RETURNS}:
+            # A SINUMERIK 802D goes back to the caller at M2; others end the program.
+            raise NotFollowedError
         if runner.state is not ended:
             self._split(ways, at + 1, runner.state)
-        returns = any(w.letter == "M" and w.value in _RETURNS for w in line.block.words)
-        if returns:
+        if codes & {*_RETURNS}:
             self._return(unit, at, ended, ways)
         else:
             self._end(ended)

@@ -152,7 +152,8 @@ class _Compiler:
                 raise NotFollowedError
             return self._structure(name, text, at)
         if name == "RET":
-            return Op("return") if alone and not block.block_delete else Op("jump", None, LOST)
+            plain = alone and not text and not block.block_delete  # RET("LABEL") goes on there
+            return Op("return") if plain else Op("jump", None, LOST)
         only_count = all(word.letter == "P" for word in words)
         if len(names) == 1 and only_count and not block.assigns and not block.block_delete:
             return self._call(name, text, words[0].value if words else 1.0, at)

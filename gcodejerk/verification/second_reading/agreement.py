@@ -31,7 +31,7 @@ from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back
 from gcodejerk.verification.second_reading.routes import LostError, calls, flows
 from gcodejerk.verification.second_reading.straight import Column, PlainLines, Straight, follow
 from gcodejerk.verification.second_reading.tracking import Tracker
-from gcodejerk.verification.second_reading.walking import Stepper, Walker
+from gcodejerk.verification.second_reading.walking import Stepper, Walker, given_up
 
 MOST_BYTES = 4_000_000
 """Of a file whose flow is followed."""
@@ -323,7 +323,7 @@ def _walked(
     try:
         return Walker(stepper, begin, [*lines, *behind]).walk()
     except LostError:
-        return None
+        return given_up(lines) if stepper.dialect.text.names else None
 
 
 def _behaves_like_a_laser(original: BinaryIO, dialect: Dialect, start: Start) -> bool:

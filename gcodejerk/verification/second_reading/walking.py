@@ -28,6 +28,7 @@ _DEEPEST = 9
 _RETURNS = re.compile(rb"(?<![A-Z])M[ \t]*0*(?:99|17)(?![0-9])")
 _ALONE = re.compile(rb"[ \t\0]*(?:N[ \t]*[0-9]+)?[ \t\0]*M[ \t]*0*(?:99|17)[ \t\0;]*")
 _DECLARES = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?DEF[ \t]", re.IGNORECASE)
+_NUMBER = re.compile(rb"N?[0-9]+")
 _LABEL = re.compile(rb"([ \t]*(?:N[0-9]+[ \t]*)?)[A-Za-z_][A-Za-z_][A-Za-z0-9_]*[ \t]*:(?!=)")
 
 
@@ -350,6 +351,8 @@ class Walker:
         if not state.ended:
             return [(at + 1, state)]
         returns = _RETURNS.search(upper) is not None
+        if self.routes.named and self._calls and not returns:
+            raise LostError  # M2 and M30 of a subprogram go back to its caller on some controls
         if returns and self._calls:
             if _ALONE.fullmatch(upper) is None:
                 before.stray()
@@ -363,6 +366,19 @@ class Walker:
         if self._calls:
             back.append(state)
         return []
+
+
+def given_up(lines: list[bytes]) -> dict[int, Observation] | None:
+    """What is seen in a file that is not followed, if anything: REPEATB N10 runs a single block."""
+    places = (line.partition(b";")[0].upper().split() for line in lines)
+    if not any(
+        word in (b"REPEAT", b"REPEATB") and any(map(_NUMBER.fullmatch, words[k + 1 : k + 3]))
+        for words in places
+        for k, word in enumerate(words)
+    ):
+        return None
+    why = "the program repeats blocks by their numbers"
+    return {at: Observation(against=why) for at in range(len(lines))}
 
 
 def _joined(a: Tracker | None, b: Tracker) -> Tracker:

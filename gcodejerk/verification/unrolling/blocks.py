@@ -16,7 +16,7 @@ from gcodejerk.verification.unrolling.values import Parts, Said, Values, code_of
 
 _READS_PLACE = re.compile(rb"<_(?:VALUE|VALUE_RETURNED|CALL_LEVEL|REMAP_LEVEL|LINE)>")
 _ACTIVE = re.compile(rb"[(;][ \t]*PY", re.IGNORECASE)
-_SHOWS = re.compile(rb"[(;][ \t]*(?:PRINT|DEBUG|LOG)[ \t]*,", re.IGNORECASE)
+_SHOWS = re.compile(rb"[(;][ \t]*(?:PRINT|DEBUG|LOG|ABORT)[ \t]*,", re.IGNORECASE)
 _SHOWN = re.compile(rb"#([0-9]+|<[^<>]*>)")
 _CODE = re.compile(rb"([GM])([0-9]+(?:\.[0-9]*)?)")
 _LIBRARY = re.compile(rb"(?:SIN|COS|TAN|EXP|LN)\[|\*\*")
@@ -74,8 +74,7 @@ class Sides:
 
     def _reads_place(self) -> int | None:
         """A line that reads where in the flow it is, which is elsewhere in the other file."""
-        for at in range(self.size):
-            text = self.mine[at]
+        for at, text in enumerate(self.table.text):
             if b"_" in text and _READS_PLACE.search(text.translate(None, b" \t").upper()):
                 return at
         return None
@@ -212,7 +211,7 @@ class Sides:
             return
         code = self.table.code[at]
         parts = self.values.parts(code, self.variables) if parts is None else parts
-        words, sets, comments = parts.words, self._shared(parts), self._comments(at, text)
+        words, sets, comments = parts.words, self._shared(at, parts), self._comments(at, text)
         if not (words or sets or comments):
             return
         if theirs is None or not parts.understood:
@@ -239,9 +238,13 @@ class Sides:
         shows = any(_SHOWS.match(comment) for comment in comments_of(text))
         return (shows and b"#" in text) or self.values.reads_local(self.table.code[at])
 
-    def _shared(self, parts: Parts) -> list[Said]:
+    def _shared(self, at: int, parts: Parts) -> list[Said]:
         """Of what a block sets, that which others see."""
-        return [each for each in parts.sets if not each.name or not self.values.is_local(each.name)]
+        found = [each for each in parts.sets if not (each.name and self.values.is_local(each.name))]
+        if len(found) < len(parts.sets) and any(each.value != each.value for each in parts.sets):
+            # The rest is left out, where LinuxCNC might have stopped with an error.
+            raise self._doubt(at, "a variable of a subprogram is set to what is not known")
+        return found
 
     def _comments(self, at: int, text: bytes) -> list[bytes]:
         """The comments of a block, with what LinuxCNC shows of the subprogram's own variables."""

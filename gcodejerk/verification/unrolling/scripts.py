@@ -30,6 +30,7 @@ _LEADS = re.compile(rb"G0*66(?:\.1)?(?![0-9])|M0*(?:96|198|47)(?![0-9])")
 _RETURNS = re.compile(rb"(?<![A-Z])M0*(?:99|17)(?![0-9])")
 _ENDS = re.compile(rb"(?<![A-Z])M0*(?:2|30)(?![0-9])")
 _DEF = re.compile(rb"(?:N[0-9]+)?DEF(?:REAL|INT|BOOL)")
+_G = re.compile(rb"(?<![A-Z])G[ \t]*([0-9]+(?:\.[0-9]*)?)")
 _HASH = re.compile(rb"#[ \t]*(?:([0-9]+)|[#\[])")
 _NAME = re.compile(rb"(?<![A-Z0-9_$])[A-Z_][A-Z_][A-Z0-9_]*")
 _WORD = re.compile(rb"([A-Z])([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))")
@@ -58,6 +59,8 @@ class FlowWalker(Walker):
         self.here = 0
         self._scopes: list[bool] = []
         """Calls that run, and whether each has variables of its own."""
+        self.called: set[int] = set()
+        """First lines of what was called."""
         self.ended = False
         """The main program has come to its end."""
         self.remarks = {line.strip(b" \t") for at, line in enumerate(lines) if not self._code(at)}
@@ -107,7 +110,8 @@ class FlowWalker(Walker):
         if number != number:
             raise self._doubt("a condition is not known")
         if number != 0.0:
-            self._expect(way.texts[0], way.texts[0].translate(None, b" \t"), state)
+            text = b" ".join([way.texts[0], *self._remarks(self.lines[self.here])])
+            self._expect(text, way.texts[0].translate(None, b" \t"), state)
         return super()._then(way, state)
 
     def _count(
@@ -138,6 +142,7 @@ class FlowWalker(Walker):
         if called.saves:
             raise self._doubt("a subprogram gives modes back")
         self._scopes.append(way.own)
+        self.called.add(called.begin)
         found = super()._call(at, way, state)
         self._scopes.pop()
         self.here = at
@@ -224,6 +229,11 @@ class FlowWalker(Walker):
             return any(name.decode() in computer.kinds for name in _NAME.findall(upper))
         return any(not n or computer.is_local(str(int(n))) for n in _HASH.findall(upper))
 
+    def _remarks(self, line: bytes) -> list[bytes]:
+        """The comments of a line: some are shown to the operator."""
+        comments = self.stepper.text.comments
+        return [] if comments is None else [match[0] for match in comments.finditer(line)]
+
     def _expect_numbers(self, line: bytes, state: Tracker) -> None:
         """The same for a block with variables of a subprogram's own: word by word."""
         if b"/" in line[:4]:
@@ -232,14 +242,28 @@ class FlowWalker(Walker):
         upper = _NUMBER.sub(rb"\1", upper, count=1) if _NUMBER.match(upper) else upper
         inch = state.unit is not None and state.unit != 1.0
         mine = self._said(upper, state, inch)
+        if letter := self._uncertain(upper, state):
+            raise self._doubt(f"what a computed {letter} means is not certain")
         if mine is None:
             raise self._doubt("a number is not known")
         if not (mine[0] or mine[1]):
             return
         got = _NUMBER.sub(rb"\1", self.stepper.upper(self._next()).replace(b"\0", b" "), count=1)
-        if self._names_own(got) or self._said(got, state, inch) != mine:
+        alike = self._said(got, state, inch) == mine
+        if self._names_own(got) or not alike or self._remarks(line) != self._remarks(self._next()):
             raise self._differs(line)
         self.k += 1
+
+    def _uncertain(self, upper: bytes, state: Tracker) -> str:
+        """A computed count or dwell, which the control reads by how it is written."""
+        dialect = self.stepper.dialect
+        codes = {round(float(number) * 10.0) for number in _G.findall(upper)}
+        cycles = bool(codes & dialect.cycles) or (state.cycle is not None and 800 not in codes)
+        letters = dialect.drilling.repeats + "P" if cycles else "P" if 40 in codes else ""
+        found = (
+            letter for letter in letters if re.search(rb"%s[ \t]*-?[#\[]" % letter.encode(), upper)
+        )
+        return next(found, "")
 
     def _said(
         self, upper: bytes, state: Tracker, inch: bool
@@ -325,6 +349,12 @@ def check_script(
         found.add(Kind.MISSING, walker.k + 1, walker.closing + 1, "the closing % is missing")
     elif walker.lost and len(rest) < len(mine) - mains[0].end:
         told = "a subprogram is left out that may still be called"
+        found.add(Kind.FLOW, walker.k + 1, mains[0].end + 1, told)
+    elif len(rest) < len(mine) - mains[0].end and any(
+        mains[0].end <= part.begin < len(mine) and part.begin not in walker.called
+        for part in walker.routes.parts
+    ):
+        told = "a program is left out that nothing here has called"
         found.add(Kind.FLOW, walker.k + 1, mains[0].end + 1, told)
     elif not walker.ended and any(walker.stepper.upper(line).strip(b" \t\0;%") for line in rest):
         found.add(
