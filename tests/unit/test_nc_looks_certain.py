@@ -209,6 +209,20 @@ NOT_CERTAIN = {
         "heidenhain-iso", b"N3 G01 G43 Z5 F9*\nN4 G40*\nN5 G00 Z9*\n", Reason.START_UNKNOWN
     ),
     "beside a linear one": ("linuxcnc", b"G0 X3 A5\n", Reason.ROTARY_WAY),
+    "an arc that misses its end": ("grbl", b"G2 X10 Y0 I5.6\nG0 X0\n", Reason.START_UNKNOWN),
+    "an arc whose radius is too small": ("grbl", b"G2 X10 R3\nG0 X0\n", Reason.START_UNKNOWN),
+    "an arc without its plane": ("grbl", b"G2 Z3 I5\nG0 Z50\n", Reason.START_UNKNOWN),
+    "an arc from an unknown place": (
+        "grbl", b"M0\nG2 X10 Y0 I5\nG0 X0\n", Reason.START_UNKNOWN
+    ),
+    "such an arc in inches": ("grbl", b"G20\nG2 X.5 R.2\nG0 X0\n", Reason.START_UNKNOWN),
+    "such an arc by increments": (
+        "grbl", b"G91 G2 X10 I5.6\nG90 G0 X0\n", Reason.START_UNKNOWN
+    ),
+    "such an arc among many lines": (
+        "grbl", b"G1 X1\n" * 40 + b"G3 X10 Y0 I4\nG1 Y1\n" + b"Y3\n" * 40 + b"G0 X0\n",
+        Reason.START_UNKNOWN,
+    ),
 }  # fmt: skip
 
 
@@ -265,6 +279,14 @@ STILL_CERTAIN = {
         "heidenhain-iso", b"N3 G00 X5 M99*\nN4 G00 X5 Y5 Z9*\nN5 G00 X9*\n"
     ),
     "a rotary axis that stays": ("linuxcnc", b"G0 X5 A10\n"),
+    "an arc that meets its end": ("grbl", b"G2 X10 Y0.003 I5\nG3 X0 Y0 R8\nG0 X5\n"),
+    "arcs among many lines": (
+        "grbl", b"G1 X1\n" * 40 + b"G3 X11 Y0 I5 J0\nX1 I-5\nG1 X5\nY3\n" * 20 + b"G0 X0\n"
+    ),
+    "behind an arc that misses its end": (
+        "grbl", b"G2 X10 Y0 I5.6\nG0 X0 Y0 Z9 F90\nG1 X3\nG0 X5\n"
+    ),
+    "an arc of LinuxCNC, which stops": ("linuxcnc", b"G2 X10 Y0 I5.6\nG0 X0\n"),
 }  # fmt: skip
 
 

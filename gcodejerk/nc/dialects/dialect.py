@@ -294,6 +294,8 @@ class Dialect:
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rapid: int = 0
     arcs: frozenset[int] = frozenset({20, 30})
+    arcs_refused: bool = False
+    """An arc that does not meet its end is refused, and whoever sends the program may go on."""
     harmless: frozenset[int] = frozenset({0})
     """G codes whose effect does not depend on when, within its block, a rapid runs."""
     before_m: frozenset[int] = frozenset()

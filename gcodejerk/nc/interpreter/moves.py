@@ -70,6 +70,8 @@ def go_to_machine_position(state: State, values: dict[str, float], dialect: Dial
         if letter in values:
             at = _named_place(state, axis, values[letter] * state.scale(axis))
             state.move(axis, NAN if state.distance == G91 else at)
+    if state.transformed:
+        state.forget_positions(range(2))  # one axis of the machine is both of a turned frame
 
 
 def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:

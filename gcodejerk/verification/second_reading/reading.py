@@ -142,6 +142,8 @@ class Text:
         self.delete = re.compile(rb"[ \t]*" + number + rb"/" + level)
         self.declared: set[bytes] = set()
         """Variables with a name."""
+        self.tried = -1, -1
+        """Begin and end of a run that was not taken."""
         self.run, self.run_stated, self.run_on = self._runs(decimals_matter)
 
     def _runs(self, decimals_matter: bool) -> tuple[re.Pattern[bytes], ...]:
