@@ -223,6 +223,20 @@ NOT_CERTAIN = {
         "grbl", b"G1 X1\n" * 40 + b"G3 X10 Y0 I4\nG1 Y1\n" + b"Y3\n" * 40 + b"G0 X0\n",
         Reason.START_UNKNOWN,
     ),
+    "behind a rounded corner": (
+        "siemens", b"G1 X10 RND=5\nG0 Y10\n", Reason.START_UNKNOWN
+    ),
+    "a corner that is cut, and Z between": (
+        "siemens", b"G1 X10 CHF=5\nG0 Z10\n", Reason.START_UNKNOWN
+    ),
+    "rounded corners": (
+        "siemens", b"RNDM=5\nG1 X5 Y5\nG0 X10 Y0\nG0 Y10\n", Reason.START_UNKNOWN
+    ),
+    "a macro of Marlin": ("marlin", b"M810\nG0 X5 Y5 Z5\nG0 X9 F6000\n", NO_DISTANCE),
+    "what Marlin writes to a file": (
+        "marlin", b"M28 A\nG21\nG90\nG0 X5 Y5 Z5\nM29\nG0 X9 F6000\n", NO_DISTANCE
+    ),
+    "a macro of Klipper": ("klipper", b"M600\nG0 X5 Y5 Z5\nG0 X9 F6000\n", NO_DISTANCE),
 }  # fmt: skip
 
 
@@ -287,6 +301,11 @@ STILL_CERTAIN = {
         "grbl", b"G2 X10 Y0 I5.6\nG0 X0 Y0 Z9 F90\nG1 X3\nG0 X5\n"
     ),
     "an arc of LinuxCNC, which stops": ("linuxcnc", b"G2 X10 Y0 I5.6\nG0 X0\n"),
+    "a text of Marlin": ("marlin", b"M117 Hello G91 #1\nN5 M118 G91 World*3\nG0 X5 F900\n"),
+    "rounded corners no more": (
+        "siemens", b"RNDM=5\nG1 X5 Y5\nRNDM=0\nG1 X5 Y5\nG0 X10 Y0\nG0 Y10\n"
+    ),
+    "behind the corner's other side": ("siemens", b"G1 X10 RND=5\nY10\nG1 X9 Y9\nG0 Y8\n"),
 }  # fmt: skip
 
 

@@ -37,6 +37,9 @@ def go_straight(state: State, codes: Codes, step: Step) -> None:
             else:
                 value = NAN  # the shortest way, or this way round: the machine decides
             state.move(axis, value)
+    if "scaling" in codes.g:
+        # Beside G51 they are its centre; beside G50 no manual has any.
+        state.forget_positions(AXES.index(axis) for axis in codes.moved())
 
 
 def _before_increment(state: State, axis: int) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, Effect
-from gcodejerk.nc.dialects.gcodes import G1, G40, G43, G49, G80, G90, G91
+from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.second_reading.circling import Circling
@@ -172,6 +172,8 @@ class Tracker(Circling):
         if any(effect in ("transform", "swivel", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
+        if not {"corner", "corners"}.isdisjoint(line.effects):
+            self.bars["corners that are cut"] = None
         self.bar_for_good(any(self.is_unknown(letter, n) for letter, n, _ in line.words))
         self.strayed = True
         return Observation()
@@ -210,6 +212,8 @@ class Tracker(Circling):
                 self.feed = NAN
             self.feed_mode = mode
         taken = "words" in kinds or (self.dialect.one_command and not g)
+        if "F" in values and taken and not self.dialect.one_command and G4 not in g.values():
+            self.feed = NAN
         if "F" in values and not taken:
             self.feed, self.feed_whole = values["F"], self.matters(block.feed_whole)
 
@@ -363,6 +367,7 @@ class Tracker(Circling):
                 elif how is not None or distance is not None:
                     there = self.absolutely(k, there)
                 self.at[k] = NAN if distance is None and how is None else there
+        self.lose(_letters(block.axes) if "scaling" in block.g else "")
 
     def _why_not(self, block: Sorted, seen: Observation) -> None:
         """Whether the move was a rapid in a known frame."""
