@@ -332,6 +332,7 @@ CASES = [
     # a break is remembered by the interpreter, and ends a later do
     b"#1=0\no1 while [#1 LT 3]\n#1=[#1+1]\no2 if [#1 EQ 1]\no1 break\no2 endif\no1 endwhile\n"
     b"#2=0\no3 do\n#2=[#2+1]\nG0 X#2\no3 while [#2 LT 3]\nG0 Y1\nM2\n",
+    b"G0 X1 Y1\nG10 L2 P1 R45\nG0 X2\nG53 G0 Y2\nG0 Z1\nG10 L2 P1 R0\nG0 Y1\nM2\n",
     b"o1 while [#5420 LT 3]\nG91 G0 X1\no1 endwhile\nG90 G0 Y1\nM2\n",
 ]
 

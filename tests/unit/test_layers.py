@@ -86,7 +86,7 @@ NEVER = {
 }
 """What the picture alone would allow, or what matters enough to be said twice."""
 SECOND_READER = (
-    *("reading", "sorting", "known", "coding", "drilling", "tracking"),
+    *("reading", "sorting", "known", "coding", "drilling", "circling", "tracking"),
     *("operating", "computing", "routes", "walking", "klartext", "straight"),
 )
 """Modules of `verification` that read programs without the help of `nc`, but for its tables."""

@@ -408,7 +408,9 @@ def test_where_a_back_boring_cycle_ends_is_not_known():
 
 
 def test_a_rounded_corner_ends_where_it_is_programmed():
-    assert same(end(b"G90\nG1 X10 Y5 RND=2 F100\n", "siemens", SIEMENS)[:2], (10.0, 5.0))
+    rounded = b"G90\nG1 X10 Y5 RND=2 F100\n"
+    assert all(map(math.isnan, end(rounded, "siemens", SIEMENS)[:2]))
+    assert same(end(rounded + b"X9 Y3\n", "siemens", SIEMENS)[:2], (9.0, 3.0))
     assert math.isnan(end(b"G90\nG1 X10 ANG=30 F100\n", "siemens", SIEMENS)[1])
 
 

@@ -12,6 +12,7 @@ MODES = "G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\n"
 START, ROTATION = Reason.START_UNKNOWN, Reason.ROTATION
 COMPENSATION, CHANGE = Reason.CUTTER_COMPENSATION, Reason.FRAME_CHANGE
 PLACES = {"G54": {"X": 0.0, "Y": 0.0, "Z": -200.0}}
+C = {"C": "none"}
 HOME = {"X": 0.0, "Y": 0.0, "Z": 0.0}
 MIRRORED = "G51.1 X0. Y0.\nG1 X5. Y5.\n"
 DRILLED = "G98 G81 X1. Z-5. R2. F9.\n"
@@ -98,6 +99,21 @@ NOT_CERTAIN = {
     "parameters of Centroid": (
         "centroid", f"G10 P81 R5.\n{MODES}G0 X1. Y1. Z1.\nX2.\n", Reason.SYSTEM_WRITTEN, {}
     ),
+    "a spindle that is the C axis": ("fanuc", "G0 C5.\nM3 S9\nC9.\n", START, {"wraps": C}),
+    "of a lathe's": ("fanuc-lathe-a", "G0 C5.\nM19\nC9.\n", START, {"wraps": C}),
+    "of a Haas": ("haas", "G0 C5.\nM4 S9\nC9.\n", START, {"wraps": C}),
+    "a mirror by an M code": (
+        "fanuc", f"M21\n{MODES}G0 X1. Y1. Z1.\nX5.\n", ROTATION, {}
+    ),
+    "so of the kin's": ("syntec", f"M22\n{MODES}G0 X1. Y1. Z1.\nX5.\n", Reason.NOT_UNDERSTOOD, {}),
+    "axis words beside G50": ("fanuc", "G0 G50 X7.\nX9.\n", START, {}),
+    "so of Mach": ("mach", "G50 X7.\nG0 X9.\n", START, {}),
+    "a code that may last": (
+        "fanuc", f"G51.2 P1 Q2\n{MODES}G0 X1. Y1. Z1.\nX5.\n", ROTATION, {}
+    ),
+    "the same of Haas": (
+        "haas", f"G43.7 H2\n{MODES}G0 X1. Y1. Z1.\nX5.\n", ROTATION, {}
+    ),
 }  # fmt: skip
 
 
@@ -139,6 +155,9 @@ STILL_CERTAIN = {
         "fanuc", "G99 " + DRILLED[4:] + "G55 X5.\nG80\nG0 Z9.\n", {}
     ),
     "drilled in G17": ("fanuc", "G99 G81 X9. Y-5. Z2. R3. F9.\nG80\nG0 Z5.\n", {}),
+    "an axis that no spindle turns": ("fanuc", "G0 A5.\nM3 S9\nA9.\n", {"wraps": {"A": "none"}}),
+    "G50 alone": ("fanuc", "G50\nG0 X9.\n", {}),
+    "a relay of Haas": ("haas", f"M21\n{MODES}G0 X1. Y1. Z1.\nX5.\n", {}),
 }  # fmt: skip
 
 
@@ -162,3 +181,10 @@ def test_a_program_that_is_not_followed_may_have_measured_a_tool():
 def test_a_mirror_without_axes_is_ended_by_nobody_for_certain(dialect):
     text = MIRRORED + "G50.1\nG0 X5. Y5.\nX6.\n"
     assert read(text.encode(), dialect)[-1] == ROTATION
+
+
+@pytest.mark.parametrize("beside", ["G51.1 X0.", "G50.1 X0.", "G22 X9."])
+def test_whether_f_beside_it_is_a_feed_nobody_says(beside):
+    """A stream puts the F back that is in force behind it."""
+    text = f"{beside} F90.\nG50.1 X0.\nG0 X5. Y5.\nX6.\nG1 Y6.\n"
+    assert read(text.encode(), "fanuc")[-1] == Reason.FEED_UNKNOWN

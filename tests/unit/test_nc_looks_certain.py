@@ -209,6 +209,34 @@ NOT_CERTAIN = {
         "heidenhain-iso", b"N3 G01 G43 Z5 F9*\nN4 G40*\nN5 G00 Z9*\n", Reason.START_UNKNOWN
     ),
     "beside a linear one": ("linuxcnc", b"G0 X3 A5\n", Reason.ROTARY_WAY),
+    "an arc that misses its end": ("grbl", b"G2 X10 Y0 I5.6\nG0 X0\n", Reason.START_UNKNOWN),
+    "an arc whose radius is too small": ("grbl", b"G2 X10 R3\nG0 X0\n", Reason.START_UNKNOWN),
+    "an arc without its plane": ("grbl", b"G2 Z3 I5\nG0 Z50\n", Reason.START_UNKNOWN),
+    "an arc from an unknown place": (
+        "grbl", b"M0\nG2 X10 Y0 I5\nG0 X0\n", Reason.START_UNKNOWN
+    ),
+    "such an arc in inches": ("grbl", b"G20\nG2 X.5 R.2\nG0 X0\n", Reason.START_UNKNOWN),
+    "such an arc by increments": (
+        "grbl", b"G91 G2 X10 I5.6\nG90 G0 X0\n", Reason.START_UNKNOWN
+    ),
+    "such an arc among many lines": (
+        "grbl", b"G1 X1\n" * 40 + b"G3 X10 Y0 I4\nG1 Y1\n" + b"Y3\n" * 40 + b"G0 X0\n",
+        Reason.START_UNKNOWN,
+    ),
+    "behind a rounded corner": (
+        "siemens", b"G1 X10 RND=5\nG0 Y10\n", Reason.START_UNKNOWN
+    ),
+    "a corner that is cut, and Z between": (
+        "siemens", b"G1 X10 CHF=5\nG0 Z10\n", Reason.START_UNKNOWN
+    ),
+    "rounded corners": (
+        "siemens", b"RNDM=5\nG1 X5 Y5\nG0 X10 Y0\nG0 Y10\n", Reason.START_UNKNOWN
+    ),
+    "a macro of Marlin": ("marlin", b"M810\nG0 X5 Y5 Z5\nG0 X9 F6000\n", NO_DISTANCE),
+    "what Marlin writes to a file": (
+        "marlin", b"M28 A\nG21\nG90\nG0 X5 Y5 Z5\nM29\nG0 X9 F6000\n", NO_DISTANCE
+    ),
+    "a macro of Klipper": ("klipper", b"M600\nG0 X5 Y5 Z5\nG0 X9 F6000\n", NO_DISTANCE),
 }  # fmt: skip
 
 
@@ -265,6 +293,19 @@ STILL_CERTAIN = {
         "heidenhain-iso", b"N3 G00 X5 M99*\nN4 G00 X5 Y5 Z9*\nN5 G00 X9*\n"
     ),
     "a rotary axis that stays": ("linuxcnc", b"G0 X5 A10\n"),
+    "an arc that meets its end": ("grbl", b"G2 X10 Y0.003 I5\nG3 X0 Y0 R8\nG0 X5\n"),
+    "arcs among many lines": (
+        "grbl", b"G1 X1\n" * 40 + b"G3 X11 Y0 I5 J0\nX1 I-5\nG1 X5\nY3\n" * 20 + b"G0 X0\n"
+    ),
+    "behind an arc that misses its end": (
+        "grbl", b"G2 X10 Y0 I5.6\nG0 X0 Y0 Z9 F90\nG1 X3\nG0 X5\n"
+    ),
+    "an arc of LinuxCNC, which stops": ("linuxcnc", b"G2 X10 Y0 I5.6\nG0 X0\n"),
+    "a text of Marlin": ("marlin", b"M117 Hello G91 #1\nN5 M118 G91 World*3\nG0 X5 F900\n"),
+    "rounded corners no more": (
+        "siemens", b"RNDM=5\nG1 X5 Y5\nRNDM=0\nG1 X5 Y5\nG0 X10 Y0\nG0 Y10\n"
+    ),
+    "behind the corner's other side": ("siemens", b"G1 X10 RND=5\nY10\nG1 X9 Y9\nG0 Y8\n"),
 }  # fmt: skip
 
 

@@ -73,6 +73,8 @@ Effect = Literal[
     "further shift",  # the axis words shift it by so much more
     "turned frame",  # turns, scales or mirrors the frame that "shift" ends; bare, it ends it too
     "further turn",  # the same on top of what is in force; bare, nobody knows
+    "corner",  # the corner behind its block is cut, so that the next one begins elsewhere
+    "corners",  # so are all that follow, until it is 0
     "smoothing",  # selects a continuous path; without a first argument, or with 0, nobody knows
     "turn",  # positions a spindle, which may be a rotary axis as well
     "watch",  # what is said here may act at any time from here on
@@ -198,8 +200,8 @@ class Dialect:
     base_frames: bool = False
     """Between machine and work systems lie frames that the program does not name, and that G53 may
     leave in force."""
-    spindle_turns: bool = False
-    """What M3 turns may be a rotary axis as well."""
+    spindle_turns: str = ""
+    """Rotary axes that what M3 turns may be as well."""
     distance_first: bool = False
     """G90 and G91 may count for the words behind them alone."""
     polar: str = ""
@@ -294,6 +296,8 @@ class Dialect:
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rapid: int = 0
     arcs: frozenset[int] = frozenset({20, 30})
+    arcs_refused: bool = False
+    """An arc that does not meet its end is refused, and whoever sends the program may go on."""
     harmless: frozenset[int] = frozenset({0})
     """G codes whose effect does not depend on when, within its block, a rapid runs."""
     before_m: frozenset[int] = frozenset()

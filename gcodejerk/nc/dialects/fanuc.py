@@ -14,7 +14,8 @@ not known. G53, G28 and G30 cancel the vector of a tool length (B-63844EN/02 p. 
 beside G51.1 and G50.1 are those that are mirrored and no longer mirrored (ISO dialect of Siemens,
 3-65). Whether cycles drill along Z in G18 and G19, too (5101#0), whether G60 is modal (5431#0) and
 which codes of the list of the 30i turn or shift for good, is general knowledge, used to leave
-rapids alone.
+rapids alone. So is that M21 to M23 mirror the axes of older controls, and that C, or on a
+lathe any rotary axis, is what M3 turns.
 A thread (G32, G33) ends at its words and stays there: Haas lathes, G32 ("no automatic position
 return is performed at the end"); ADT-CNC4620 programming manual p. 27 (X, Z: end of the thread).
 Of threads of changing lead (G34) no page was found.
@@ -47,8 +48,12 @@ _TURNS = (683, 684)
 """Tilted planes, besides G68.2, until G69."""
 _SPACE = (412, 413, 414, 415, 416, 422, 424, 425, 426)
 """Cutter compensation in space, until G40."""
-_LASTING = (70, 411, 421, 542, 543, 544)
-"""An axis that does not move, one that turns with the path, offsets that follow rotary axes."""
+_LASTING = (
+    *(70, 411, 421, 542, 543, 544),
+    *(106, 124, 437, 438, 439, 512, 514, 515, 516, 811, 814, 815, 1610),
+)
+"""An axis that does not move, one that turns with the path, offsets that follow rotary axes; axes
+that turn, follow or swing with others (G51.2 to G51.6, G81.1, G81.4), and other lengths (G43.7)."""
 
 _EFFECTS: dict[int, Effect] = {
     40: "words",  # G4 X1.5 is a dwell of 1.5 s
@@ -150,6 +155,8 @@ FANUC = Dialect(
     length_moves=True,  # 5006#6
     length_word="H",
     tool_word_moves=True,  # 6001#5: T calls O9000
+    spindle_turns="C",  # Cs contour control
+    m_bars=dict.fromkeys((21, 22, 23), "mirror by M code"),
     p_selects=frozenset(SYSTEMS),
     transforms={
         **dict.fromkeys((680, 682, *_TURNS), ("rotation", True)),
@@ -269,6 +276,8 @@ _LATHE = replace(
     contours=frozenset({710, 720, 730}),
     drilling=Drilling(),
     length_moves=False,
+    spindle_turns="ABC",
+    m_bars={},
     tool_word_moves=False,
     tool_cancelled_by_return="no",
     length_word="",

@@ -114,6 +114,7 @@ GRBL = Dialect(
     },
     strict=True,
     paths={610: 64},
+    arcs_refused=True,
     dark_rapids=True,
     beam_codes=frozenset({4}),
     incremental_set=True,

@@ -81,6 +81,7 @@ HAAS = replace(
     # L repeats; K is the least depth of a peck (G73 and G83, 96-8000 pp. 185, 191).
     drilling=replace(FANUC.drilling, repeats="L"),
     packed_repeats=False,
+    m_bars={},  # M21 to M28 are relays
     tool_word_moves=False,
     tool_cancelled_by_return="all",
     bare_return=True,

@@ -38,6 +38,7 @@ KLIPPER = replace(
     bare_set="zero",
     refused=frozenset(),
     redrawn=frozenset({20, 30, 50}),
+    other_m="unknown",  # a macro of the owner's, perhaps
     dark_rapids=False,  # M3 is a macro there, if anything; a laser is declared
     names={
         **dict.fromkeys(

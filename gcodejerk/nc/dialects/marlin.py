@@ -25,6 +25,8 @@ SILENT = (
     *(906, 907, 908, 909, 910, 911, 912, 913, 914),
 )
 """M codes that move nothing and change no frame."""
+MACROS = (28, 29, 32, 808, *range(810, 820))
+"""What is written to a file instead of run, another file, a loop, macros (src/gcode/gcode.cpp)."""
 EFFECTS: dict[int, Effect] = {
     40: "words",
     100: "words",  # firmware retract: E, and Z where it hops, which G11 takes back
@@ -41,6 +43,7 @@ MARLIN = Dialect(
     title="Marlin 2",
     sources=("marlinfw.org: gcode pages", "MarlinFirmware/Marlin issues 7165, 24625"),
     text=Text(
+        messages=True,  # src/gcode/parser.cpp: string_arg
         parentheses="lone comment",
         capitals=True,
         semicolon="comment",
@@ -63,7 +66,9 @@ MARLIN = Dialect(
             "non-modal": tuple(sorted(set(EFFECTS) - set(SYSTEMS) | {800})),
         }
     ),
-    m_groups=grouped({"stop": (0, 1, 2, 30), "spindle": (3, 4, 5), "silent": SILENT}),
+    m_groups=grouped(
+        {"stop": (0, 1, 2, 30), "spindle": (3, 4, 5), "silent": SILENT, "macro": MACROS}
+    ),
     # No code changes these.
     defaults={"plane": 170, "feed mode": 940, "compensation": 400, "path": 640},
     effects=EFFECTS,

@@ -89,6 +89,7 @@ def _read_in_part(name: str, title: str, *sources: str, apart: str = "") -> Dial
         redrawn=frozenset({800}),
         strict=False,
         refused=frozenset(),
+        arcs_refused=False,  # they run their files themselves, and stop
         macro_change=True,
         unknown_lasts=True,
         apart=frozenset(apart),

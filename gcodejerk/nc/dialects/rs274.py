@@ -90,6 +90,7 @@ RS274 = Dialect(
     diameter_codes=True,
     refused=GRBL.refused,
     feed_before_units=True,
+    arcs_refused=True,
     dark_rapids=True,
     # Centroid's control has programs like these, and moves Z apart; nothing may tell it from them.
     apart=frozenset("Z"),

@@ -39,7 +39,7 @@ _SILENT = (
     *("COMPON", "COMPOF", "COMPCAD", "COMPCURV", "CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
     *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
-    *("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM", "SF", "SCC"),  # corners: the end stays
+    *("FRC", "FRCM", "SF", "SCC"),
     *("DYNFINISH", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
     *("FNORM", "FIFOCTRL", "WAITM", "WAITMC", "SETM", "CLEARM"),  # F as it is; waiting for channels
 )
@@ -97,6 +97,10 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys(_FURTHER, "further turn"),
     **dict.fromkeys(("SPOS", "SPOSA"), "turn"),
     "CYCLE832": "smoothing",
+    # Between the block and the next that moves in the plane, G0 too; none behind four blocks that
+    # do not: cncforum.net, "Rounding and Chamfer".
+    **dict.fromkeys(("RND", "CHF", "CHR"), "corner"),
+    "RNDM": "corners",
     **dict.fromkeys(_WATCHES, "watch"),
     "TRAFOOF": "frames",
     **dict.fromkeys(_TURNED, "transform"),
@@ -191,7 +195,7 @@ SIEMENS = Dialect(
     tool_frame=frozenset("TD"),
     length_turns=True,
     shifts_travel=True,
-    spindle_turns=True,
+    spindle_turns="ABC",
     base_frames=True,
     other_m="positions",
     redrawn=frozenset({330, 340, 350, 630, 3310, 3320}),

@@ -5,8 +5,11 @@ It is a part of `gcodejerk.nc.dialects.dialect`, and holds to its rules.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
+
+_MESSAGE = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?M11[78](?![0-9.])")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,8 @@ class Text:
     """``//`` begins a comment."""
     python: bool = False
     """A comment may run a program: ``(py, ...)``."""
+    messages: bool = False
+    """Behind M117 and M118 the rest of the line is text."""
     live_comments: bool = False
     """One that begins with a word and a comma may do something: ``(expr, ...)``, but for texts."""
     delete: Literal["first", "numbered", "ignored", "none"] = "first"
@@ -64,6 +69,11 @@ class Text:
     """What ends every block."""
     line_limit: int = 512
     """Longest line that the controller reads, in bytes."""
+
+    def unsaid(self, text: bytes) -> bytes:
+        """Cut a line where its message begins."""
+        message = _MESSAGE.match(text) if self.messages else None
+        return text if message is None else message[0]
 
 
 @dataclass(frozen=True, slots=True)

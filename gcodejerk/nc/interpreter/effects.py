@@ -16,6 +16,7 @@ from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.expressions import evaluate
 from gcodejerk.nc.interpreter.flow_words import known_behind
 from gcodejerk.nc.interpreter.modal import NAN, State
+from gcodejerk.nc.interpreter.moves import plane_axes
 from gcodejerk.nc.interpreter.named_cycles import certain_call, come_back
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import converted, fills, named_assignment
@@ -189,6 +190,23 @@ class Effects:
                 tolerance = name.arguments.strip(b"( \t)").partition(b",")[0].strip(b" \t")
                 if self.state.path != CONTINUOUS or not tolerance.strip(b"0."):
                     self.state.lose("path")
+
+    def _corners(self, codes: Codes) -> None:
+        """RND=5, CHF=5, RNDM=5: the next block begins beside the end of this one."""
+        state = self.state
+        plane = (
+            {AXES[axis] for axis in plane_axes(state)} if "rounded corner" in state.bars else set()
+        )
+        if not codes.names and not plane.isdisjoint(codes.moved()):
+            frames.end_bar(state, "rounded corner")
+        for name in codes.names:
+            effect = self._named(name)
+            if effect not in ("corner", "corners"):
+                continue
+            ends = effect == "corners" and not name.arguments.strip(b"= \t+-").strip(b"0.")
+            bars = {} if effect == "corner" else {"rounded corners": not ends}
+            state.put("bars", {**state.bars, **bars, "rounded corner": True})
+            state.forget_positions(plane_axes(state))
 
     def _swivel(self, names: list[Name], step: Step) -> None:
         """CYCLE800(..) turns the plane, CYCLE800() turns it back; where the axes go, it says."""

@@ -57,6 +57,9 @@ BARS = {
     "feed group": Reason.FEED_GROUP,
     "feed override": Reason.FEED_SCALED,
     "another language": Reason.NOT_UNDERSTOOD,
+    "mirror by M code": Reason.ROTATION,  # for good
+    "rounded corner": Reason.START_UNKNOWN,  # until a move in its plane
+    "rounded corners": Reason.START_UNKNOWN,  # until RNDM=0
     "exact path": Reason.PATH_UNKNOWN,
     "synchronized action": Reason.NOT_FOLLOWED,  # for good
     "unknown code": Reason.NOT_UNDERSTOOD,  # for good

@@ -11,6 +11,7 @@ from __future__ import annotations
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.interpreter import frames
+from gcodejerk.nc.interpreter.arcs import in_doubt
 from gcodejerk.nc.interpreter.beams import inline_power
 from gcodejerk.nc.interpreter.codes import Codes, sort_words
 from gcodejerk.nc.interpreter.eligibility import Call, Step, looks_rapid, why_left_alone
@@ -93,8 +94,11 @@ class Executor(Phases):
         if block.assigns:
             assign(block, values, state, rules)
         code = _first_refused(codes, self.dialect)
-        if code:
-            self._run_or_refuse(codes, step, code)
+        doubt = self.dialect.arcs_refused and in_doubt(codes, state, self.dialect)
+        if code or doubt is not False:
+            self._run_or_refuse(codes, step, code or "the arc")
+            if doubt is None and not code:
+                step.fault, step.refused = False, ""  # nothing is known against it
         else:
             self.act(codes, step)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import LINEAR, Dialect, Effect
+from gcodejerk.nc.dialects.dialect import Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G90
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -102,9 +102,9 @@ def turn_length(state: State) -> None:
         state.forget_positions()
 
 
-def turn_spindle(state: State) -> None:
-    """A spindle turns, which may be a rotary axis as well."""
-    state.forget_positions(k for k, axis in enumerate(AXES) if axis not in LINEAR)
+def turn_spindle(state: State, axes: str = "ABC") -> None:
+    """A spindle turns, which may be one of these rotary axes as well."""
+    state.forget_positions(AXES.index(axis) for axis in axes)
 
 
 def numbered_system(number: float) -> int:

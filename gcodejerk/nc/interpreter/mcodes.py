@@ -18,7 +18,7 @@ from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import forget_shared
 
 _CALLS = frozenset({47, 96, 97, 98, 198})
-"""M codes that go on elsewhere, or may."""
+"""M codes that go on elsewhere, or may, besides those of the group "macro"."""
 
 
 def run_m_code(
@@ -52,8 +52,8 @@ def run_m_code(
     group = dialect.m_groups.get(m)
     if m in (3, 4, 5) and group == "spindle":
         state.put("spindle", m)
-    if group == "spindle" and dialect.spindle_turns:
-        turn_spindle(state)
+    if group == "spindle":
+        turn_spindle(state, dialect.spindle_turns)
     if group is None or m == 6 or group == "user":
         # A tool change may go anywhere, and so may a program of the user's.
         forget_shared(state, dialect.arithmetic)
@@ -67,7 +67,7 @@ def run_m_code(
         if m == 72:
             state.forget_modes()
             state.forget_positions()
-    return group is not None and m in _CALLS and step.call is None
+    return group == "macro" or (group is not None and m in _CALLS and step.call is None)
 
 
 def _behind_macro(state: State) -> None:

@@ -37,6 +37,9 @@ def go_straight(state: State, codes: Codes, step: Step) -> None:
             else:
                 value = NAN  # the shortest way, or this way round: the machine decides
             state.move(axis, value)
+    if "scaling" in codes.g:
+        # Beside G51 they are its centre; beside G50 no manual has any.
+        state.forget_positions(AXES.index(axis) for axis in codes.moved())
 
 
 def _before_increment(state: State, axis: int) -> float:
@@ -70,6 +73,8 @@ def go_to_machine_position(state: State, values: dict[str, float], dialect: Dial
         if letter in values:
             at = _named_place(state, axis, values[letter] * state.scale(axis))
             state.move(axis, NAN if state.distance == G91 else at)
+    if state.transformed:
+        state.forget_positions(range(2))  # one axis of the machine is both of a turned frame
 
 
 def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:

@@ -83,6 +83,7 @@ class Phases(Effects):
         self._names(codes, step)
         self._path(codes)
         self._motion(codes, step)
+        self._corners(codes)
         self._beams(codes, step)
         step.end = self.state.position.copy()
         self._stop(codes, step)
@@ -100,7 +101,11 @@ class Phases(Effects):
 
     def _feed(self, codes: Codes, step: Step) -> None:
         """F, where it is a feed: in a dwell it may be a time."""
-        if "F" not in codes.values or self._dwells(codes):
+        if "F" not in codes.values:
+            return
+        if self._dwells(codes):
+            if not self.dialect.one_command and codes.g.get("non-modal") != G4:
+                self.state.put("feed", NAN)  # a feed, or for what takes the other words
             return
         feed = codes.values["F"]
         self.state.put("feed", feed)

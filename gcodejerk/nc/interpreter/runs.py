@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LINEAR, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G40, G90, G91
+from gcodejerk.nc.interpreter.arcs import cut_words, doubtful
 from gcodejerk.nc.interpreter.eligibility import BARS, ENDING
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
-
-Column = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 _AXIS_BITS = (1 << len(AXES)) - 1
 _CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
@@ -84,13 +83,6 @@ def _sure(
     return sure
 
 
-def _words(lines: Lines, letter: str, first: int, last: int) -> Column:
-    """Cut one letter's words to a run; lines counted from the run's first."""
-    at, value = lines.column(letter)
-    lower, upper = np.searchsorted(at, (first, last))
-    return at[lower:upper] - first, value[lower:upper]
-
-
 def run_plain(
     state: State,
     log: RapidLog,
@@ -126,9 +118,12 @@ def run_plain(
     """
     assert state.motion is not None
     letters = lines.letters[first:last]
-    codes, code_values = _words(lines, "G", first, last)
+    codes, code_values = cut_words(lines, "G", first, last)
     motion = _spread(codes, code_values.astype(np.uint8), state.motion // 10, last - first)
     sure = _sure(letters, motion, state)
+    if dialect.arcs_refused and state.unit is not None:
+        arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (_AXIS_BITS | _ARC_WORDS) != 0))
+        sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
     if not sure.all():
         last = first + int(np.argmin(sure))
         letters, motion = letters[: last - first], motion[: last - first]
@@ -138,7 +133,7 @@ def run_plain(
     named = (letters & _AXIS_BITS).astype(np.uint16)
     moves = (named != 0) | ((motion >= 2) & (letters & _CENTRES != 0))
     events = np.where(moves & (motion != 0), np.uint8(USES_FEED), np.uint8(0))
-    feeds, feed_values = _words(lines, "F", first, last)
+    feeds, feed_values = cut_words(lines, "F", first, last)
     events[feeds] = GIVES_FEED
     rapid = np.flatnonzero((named != 0) & (motion == 0))
 
@@ -177,7 +172,7 @@ def _positions(
     start = np.empty((len(rapid), len(AXES)))
     target = np.empty_like(start)
     for axis, letter in enumerate(AXES):
-        at, value = _words(lines, letter, first, last)
+        at, value = cut_words(lines, letter, first, last)
         history = np.concatenate([[state.position[axis]], value * state.scale(axis)])
         if state.distance == G91:
             history = np.add.accumulate(history)

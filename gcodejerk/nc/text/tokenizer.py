@@ -401,8 +401,8 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     Block
         With a `problem` where the controller would refuse the line.
     """
-    text = text.rstrip(b"\r")  # CR CR LF, which a transfer in text mode makes of CR LF
     rules = dialect.text
+    text = rules.unsaid(text.rstrip(b"\r"))  # CR CR LF: a transfer in text mode made it of CR LF
     if rules.klartext:
         return parse_klartext(text, dialect)
     if not (rules.names or rules.hexadecimal) and _PLAIN.fullmatch(text):

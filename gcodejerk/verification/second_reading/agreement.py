@@ -285,8 +285,7 @@ def _from_above(
                 line = lines[following] if following < len(lines) else math.inf
                 continue
             behind = behind if taken is None else taken[1]
-            stated = not tracker.feeding
-            run = text.take_run(data, at, stated=stated) if tracker.may_run else None
+            run = tracker.take_run(text, data, at)
             if run is not None:
                 tracker.run(run[0])
                 number, at = number + run[0].lines, run[1]

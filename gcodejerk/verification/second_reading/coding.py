@@ -176,11 +176,11 @@ class Codes(Known):
             group = self.dialect.m_groups.get(m)
             if group == "spindle" and m in (3, 4, 5):
                 self.spindle = m
-            if group == "spindle" and self.dialect.spindle_turns:
-                self.lose("".join(axis for axis in AXES if axis not in LINEAR))
+            if group == "spindle":
+                self.lose(self.dialect.spindle_turns)
             if group == "stop" and m in _ENDS:
                 ends = True
-            elif m in _CALLS and group is not None:
+            elif group == "macro" or (m in _CALLS and group is not None):
                 self.unknown_call()
             elif group is None and self.dialect.other_m == "unknown":
                 self.forget()

@@ -60,6 +60,7 @@ _PADDED = re.compile(rb"(?<![A-Z_])[GM](?:[ \t]|0[0-9])", re.IGNORECASE)
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
 _SPINDLE = re.compile(rb"\$(-?[0-9]+)\.?(?![-+0-9.#\[])")
+_SAYING = re.compile(rb"^([ \t]*(?:N[0-9]+[ \t]*)?M11[78])(?:[^0-9.].*)?$")
 _STRING = re.compile(rb"([A-Z])[ \t]*=[ \t]*\"[^\"]*\"")
 RUN_LINES = 512
 """Lines of a run in one match."""
@@ -142,6 +143,8 @@ class Text:
         self.delete = re.compile(rb"[ \t]*" + number + rb"/" + level)
         self.declared: set[bytes] = set()
         """Variables with a name."""
+        self.tried = -1, -1
+        """Begin and end of a run that was not taken."""
         self.run, self.run_stated, self.run_on = self._runs(decimals_matter)
 
     def _runs(self, decimals_matter: bool) -> tuple[re.Pattern[bytes], ...]:
@@ -231,6 +234,7 @@ class Text:
         if len(text) > rules.line_limit or runs_python:
             line.understood = False
             return line
+        text = self._unsaid(text)
         beside = b"(" in text.partition(b";")[0]
         if self.comments is not None:
             text = self.comments.sub(b"\0", text)
@@ -255,6 +259,10 @@ class Text:
                 text = _SPINDLE.sub(b"\0", text)
             self._words(text.replace(b"\0", b" "), line)
         return line
+
+    def _unsaid(self, text: bytes) -> bytes:
+        """A line without what M117 shows and M118 sends."""
+        return _SAYING.sub(rb"\1", text) if self.dialect.text.messages else text
 
     def _misspelled(self, text: bytes, beside: bool) -> bool:
         """Whether the control may see other words than stand here; `beside` parentheses."""

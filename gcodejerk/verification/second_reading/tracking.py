@@ -13,13 +13,13 @@ from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, Effect
-from gcodejerk.nc.dialects.gcodes import G1, G40, G43, G49, G80, G90, G91
+from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
+from gcodejerk.verification.second_reading.circling import Circling
 from gcodejerk.verification.second_reading.coding import LEFT_OVER, QUIET, SELECTIONS
-from gcodejerk.verification.second_reading.drilling import Drilling
 from gcodejerk.verification.second_reading.known import NEAR, Observation
-from gcodejerk.verification.second_reading.reading import NAN, Line, Run
+from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
 
 _FRAMES: frozenset[Effect] = frozenset(
@@ -37,47 +37,8 @@ _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
 
 
-class Tracker(Drilling):
+class Tracker(Circling):
     """Follows lines."""
-
-    @property
-    def feeding(self) -> bool:
-        """Whether lines without a code are feed moves whose last words say where they end."""
-        return self._plain and self.g.get("motion") in (10, *self.dialect.arcs)
-
-    @property
-    def _plain(self) -> bool:
-        return (
-            self.facts.rapid_feed is None
-            and self.g.get("distance") == G90
-            and self.cycle is None
-            and not self.ended
-            and self.contour is None
-            and self.g.get("compensation") is not None
-            and self.bars.get(LEFT_OVER, False) is False
-            and not any(on is not False for on in self.frames.values())
-        )
-
-    @property
-    def may_run(self) -> bool:
-        """Whether a run may be taken that states its own motion."""
-        return self._plain
-
-    def run(self, run: Run) -> None:
-        """Follow a run of feed moves."""
-        self.begun = self.started = True
-        for letter, number in run.last.items():
-            if letter == "F":
-                self.feed, self.feed_whole = number, self._matters(run.feed_whole)
-            else:
-                self.end_run(AXES.index(letter), number * self.scale(letter))
-        if run.code is not None and self.dialect.modal_motion:
-            self.g["motion"] = run.code
-        if self.g.get("compensation") != G40:
-            self.lose(self.in_plane())
-
-    def _matters(self, whole: bool) -> bool:
-        return whole and self.dialect.whole_numbers == "machine"
 
     def follow(self, line: Line) -> Observation:
         """Execute a line, and tell what it was."""
@@ -170,7 +131,7 @@ class Tracker(Drilling):
             elif effect == "smoothing" and not (line.smoothed and self.path == 64):
                 self.path, self.p, self.q = None, NAN, NAN
         codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}
-        if codes & dialect.refused:
+        if codes & dialect.refused or self.doubts_arc(block):
             return self._run_or_refused(block)
         seen = self._run_block(block)
         seen = self.end_elsewhere(line, block) or seen
@@ -211,6 +172,8 @@ class Tracker(Drilling):
         if any(effect in ("transform", "swivel", "modal cycle") for effect in line.effects):
             self.frames["a named frame"] = None
         self.forget()
+        if not {"corner", "corners"}.isdisjoint(line.effects):
+            self.bars["corners that are cut"] = None
         self.bar_for_good(any(self.is_unknown(letter, n) for letter, n, _ in line.words))
         self.strayed = True
         return Observation()
@@ -249,8 +212,10 @@ class Tracker(Drilling):
                 self.feed = NAN
             self.feed_mode = mode
         taken = "words" in kinds or (self.dialect.one_command and not g)
+        if "F" in values and taken and not self.dialect.one_command and G4 not in g.values():
+            self.feed = NAN
         if "F" in values and not taken:
-            self.feed, self.feed_whole = values["F"], self._matters(block.feed_whole)
+            self.feed, self.feed_whole = values["F"], self.matters(block.feed_whole)
 
     def _set_tool(self, block: Sorted, seen: Observation) -> None:
         """Execute the words, other than codes, that move the tool or its frame."""
@@ -402,6 +367,7 @@ class Tracker(Drilling):
                 elif how is not None or distance is not None:
                     there = self.absolutely(k, there)
                 self.at[k] = NAN if distance is None and how is None else there
+        self.lose(_letters(block.axes) if "scaling" in block.g else "")
 
     def _why_not(self, block: Sorted, seen: Observation) -> None:
         """Whether the move was a rapid in a known frame."""

@@ -1,0 +1,138 @@
+"""Arcs that the control may refuse while the program goes on, and runs of feed moves with them.
+
+Rule: an arc that misses its end, or of which too little is known, is run and not run.
+"""
+
+from __future__ import annotations
+
+import re
+
+from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.dialect import PLANES, Effect
+from gcodejerk.nc.dialects.gcodes import G40, G90, G91
+from gcodejerk.units import MM_PER_INCH as INCH
+from gcodejerk.verification.second_reading.coding import LEFT_OVER
+from gcodejerk.verification.second_reading.drilling import Drilling
+from gcodejerk.verification.second_reading.reading import Run, Text
+from gcodejerk.verification.second_reading.sorting import Sorted
+
+_TAKES: frozenset[Effect] = frozenset(("return", "table", "local", "set", "words", "store"))
+_ALONE = {"motion", "plane", "distance", "arc distance", "feed mode", "units"}
+_CENTRES = dict(zip("XYZ", "IJK", strict=True))
+_WORDS = re.compile(rb"([GIJKRXYZ])[ \t]*([-+]?[0-9.]+)")
+
+
+def misses(way: complex, centre: complex, radius: float | None) -> bool:
+    """Whether an arc may not meet its end, after grbl's gcode.c [mm]; NaN counts as missed."""
+    if radius is not None:
+        return not (abs(way) > 2e-4 and 2.0 * abs(radius) - abs(way) > 2e-4)
+    here, there = abs(centre), abs(way - centre)
+    near = abs(here - there) <= 0.0048
+    return not (near or abs(here - there) <= min(0.49, 0.00098 * here))
+
+
+class Circling(Drilling):
+    """Takes runs of feed moves, and doubts arcs."""
+
+    @property
+    def feeding(self) -> bool:
+        """Whether lines without a code are feed moves whose last words say where they end."""
+        return self.may_run and self.g.get("motion") in (10, *self.dialect.arcs)
+
+    @property
+    def may_run(self) -> bool:
+        """Whether a run may be taken that states its own motion."""
+        return (
+            self.facts.rapid_feed is None
+            and self.g.get("distance") == G90
+            and self.cycle is None
+            and not self.ended
+            and self.contour is None
+            and self.g.get("compensation") is not None
+            and self.bars.get(LEFT_OVER, False) is False
+            and not any(on is not False for on in self.frames.values())
+        )
+
+    def take_run(self, text: Text, data: bytes, at: int) -> tuple[Run, int] | None:
+        """Take a run of feed moves, if one begins here whose arcs all meet their ends."""
+        if not self.may_run or text.tried[0] < at < text.tried[1]:
+            return None
+        run = text.take_run(data, at, stated=not self.feeding)
+        if run is not None and self.dialect.arcs_refused and self._strays(data[at : run[1]]):
+            text.tried = at, run[1]  # line by line, then: who looks again and again never ends
+            return None
+        return run
+
+    def run(self, run: Run) -> None:
+        """Follow a run of feed moves."""
+        self.begun = self.started = True
+        for letter, number in run.last.items():
+            if letter == "F":
+                self.feed, self.feed_whole = number, self.matters(run.feed_whole)
+            else:
+                self.end_run(AXES.index(letter), number * self.scale(letter))
+        if run.code is not None and self.dialect.modal_motion:
+            self.g["motion"] = run.code
+        if self.g.get("compensation") != G40:
+            self.lose(self.in_plane())
+
+    def matters(self, whole: bool) -> bool:
+        """Whether a number without a decimal point, which this one is or not, may mean another."""
+        return whole and self.dialect.whole_numbers == "machine"
+
+    def _strays(self, run: bytes) -> bool:
+        """Whether any arc of a run may be refused."""
+        plane = PLANES.get(self.g.get("plane") or 0)
+        if self.unit is None or not any(mark in run for mark in (b"I", b"J", b"K", b"R")):
+            return False
+        if plane is None or self.diameter is not False:
+            return True
+        first, second = plane[:2]
+        here = complex(self.at[AXES.index(first)], self.at[AXES.index(second)]) / self.unit
+        arcs = self.g.get("motion") in self.dialect.arcs
+        for line in run.split(b"\n"):
+            words = {letter.decode(): float(n) for letter, n in _WORDS.findall(_bare(line))}
+            arcs = words["G"] > 1.5 if "G" in words else arcs
+            there = complex(words.get(first, here.real), words.get(second, here.imag))
+            if arcs and words and self._fails(words, there - here, plane[:2]):
+                return True
+            here = there
+        return False
+
+    def _fails(self, words: dict[str, float], way: complex, axes: tuple[str, ...]) -> bool:
+        """Whether an arc with these words may be refused; its way in the program's unit."""
+        if not set(axes) & words.keys():
+            return True
+        way = complex(*(n if a in words else 0.0 for a, n in zip(axes, (way.real, way.imag))))  # noqa: B905
+        unit = self.unit or 1.0
+        centre = complex(*(words.get(_CENTRES[axis], 0.0) for axis in axes))
+        radius = words["R"] * unit if "R" in words else None
+        return misses(way * unit, centre * unit, radius)
+
+    def doubts_arc(self, block: Sorted) -> bool:
+        """Whether a block is an arc that the control may refuse."""
+        dialect, g, values = self.dialect, block.g, block.values
+        arc = dialect.arcs_refused and g.get("motion", self.g.get("motion")) in dialect.arcs
+        if not arc or not (block.axes or {"I", "J", "K", "R"} & values.keys()):
+            return False
+        if any(dialect.effect(code) in _TAKES for code in g.values()):
+            return False
+        before = self.unit
+        if "units" in g:
+            self.unit = INCH if dialect.units[g["units"]] else 1.0
+        plane = PLANES.get(g.get("plane", self.g.get("plane")) or 0)
+        failed = self.unit is not None
+        if plane is not None and self.unit is not None and set(g) <= _ALONE:
+            ends = []
+            for axis in plane[:2]:
+                stated = g.get("distance", self.g.get("distance")) == G91 or axis not in values
+                stands = 0.0 if stated else self.at[AXES.index(axis)] / self.unit
+                ends.append(values.get(axis, 0.0) - stands)
+            failed = self.diameter is not False or self._fails(values, complex(*ends), plane[:2])
+        self.unit = before
+        return failed
+
+
+def _bare(line: bytes) -> bytes:
+    """A line of a run without its comment."""
+    return line.partition(b"(")[0]
