@@ -315,10 +315,6 @@ CASES = [
         machine={"design": {"minimum_length": 100}}, then={"design": {"minimum_length": 1}},
     ),
     Case(
-        Reason.TOO_LONG, "several rapids", LINUXCNC, KNOWN + "G0 X40000. (77)\nM2\n",
-        KNOWN + "G0 X20000. (77)\nG0 X40000. (77)\nM2\n",
-    ),
-    Case(
         Reason.BEYOND_TRAVEL, "the number", LINUXCNC,
         KNOWN + "G0 X7700.\nM2\n", KNOWN + AT,
         machine=axis(travel=[0, 500]) | program(offsets={"G54": {"X": 0, "Y": 0, "Z": 0}}),
@@ -392,8 +388,17 @@ def test_what_helps_helps(case, tmp_path):
     assert set(reasons(case.after or case.before, then, **case.call)) == {None}
 
 
+def test_a_move_that_is_too_long_helps_as_several(monkeypatch, tmp_path):
+    # The real bound, 100 s, makes streams of as many points.
+    monkeypatch.setattr("gcodejerk.planning.plan.MOST_INTERVALS", 800)
+    own = machine(LINUXCNC, {}, tmp_path)
+    assert reasons(KNOWN + "G0 X300. (77)\nM2\n", own) == [Reason.TOO_LONG]
+    several = "G0 X150. (77)\nG1 X151.\nG0 X300. (77)\nM2\n"
+    assert reasons(KNOWN + several, own) == [None, None]
+
+
 def test_every_reason_that_can_be_helped_is_helped_here():
-    helped = {case.reason for case in CASES}
+    helped = {case.reason for case in CASES} | {Reason.TOO_LONG}
     assert {reason for reason in Reason if not EXPLAINED[reason].remedy.startswith("nothing")} == (
         helped - {Reason.AFTER_END}
     )
