@@ -12,7 +12,7 @@ reasons of the rest. `--lines` prints the blocks that one reason keeps, `--subpr
 calls into the other files of a collection, `--start` states where the axes stand (which few shops
 can), `--unroll` writes loops and calls out first (and proves it), so that there are more rapids,
 one for each pass, `--auto` prints how many of the files with rapids `auto` reads as their dialect,
-or as what their dialect reads alike.
+or as what their dialect reads alike, and how many certain rapids differ (without `--unroll`).
 """
 
 import argparse
@@ -43,6 +43,7 @@ ALIKE = {
     "rs274": {"linuxcnc", "grbl", "mach", "centroid", "uccnc", "edingcnc", "planetcnc", "masso"},
     "iso-mill": {"fanuc", "haas", "mitsubishi", "mazatrol-eia", "syntec"},
 }
+ALIKE["any-mill"] = ALIKE["rs274"] | ALIKE["iso-mill"]
 STARTUP = {
     "siemens": "G90 G71 G17 G40 G64 G94",
     "fanuc": "G90 G17 G21 G40 G49 G80 G94",
@@ -177,9 +178,10 @@ def row(folder, files, given):
         if given.lines:
             show(path, data, rapids, given.lines)
         if given.auto and reasons + [None] * certain:
-            detected[judge(data, path.name, name, start.diameter)] += 1
+            how, apart = judge(data, path.name, name, start, rapids)
+            detected.update({how: 1, "certain rapids that differ": apart})
             if given.verbose:
-                print(judge(data, path.name, name, start.diameter), path, file=sys.stderr)
+                print(how, path, file=sys.stderr)
     share = 100.0 * total["certain"] / max(1, total["moving"])
     names = ("files", "refused", "rapids", "moving", "certain")
     main = ", ".join(f"{reason} {count}" for reason, count in left.most_common(given.most))
@@ -204,16 +206,26 @@ def show(path, data, rapids, reason):
             print(f"{path}:{line}: {text}", file=sys.stderr)
 
 
-def judge(data, name, dialect, lathe):
-    """How `auto` reads a program."""
+def judge(data, name, dialect, start, rapids):
+    """How `auto` reads a program, and certain rapids of it that are not those of its dialect."""
     try:
-        found = detect_dialect(data[: 1 << 18], name, lathe=lathe)[0]
+        found = detect_dialect(data[: 1 << 18], name, lathe=start.diameter)[0]
     except GcodejerkError:
-        return "refused"
-    found = getattr(found, "name", found)
-    if found == dialect:
-        return "right"
-    return "alike" if dialect in ALIKE.get(found, ()) else f"WRONG ({found})"
+        return "refused", 0
+    mine = read_program(io.BytesIO(data), dialect=found.name, start=start).rapids
+    where = {line: i for i, line in enumerate(rapids.line.tolist())}
+    apart = 0
+    for i in np.flatnonzero(mine.reason == CERTAIN).tolist():
+        j = where.get(int(mine.line[i]))
+        axes = [k for k in range(len(AXES)) if mine.words[i] >> k & 1]
+        if j is None or (rapids.reason[j] == CERTAIN and not (
+            np.allclose(mine.start[i, axes], rapids.start[j, axes], atol=1e-6)
+            and np.allclose(mine.target[i, axes], rapids.target[j, axes], atol=1e-6)
+        )):  # fmt: skip
+            apart += 1
+    if found.name == dialect:
+        return "right", apart
+    return "alike" if dialect in ALIKE.get(found.name, ()) else f"WRONG ({found.name})", apart
 
 
 def main():

@@ -271,9 +271,7 @@ def part(figure, title):
 
 
 @pytest.mark.parametrize("case", COMPARED, ids=lambda case: f"{case[0]}-{len(case) - 1}")
-def test_a_comparison_shows_every_axis_with_no_word_over_another_or_over_a_line(case, request):
-    if COMPARED.index(case) % 2 and not request.config.getoption("--long"):
-        pytest.skip("left to the long run")
+def test_a_comparison_shows_every_axis_with_no_word_over_another_or_over_a_line(case):
     shown, figure = compared(*case)
     assert_readable(figure)
     for axes in figure.axes:

@@ -143,7 +143,7 @@ class Processor:
 
     @property
     def tooltip(self):
-        raise NotImplementedError
+        raise NotImplementedError  # as FreeCAD's own does: each post has to say it
 
 
 class Factory:

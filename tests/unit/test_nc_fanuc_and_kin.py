@@ -6,7 +6,7 @@ Behind it the rapids were called certain, and began, or went, elsewhere.
 import pytest
 
 from gcodejerk.reasons import Reason
-from tests.unit.test_nc_looks_certain import HEADS, also_noticed, read
+from tests.unit.test_nc_looks_certain import also_noticed, read
 
 MODES = "G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\n"
 START, ROTATION = Reason.START_UNKNOWN, Reason.ROTATION
@@ -18,7 +18,6 @@ MIRRORED = "G51.1 X0. Y0.\nG1 X5. Y5.\n"
 DRILLED = "G98 G81 X1. Z-5. R2. F9.\n"
 COMPENSATED = "G41 D1 G1 X5. Y5.\nX9.\n"
 KIN = ("mitsubishi", "syntec", "mazatrol-eia", "iso-mill")
-HEADS.update(dict.fromkeys((*KIN, "centroid"), HEADS["fanuc"]))
 
 # What stands in front of the last rapid, the reason for which that one is left alone, and facts.
 NOT_CERTAIN = {

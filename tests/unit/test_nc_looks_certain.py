@@ -33,6 +33,8 @@ HEADS = {
     "klartext": b"0 BEGIN PGM P MM\n1 L X+0 Y+0 Z+50 R0 FMAX\n",
     "heidenhain-iso": b"%P G71 *\nN1 G17 G90 G40*\nN2 G00 X0 Y0 Z50*\n",
 }
+_LIKE_FANUC = ("mitsubishi", "syntec", "mazatrol-eia", "iso-mill", "centroid")
+HEADS.update(dict.fromkeys(_LIKE_FANUC, HEADS["fanuc"]))
 
 
 def start_of(dialect, **facts):

@@ -29,6 +29,7 @@ from dataclasses import replace
 
 from gcodejerk.nc.dialects.dialect import (
     COMPENSATION,
+    LEFT_OVER,
     Arithmetic,
     Dialect,
     Drilling,
@@ -175,7 +176,7 @@ FANUC = Dialect(
         670: ("modal macro", False),
     },
     units_once=True,
-    bars={400: ("compensation that ends", True)},
+    bars={400: (LEFT_OVER, True)},
     tool_cancelled_by_return="named",
     whole_numbers="machine",
     packed_repeats=True,

@@ -22,11 +22,9 @@ from gcodejerk.nc.dialects.dialect import ARC_CENTRES, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import NAN, State
-from gcodejerk.nc.interpreter.rules import takes_axes
+from gcodejerk.nc.interpreter.rules import AXIS_USERS, takes_axes
 from gcodejerk.nc.text.words import BIT, Lines
 from gcodejerk.units import MM_PER_INCH
-
-Column = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 _GAP = 0.0048
 """By how much the radii at both ends may differ anyway: 0.005. [mm]"""
@@ -39,7 +37,7 @@ _REACH = 2e-4
 _MODES = frozenset({"motion", "plane", "distance", "arc distance", "feed mode", "units"})
 """Groups beside which the way of an arc is known from where the block begins."""
 _CENTRES = {"X": "I", "Y": "J", "Z": "K"}
-_AXIS_USERS = frozenset({"return", "table", "local", "set", "words", "store"})
+_TAKES = AXIS_USERS | {"words", "store"}
 
 
 def in_doubt(codes: Codes, state: State, dialect: Dialect) -> bool | None:
@@ -75,7 +73,7 @@ def _is_arc(codes: Codes, state: State, dialect: Dialect) -> bool:
     """Whether the words of a block say an arc."""
     if codes.g.get("motion", state.motion) not in dialect.arcs or codes.unknown:
         return False
-    if dialect.effect(codes.g.get("non-modal")) in _AXIS_USERS or takes_axes(codes):
+    if dialect.effect(codes.g.get("non-modal")) in _TAKES or takes_axes(codes):
         return False
     return bool(codes.moved()) or not codes.values.keys().isdisjoint("IJKR")
 
@@ -95,13 +93,6 @@ def _misses(
     reaches = (2.0 * np.abs(radius) - way > _REACH) & (way > _REACH)
     missed: NDArray[np.bool_] = ~np.where(np.isnan(radius), meets, reaches)
     return missed
-
-
-def cut_words(lines: Lines, letter: str, first: int, last: int) -> Column:
-    """Cut one letter's words to a run; lines counted from the run's first."""
-    at, value = lines.column(letter)
-    lower, upper = np.searchsorted(at, (first, last))
-    return at[lower:upper] - first, value[lower:upper]
 
 
 def doubtful(
@@ -132,7 +123,7 @@ def doubtful(
     columns: list[Any] = [_ways(state, lines, axis, rows, (first, last)) for axis in axes]
     for letter in (*(_CENTRES[axis] for axis in axes), "R"):
         whole = np.full(len(letters), NAN if letter == "R" else 0.0)
-        at, value = cut_words(lines, letter, first, last)
+        at, value = lines.cut(letter, first, last)
         whole[at] = value * (state.unit or NAN)
         columns.append(whole[rows])
     in_plane = np.uint32(BIT[axes[0]] | BIT[axes[1]])
@@ -145,7 +136,7 @@ def _ways(
 ) -> NDArray[np.float64]:
     """How far an axis goes in each of these lines of a run."""
     k = AXES.index(axis)
-    at, value = cut_words(lines, axis, *run)
+    at, value = lines.cut(axis, *run)
     value = value * state.scale(k)
     before, behind = (np.searchsorted(at, rows, side=side) for side in ("left", "right"))
     named = behind > before

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import (
     COMPENSATION,
+    LEFT_OVER,
     LINEAR,
     MACHINE_WORDS,
     Dialect,
@@ -46,13 +47,11 @@ _FRAME_CHANGES: frozenset[Effect] = frozenset(
 
 _SELECTIONS: frozenset[Effect] = frozenset({"system", "numbered system"})
 
-ENDING = "compensation that ends"
-"""Name of a bar: G40 has been read, and what it leaves of the offset goes with the next move."""
 BARS = {
     "offsets written": Reason.SYSTEM_WRITTEN,  # until a work system is selected
     "tool data written": Reason.SYSTEM_WRITTEN,  # until a tool length is
     "parameters written": Reason.SYSTEM_WRITTEN,  # for good
-    ENDING: Reason.CUTTER_COMPENSATION,  # until a move in its plane
+    LEFT_OVER: Reason.CUTTER_COMPENSATION,  # until a move in its plane
     "look-ahead": Reason.LOOK_AHEAD,
     "feed group": Reason.FEED_GROUP,
     "feed override": Reason.FEED_SCALED,

@@ -11,6 +11,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import (
     ANOTHER_LANGUAGE,
     CYCLE_CALL,
+    LEFT_OVER,
     MACHINE_WORDS,
     PLANES,
     Dialect,
@@ -22,7 +23,7 @@ from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.cycles import begin_cycle, run_cycle
 from gcodejerk.nc.interpreter.effects import Effects
-from gcodejerk.nc.interpreter.eligibility import ENDING, Step
+from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.mcodes import run_m_code
 from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.interpreter.moves import (
@@ -161,7 +162,7 @@ class Phases(Effects):
                 state.forget_positions()
             if code in dialect.bars:
                 name, begins = dialect.bars[code]
-                if name == ENDING and not compensated:
+                if name == LEFT_OVER and not compensated:
                     continue
                 on = _switched(codes.values.get("P", 0.0)) if begins == "P" else begins
                 if name == ANOTHER_LANGUAGE:
@@ -391,7 +392,7 @@ class Phases(Effects):
         if state.compensation != G40:
             state.forget_positions(plane_axes(state))
         elif motion in (dialect.rapid, G1) and _in_plane(codes, state):
-            frames.end_bar(state, ENDING)
+            frames.end_bar(state, LEFT_OVER)
         if any(on is not False for on in state.transforms.values()) and not (
             motion not in dialect.redrawn and drill_behind(state, step.start)
         ):

@@ -11,7 +11,7 @@ from gcodejerk.nc.dialects.gcodes import G40, G80, G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
 
-_AXIS_USERS = frozenset({"return", "table", "local", "set"})
+AXIS_USERS = frozenset({"return", "table", "local", "set"})
 """Effects that take the axis words of the block, so that no motion may be stated beside them."""
 _OFF = frozenset({G40, None})
 _REFUSED = -1
@@ -59,7 +59,7 @@ def _strict_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
     """Motion code that the axis words are for on a strict control; None for none."""
     motion, axes = codes.g.get("motion"), bool(codes.moved())
     effect = dialect.effect(codes.g.get("non-modal"))
-    if effect in _AXIS_USERS or (axes and takes_axes(codes)):
+    if effect in AXIS_USERS or (axes and takes_axes(codes)):
         bare = effect in ("local", "set") and not axes
         motion = _REFUSED if bare or motion not in (None, G80) else None
     elif motion is None and (axes or arc_words(codes.values, state)):

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LINEAR, PLANES, Dialect
+from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LEFT_OVER, LINEAR, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G40, G90, G91
-from gcodejerk.nc.interpreter.arcs import cut_words, doubtful
-from gcodejerk.nc.interpreter.eligibility import BARS, ENDING
+from gcodejerk.nc.interpreter.arcs import doubtful
+from gcodejerk.nc.interpreter.eligibility import BARS
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
@@ -43,7 +43,7 @@ def can_run(state: State) -> bool:
         and (state.unit is not None or not state.lost)
         and state.touched is None
         and state.cycle is None
-        and state.bars.get(ENDING, False) is False
+        and state.bars.get(LEFT_OVER, False) is False
         and not any(on is not False for on in state.transforms.values())
     )
 
@@ -118,7 +118,7 @@ def run_plain(
     """
     assert state.motion is not None
     letters = lines.letters[first:last]
-    codes, code_values = cut_words(lines, "G", first, last)
+    codes, code_values = lines.cut("G", first, last)
     motion = _spread(codes, code_values.astype(np.uint8), state.motion // 10, last - first)
     sure = _sure(letters, motion, state)
     if dialect.arcs_refused and state.unit is not None:
@@ -133,7 +133,7 @@ def run_plain(
     named = (letters & _AXIS_BITS).astype(np.uint16)
     moves = (named != 0) | ((motion >= 2) & (letters & _CENTRES != 0))
     events = np.where(moves & (motion != 0), np.uint8(USES_FEED), np.uint8(0))
-    feeds, feed_values = cut_words(lines, "F", first, last)
+    feeds, feed_values = lines.cut("F", first, last)
     events[feeds] = GIVES_FEED
     rapid = np.flatnonzero((named != 0) & (motion == 0))
 
@@ -172,7 +172,7 @@ def _positions(
     start = np.empty((len(rapid), len(AXES)))
     target = np.empty_like(start)
     for axis, letter in enumerate(AXES):
-        at, value = cut_words(lines, letter, first, last)
+        at, value = lines.cut(letter, first, last)
         history = np.concatenate([[state.position[axis]], value * state.scale(axis)])
         if state.distance == G91:
             history = np.add.accumulate(history)

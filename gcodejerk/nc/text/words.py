@@ -17,6 +17,8 @@ from gcodejerk.axes import AXES
 PLAIN_LETTERS = AXES + "NGFSIJKR"
 """Letters that a plain line may hold; letter k has bit k in `Lines.letters`."""
 
+Column = tuple[NDArray[np.int64], NDArray[np.float64]]
+"""Lines and values of words."""
 BIT = {letter: 1 << k for k, letter in enumerate(PLAIN_LETTERS)}
 
 
@@ -50,14 +52,20 @@ class Lines:
     letters: NDArray[np.uint32]
     """Which of PLAIN_LETTERS stand on the line; 0 on those."""
     words: Words
-    _columns: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]] = field(default_factory=dict)
+    _columns: dict[str, Column] = field(default_factory=dict)
 
-    def column(self, letter: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def column(self, letter: str) -> Column:
         """Lines and values of the words of one letter."""
         if letter not in self._columns:
             at = np.flatnonzero(self.words.letter == ord(letter))
             self._columns[letter] = self.words.line[at], self.words.value[at]
         return self._columns[letter]
+
+    def cut(self, letter: str, first: int, last: int) -> Column:
+        """The same within the lines first:last, which are counted from the first."""
+        at, value = self.column(letter)
+        lower, upper = np.searchsorted(at, (first, last))
+        return at[lower:upper] - first, value[lower:upper]
 
     def __len__(self) -> int:
         return len(self.begin)

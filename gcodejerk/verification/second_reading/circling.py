@@ -8,10 +8,9 @@ from __future__ import annotations
 import re
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import PLANES, Effect
+from gcodejerk.nc.dialects.dialect import LEFT_OVER, PLANES, Effect
 from gcodejerk.nc.dialects.gcodes import G40, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
-from gcodejerk.verification.second_reading.coding import LEFT_OVER
 from gcodejerk.verification.second_reading.drilling import Drilling
 from gcodejerk.verification.second_reading.reading import Run, Text
 from gcodejerk.verification.second_reading.sorting import Sorted

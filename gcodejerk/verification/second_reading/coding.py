@@ -9,6 +9,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import (
     ANOTHER_LANGUAGE,
     CYCLE_CALL,
+    LEFT_OVER,
     LINEAR,
     MACHINE_WORDS,
     Effect,
@@ -23,8 +24,6 @@ SELECTIONS: frozenset[Effect] = frozenset(("system", "numbered system"))
 QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
 STATEMENTS: frozenset[Effect] = frozenset(("home", "cycle", "label"))
 """Effects of statements of Klartext."""
-LEFT_OVER = "compensation that ends"
-"""What forbids rapids between G40 and the next move in the plane."""
 _CALLS = (47, 96, 97, 98, 198)
 _ENDS = (2, 17, 30, 99)
 _OUTPUTS = (*range(62, 69), *range(100, 200))

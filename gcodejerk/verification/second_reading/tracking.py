@@ -12,12 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import LINEAR, Effect
+from gcodejerk.nc.dialects.dialect import LEFT_OVER, LINEAR, Effect
 from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.second_reading.circling import Circling
-from gcodejerk.verification.second_reading.coding import LEFT_OVER, QUIET, SELECTIONS
+from gcodejerk.verification.second_reading.coding import QUIET, SELECTIONS
 from gcodejerk.verification.second_reading.known import NEAR, Observation
 from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
