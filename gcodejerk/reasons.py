@@ -27,8 +27,11 @@ class Reason(enum.StrEnum):
     ROTATION = "rotation, scaling, mirroring or polar active"
     SYSTEM_WRITTEN = "offsets or parameters written by the program"
     LOOK_AHEAD = "look-ahead limited by the program"
+    COMPRESSED = "a compressor joins the blocks of a stream"
     FEED_GROUP = "F is the speed of some axes only"
     FEED_SCALED = "adaptive or programmed override of the feed"
+    OVERRIDES_OFF = "overrides or feed hold switched off by the program"
+    LIMIT_SET = "limit of speed, acceleration or jerk set by the program"
     NO_MOTION = "no axis moves"
     DISTANCE_MODE_UNKNOWN = "distance mode unknown"
     UNITS_UNKNOWN = "units unknown"
@@ -134,6 +137,13 @@ EXPLAINED: dict[Reason, Explanation] = {
         "Haas's G103 P1: no stream would be blended",
         "end it in front of the rapids (G103), or take it out",
     ),
+    Reason.COMPRESSED: Explanation(
+        "behind Siemens's `COMPCAD`, `COMPON` and their kin, or `CYCLE832`, which selects one, and "
+        "behind Fanuc's `G5.1 Q2` and `Q3`: of the blocks of a stream the control would make "
+        "curves of its own, at speeds of its own",
+        "put `COMPOF` (behind `CYCLE832` `COMPOF DYNNORM`; `G5.1 Q1` or `G5.1 Q0`) in front of the "
+        "rapids, and the compressor behind them",
+    ),
     Reason.FEED_GROUP: Explanation(
         "Siemens, behind `FGROUP(X,Y)`: F is the speed of these axes alone",
         "put `FGROUP()` in front of the rapids",
@@ -141,6 +151,24 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.FEED_SCALED: Explanation(
         "M52 of LinuxCNC, OVR of Siemens: they act on streams, not on G0",
         "LinuxCNC: end it in front of the rapids (M52 P0); Siemens: take OVR out",
+    ),
+    Reason.OVERRIDES_OFF: Explanation(
+        "Fanuc and its kin, behind G63 (tapping) or `#3004` set to anything but 0: feed override "
+        "or feed hold do nothing, and a stream, which no rapid override slows, could not be slowed "
+        "or stopped",
+        "put `G64` (`#3004=0`) in front of the rapids",
+    ),
+    Reason.LIMIT_SET: Explanation(
+        "`M204`, `M201`, `M203`, `SET_VELOCITY_LIMIT`, `$120=`, `ACC[X]=` and the like: below what "
+        "the machine file states, so that neither the rapid nor its stream would run as planned; "
+        "until it is set higher again, on grbl for good; Siemens: `DYNFINISH` and its kin, which "
+        "`CYCLE832` selects, `DRIVE`, and `SOFT` where the machine file has no jerk. `M204` and "
+        "`SET_VELOCITY_LIMIT` bound the path: of axes that go together at their own limits that is "
+        "up to 1.42 times one axis's, of three 1.74 times",
+        "state that limit in the machine file (`rapid` of the axis, and `limit` where it stands "
+        "there), or take it out of the program; a limit of the path: set it so much higher, or "
+        "move the axes in blocks of their own; Siemens: end it (`ACC[X]=100`, `DYNNORM`, "
+        "`BRISK`)",
     ),
     Reason.NO_MOTION: Explanation(
         "the block's end is its start",

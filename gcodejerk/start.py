@@ -109,6 +109,11 @@ class Start:
     cycles: CycleSettings = field(default_factory=CycleSettings)
     unrolled_lines: int | None = None
     """Lines that loops and calls may be written out as, at most; None: the program's own bound."""
+    limits: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    """Axis -> largest velocity, acceleration and jerk that its rapids and streams may have [mm/s,
+    mm/s^2, mm/s^3; deg]; one that a program sets lower is in their way."""
+    straight: bool = True
+    """Rapids are straight lines, all axes together; else every axis runs on its own."""
     subprograms: Mapping[str, bytes] = field(default_factory=dict)
     """Files in which the control finds what a program calls: name -> text."""
 

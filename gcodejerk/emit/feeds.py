@@ -9,6 +9,7 @@ of F's last digit is 1.7 nm in 2 ms (42 nm in inches), so that a block of one st
 lasts its 2 ms within 33 ns, and a faster one is nearer still. For finer steps F has more decimals:
 a block of one step lasts its time to 0.01 % in any case. What all blocks of a rapid add up to is
 right to the same share, were all of them that slow, and mostly to nanoseconds.
+Rule 3: no F has more digits than the control reads in a number: a fast one has fewer decimals.
 """
 
 from __future__ import annotations
@@ -42,17 +43,22 @@ class Feeds:
         F of the block that ends at each moment, in whole units of its last decimal.
     decimals : ndarray of int, shape (b,)
         Of each stream's F, in program units per minute.
+    digits : int
+        Most digits of F: decimals that are too many are zeros in `whole`.
     """
 
     whole: NDArray[np.int64]
     decimals: NDArray[np.int64]
+    digits: int
 
     def of_end(self, row: int) -> Decimal:
         """F of the last block of a stream."""
-        return Decimal(int(self.whole[row, -1])).scaleb(-int(self.decimals[row]))
+        whole, decimals = int(self.whole[row, -1]), int(self.decimals[row])
+        too_many = min(max(len(str(whole)) - self.digits, 0), decimals)
+        return Decimal(whole // 10**too_many).scaleb(too_many - decimals)
 
 
-def mean_feeds(batch: Batch, rapids: Rapids) -> Feeds:
+def mean_feeds(batch: Batch, rapids: Rapids, digits: int = 15) -> Feeds:
     """F for controls that hold it over a block: its length over its time.
 
     A block without length, which takes no time, has the F of the next one, or of the last that has
@@ -64,6 +70,8 @@ def mean_feeds(batch: Batch, rapids: Rapids) -> Feeds:
         b streams.
     rapids : Rapids
         The program's, for the unit of its F.
+    digits : int, optional
+        Most digits of a number that the control reads.
 
     Returns
     -------
@@ -86,13 +94,21 @@ def mean_feeds(batch: Batch, rapids: Rapids) -> Feeds:
     speed = np.where(batch.times > 0, length / time / unit, np.nan)
     # Backwards first: what is left without a length stands behind all motion.
     speed = _filled(_filled(speed[:, ::-1])[:, ::-1])
-    return Feeds(_in_digits(speed, decimals), decimals)
+    return Feeds(_in_digits(speed, decimals, digits), decimals, digits)
 
 
-def _in_digits(speed: NDArray[np.float64], decimals: NDArray[np.int64]) -> NDArray[np.int64]:
+def _in_digits(
+    speed: NDArray[np.float64], decimals: NDArray[np.int64], digits: int
+) -> NDArray[np.int64]:
     """Speeds per second as F, at least its last digit: F0 is an error, and so no block has it."""
-    scale = per_minute(1.0) * 10.0**decimals
-    feed = np.maximum(np.rint(scale[:, np.newaxis] * np.nan_to_num(speed)), 1.0)
+    scale = (per_minute(1.0) * 10.0**decimals)[:, np.newaxis]
+    feed = np.maximum(np.rint(scale * np.nan_to_num(speed)), 1.0)
+    # What has a digit too many is rounded to the last that is left; 9999.99996 may be 10000.000.
+    long = np.floor(np.log10(feed) + 1e-12) + 1.0
+    for _ in range(2):
+        last = 10.0 ** np.clip(long - digits, 0.0, decimals[:, np.newaxis])
+        feed = np.where(last > 1.0, np.rint(scale * np.nan_to_num(speed) / last) * last, feed)
+        long = np.floor(np.log10(feed) + 1e-12) + 1.0
     out: NDArray[np.int64] = feed.astype(np.int64)
     return out
 

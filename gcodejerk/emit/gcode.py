@@ -9,13 +9,16 @@ A replaced block becomes, each line only where it is needed::
 
     (gcodejerk: G0 X10. Y5.)     names the original
     N120 G0 M8 (go)              what else the block says, byte for byte
-    G4 P0                        the feed before ends here: a stream begins at rest
     G94 G64                      modes of the stream that are not in force, or not stated
+    G4 P0                        the feed before ends here: a stream begins at rest
     G1 X0.0012 Y0.0006 F38.4     the points
     G1 G61 X10. Y5. F1.2         the last with the block's own words, and the exact stop
     G0 F600.                     the modal values that the program relies on; of a G1 that
                                  counts as a rapid (`Rapids.fed`) F alone, for G1 is in force
     M0                           what the control runs after the motion
+
+Rule: G94 stands in front of G4, which counts turns of the spindle in G95 on some controls, and ends
+nowhere where it stands (Fanuc, parameter 3405#1; general knowledge that was not looked up).
 
 Rule: the last point repeats the block's own words, so the end is exactly the programmed one,
 whatever was rounded before.
@@ -41,7 +44,8 @@ from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.stream import FINE_DECIMALS
-from gcodejerk.storage import made
+from gcodejerk.storage import made, windows
+from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
 """Duration of a block, measured as the best; whole intervals, at least one [s]."""
@@ -53,6 +57,8 @@ class GcodeController(Controller):
     """Writes G1 blocks of 2 ms, F their mean speed; a control adds its name and its facts."""
 
     play = Play.HELD
+    highest_feed: str = ""
+    """What bounds G1 and not G0, by its name; empty where nothing does, or nobody knows."""
 
     @property
     def repeats(self) -> bool:  # type: ignore[override]
@@ -74,17 +80,20 @@ class GcodeController(Controller):
             )
         return NumberFormat(rapids.start, step, origins(rapids), finer=doubles)
 
-    def feeds(self, batch: Batch, rapids: Rapids) -> Feeds:
-        """F of every block of a batch."""
-        return mean_feeds(batch, rapids)
+    def feeds(self, batch: Batch, rapids: Rapids, digits: int) -> Feeds:
+        """F of every block of a batch, of no more digits than the control reads."""
+        return mean_feeds(batch, rapids, digits)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What a user of these streams has to know."""
-        return [
+        if not plans.planned.any():
+            return []
+        unmeasured = [
             f"streams in this form were not measured on {self.name}: {form.note}"
             for form in self.forms
-            if (form.name, form.confidence) == ("stream", "unverified") and plans.planned.any()
+            if (form.name, form.confidence) == ("stream", "unverified")
         ]
+        return unmeasured + [_fastest(self.highest_feed, rapids, plans)] * bool(self.highest_feed)
 
     def render(
         self,
@@ -98,8 +107,9 @@ class GcodeController(Controller):
         moves = batch.moves
         line_ends, last_ends = line_ends_of(rapids, moves, newline)
         dialect = options.dialect
-        feeds = self.feeds(batch, rapids)
-        points = self._points(batch, rapids, line_ends, feeds, writing_of(dialect).doubles)
+        writing = writing_of(dialect)
+        feeds = self.feeds(batch, rapids, writing.digits)
+        points = self._points(batch, rapids, line_ends, feeds, writing.doubles)
         out = []
         for row, move in enumerate(moves):
             frame = Frame(
@@ -109,8 +119,8 @@ class GcodeController(Controller):
             follows = follows_stream(batch.plans, rapids, int(move))
             lines = [
                 *frame.head(options.comments),
-                *frame.standstill(follows),
                 *frame.modes(),
+                *frame.standstill(follows),
                 points[row].text,
                 last,
                 b" ".join([*([] if frame.fed else [b"G0"]), *frame.restored()]),
@@ -143,10 +153,31 @@ class GcodeController(Controller):
             kinds.setdefault(kind, []).append(row)
         out: list[_Points] = [_Points(b"", {})] * len(batch)
         for kind, rows in kinds.items():
-            made = _format_kind(batch, np.array(rows), kind, feeds.whole, doubles)
+            made = _format_kind(batch, np.array(rows), kind, feeds, doubles)
             for row, points in zip(rows, made, strict=True):
                 out[row] = points
         return out
+
+
+def _fastest(bound: str, rapids: Rapids, plans: Plans) -> str:
+    """How fast the blocks become, about, in the unit of the fastest."""
+    most, inch = 0.0, False
+    peak = plans.profiles.peak_velocity
+    linear = [k for k, axis in enumerate(AXES) if axis not in "ABC"]
+    for part in windows(len(plans.move)):
+        square = (plans.share[part][:, linear] ** 2).sum(axis=1) * peak[part] ** 2
+        first = int(plans.move[part][0])
+        # Axes that run on their own add up to their path at most so.
+        speed = np.sqrt(np.bincount(plans.move[part] - first, square))
+        at = int(np.argmax(speed))
+        if speed[at] > most:
+            most, inch = float(speed[at]), bool(rapids.inch[first + at])
+    unit, name = (MM_PER_INCH, "in/min") if inch else (1.0, "mm/min")
+    return (
+        f"blocks of the streams reach F{per_minute(most) / unit:.0f} ({name}): {bound} "
+        "has to allow that for G1, or the control slows them down or stops; where it is lower, "
+        "state it as limit.velocity of the axes"
+    )
 
 
 def origins(rapids: Rapids) -> NDArray[np.float64]:
@@ -183,7 +214,7 @@ class _Kind:
 
 
 def _format_kind(
-    batch: Batch, rows: NDArray[np.int64], kind: _Kind, feed: NDArray[np.int64], doubles: bool
+    batch: Batch, rows: NDArray[np.int64], kind: _Kind, feeds: Feeds, doubles: bool
 ) -> list[_Points]:
     """Points of rows of one kind; the last point of each is left to its block's own words."""
     whole_step, decimals = axis_steps(batch.plans.machine, kind.inch, doubles)
@@ -203,7 +234,7 @@ def _format_kind(
             values = np.diff(np.where(knots > 0, values, 0), axis=1, prepend=0)
         prefix = b" " if columns else b"G1 "
         columns.append(Column(prefix + AXES[axis].encode(), values[inner], places))
-    columns.append(Column(b" F", feed[rows][inner], kind.feed_decimals))
+    columns.append(Column(b" F", feeds.whole[rows][inner], kind.feed_decimals, feeds.digits))
     text, ends = format_lines(columns, kind.line_end)
     at = np.concatenate([[0], ends])[np.concatenate([[0], np.cumsum(counts)])]
     return [
@@ -230,5 +261,8 @@ def follows_stream(plans: Plans, rapids: Rapids, move: int) -> bool:
     """Whether the block directly before is a stream too: the machine then rests."""
     before = move - 1
     return bool(
-        before >= 0 and plans.planned[before] and rapids.line[before] + 1 == rapids.line[move]
+        before >= 0
+        and plans.planned[before]
+        and rapids.line[before] + 1 == rapids.line[move]
+        and not rapids.entered[move]
     )

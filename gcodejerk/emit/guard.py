@@ -35,14 +35,15 @@ _COMMENT = re.compile(rb"\(([^)]*)\)|;(.*)")
 _ACTIVE = re.compile(rb"(?:ABORT|DEBUG|PRINT|LOG|PY)", re.IGNORECASE)
 """Comments that compute, or may."""
 _O_WORD = re.compile(rb"(?:/[0-9]?)?(?:N[0-9.]+)?O(<[^>]*>|[0-9]+|)(.*)")
-_NAME = re.compile(rb"<[^>]*>")
-_USES = (
+NAME = re.compile(rb"<[^>]*>")
+ANSWER = (
     (re.compile(rb"#0*5399(?![0-9])"), "#5399 is used"),
     (re.compile(rb"#[^0-9<]"), "a parameter is used whose number is computed, #5399 perhaps"),
-    (re.compile(rb"M0*66(?![0-9])"), "M66 is used, whose answer the guard would overwrite"),
+    (re.compile(rb"M0*66(?![0-9])"), "M66 is used, whose answer is #5399"),
     (re.compile(rb"M[\[#]"), "an M code is computed, M66 perhaps"),
     (re.compile(rb"M0*9[789](?![0-9])"), "subprograms are called by M98, and may use #5399"),
 )
+"""Where a program uses #5399, or may: M66 of ours overwrites it."""
 
 
 def guarded(line: int, stream: Sequence[bytes], own: bytes) -> list[bytes]:
@@ -113,14 +114,19 @@ def in_structures(
     return inside
 
 
+def lines_of_code(source: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Each line's number, and what the control reads of it: no blanks, capitals only."""
+    source.seek(0)
+    for number, text in enumerate(source, 1):
+        yield number, b"".join(_COMMENT.sub(_active, text).split()).upper()
+
+
 def _structures(source: BinaryIO, name: str) -> Iterator[tuple[int, float]]:
     """First and last line of each label's structures."""
     first: dict[bytes, int] = {}
     last: dict[bytes, float] = {}
     calls: dict[bytes, int] = {}
-    source.seek(0)
-    for number, text in enumerate(source, 1):
-        code = b"".join(_COMMENT.sub(_active, text).split()).upper()
+    for number, code in lines_of_code(source):
         match = _O_WORD.match(code)
         if match is not None:
             label = match[1]
@@ -134,8 +140,8 @@ def _structures(source: BinaryIO, name: str) -> Iterator[tuple[int, float]]:
             # What stands alone has no end that we know.
             last[label] = number if label in first else np.inf
             first.setdefault(label, number)
-        plain = _NAME.sub(b"<>", code)
-        for pattern, problem in _USES:
+        plain = NAME.sub(b"<>", code)
+        for pattern, problem in ANSWER:
             if pattern.search(plain):
                 raise _refused(problem, name, number)
     for label, number in calls.items():

@@ -43,7 +43,7 @@ from gcodejerk.nc import Dialect, Program, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
-from gcodejerk.planning.straight import LINEAR, leading_axis
+from gcodejerk.planning.straight import LINEAR, leading_axis, outer_steps
 from gcodejerk.storage import windows
 from gcodejerk.units import MM_PER_INCH, per_minute
 
@@ -114,9 +114,10 @@ class LinuxcncController(LinuxcncSettings, Controller):
         leading = leading_axis(way[:, : len(LINEAR)]).tolist()
         # Every row begins with zeros, the last of which is the start.
         starts = ((batch.grid.knots > 0).argmax(axis=1) - 1).tolist()
+        outer = outer_steps(batch.number_format.step[:, 0]).tolist()
         every = [
             _Points(batch, rapids, row, feed[row], *more)
-            for row, more in enumerate(zip(way, leading, starts, strict=True))
+            for row, more in enumerate(zip(way, leading, starts, outer, strict=True))
         ]
         texts = _texts(every, ends)
         for row, move in enumerate(batch.moves.tolist()):
@@ -252,6 +253,7 @@ class _Points:
         way: NDArray[np.float64],
         leading: int,
         first: int,
+        outer: int,
     ) -> None:
         move = batch.moves[row]
         self.inch = bool(rapids.inch[move])
@@ -259,18 +261,20 @@ class _Points:
         self.decimals = INCH_DECIMALS if self.inch else DECIMALS
         self.axes = way.nonzero()[0].tolist()
         self.leading = leading
+        self.outer = outer
         self.sign = 1 if way[leading] > 0.0 else -1
         diameter = bool(rapids.diameter[move])
         scale = {a: 2 if diameter and AXES[a] == "X" else 1 for a in self.axes}
         self.whole = {a: batch.whole[a][row, first:] * scale[a] for a in self.axes}
-        self.scale = scale[self.leading]
+        self.begin = outer * scale[self.leading]
+        """How far the first point is from the start, in steps."""
         self.feed = feed[first + 1 :]
 
     def lead(self, filled: bool) -> list[bytes]:
         """The tiny G0 in front of the points; a slow block in front of it where nothing queues."""
         finer = self.decimals + 1
         end = int(self.whole[self.leading][0]) * 10
-        way = 10 * self.sign * self.scale
+        way = 10 * self.sign * self.begin
         if self.incremental:
             # Increments are counted from the start, which the first of them leaves.
             end = way
@@ -278,7 +282,7 @@ class _Points:
         if self.incremental:
             at = np.diff([0, *at]).tolist()
         # F is about the way of the axis, also where the program gives diameters.
-        feed = per_minute(0.3 * 10.0**-self.decimals / LEAD_TIME)
+        feed = per_minute(0.3 * self.outer * 10.0**-self.decimals / LEAD_TIME)
         words = [
             AXES[self.leading].encode() + format(Decimal(value).scaleb(-finer), "f").encode()
             for value in at

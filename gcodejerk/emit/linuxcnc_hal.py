@@ -18,7 +18,9 @@ Form `adaptive-feed`: one G1 along the rapid at its peak speed, scaled in every 
 Form `position`: LinuxCNC makes its own G0 unseen, the drives get the samples. ::
 
     G4 P0.005                    the filter behind the planner has come to rest
-    M68 E3 Q12                   asks for rapid 12
+    M68 E3 Q[12+1000000*ABS[#[5210+20*#5220]]]
+                                 asks for rapid 12; where the coordinate system is turned (R of
+                                 G10 L2, which the control keeps), for none that there is
     G0 X10.                      the block's own words
     M66 P3 L3 Q3600              waits until the drives have LinuxCNC's own command again
 
@@ -32,6 +34,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,19 +43,19 @@ from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
 from gcodejerk.emit.frame import Frame
 from gcodejerk.emit.gcode import LINE_ENDS, GcodeController
+from gcodejerk.emit.hal_words import ADAPTIVE, POSITION, check_words
 from gcodejerk.emit.linuxcnc import LinuxcncController
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.nc import Dialect, Rapids, parse_block
+from gcodejerk.nc import Dialect, Program, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.storage import made
 from gcodejerk.units import MM_PER_INCH
 
-ADAPTIVE, POSITION = "adaptive-feed", "position"
 LONGEST = 59_000
 """Samples of one rapid; all of them have to be in the FIFO (depth 60,000) when it begins."""
 TINY = 1e-6
@@ -61,6 +64,8 @@ TINY_FEED = 0.6
 """Their F [mm/min]."""
 REST = 5
 """Periods after which the filter behind the planner is at rest; it has three."""
+UNTURNED = b"1000000*ABS[#[5210+20*#5220]]"
+"""0 where the coordinate system in force is not turned: #5230 is R of G54, #5250 that of G55."""
 DECIMALS = 10
 """Of the points in between; LinuxCNC computes in doubles."""
 FEED_DECIMALS = 8
@@ -128,6 +133,13 @@ class LinuxcncHalController(GcodeController):
         shape = rapids.start.shape
         origin = made(lambda part: np.nan_to_num(rapids.start[part]), shape)
         return NumberFormat(rapids.start, np.broadcast_to(FINEST, shape), origin)
+
+    def unguardable(
+        self, program: Program, source: BinaryIO, machine: Machine, dialect: Dialect
+    ) -> NDArray[np.bool_]:
+        """None; programs that say themselves what the form says are refused (`hal_words`)."""
+        check_words(source, program.name, self.form)
+        return super().unguardable(program, source, machine, dialect)
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
         """What has to be installed, and how the form behaves at the machine."""
@@ -226,7 +238,7 @@ def _position(frame: Frame, batch: Batch) -> list[bytes]:
     """LinuxCNC's own rapid, between asking and waiting."""
     return [
         b"G4 P%g" % (REST * batch.grid.interval),
-        b"M68 E3 Q%d" % (frame.move + 1),
+        b"M68 E3 Q[%d+%b]" % (frame.move + 1, UNTURNED),
         frame.last_point({}, b"G0"),
         b"M66 P3 L3 Q3600",
         *frame.after(),

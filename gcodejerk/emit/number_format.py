@@ -27,12 +27,15 @@ _FOUR_DIGITS = np.frombuffer(b"".join(b"%04d" % i for i in range(10_000)), np.ui
 class Column:
     """One word of each line: an address and a number with a fixed count of decimals.
 
-    Without values the prefix stands alone; at least one column has values.
+    Without values the prefix stands alone; at least one column has values. Decimals for which there
+    are too many digits in front of the point are left out: their places hold zeros.
     """
 
     prefix: bytes
     values: Whole | None
     decimals: int
+    digits: int = 18
+    """Most digits of a number."""
 
 
 def format_lines(columns: list[Column], line_end: bytes) -> tuple[bytes, Whole]:
@@ -91,7 +94,7 @@ def _format_rows(
     for column, width in zip(columns, widths, strict=True):
         at = _put(lines, at, column.prefix)
         if column.values is not None:
-            at = _put_number(lines, at, column.values[part], width, column.decimals)
+            at = _put_number(lines, at, column.values[part], width, column)
     _put(lines, at, line_end)
     used = lines != 0
     return lines[used].tobytes(), np.count_nonzero(used, axis=1)
@@ -103,8 +106,9 @@ def _put(lines: Bytes, at: int, text: bytes) -> int:
     return at + len(text)
 
 
-def _put_number(lines: Bytes, at: int, values: Whole, width: int, decimals: int) -> int:
+def _put_number(lines: Bytes, at: int, values: Whole, width: int, column: Column) -> int:
     """Sign, whole part, point and decimals; the column behind them."""
+    decimals = column.decimals
     lines[:, at] = np.where(values < 0, ord("-"), 0)
     digits = _digits(np.abs(values), width)
     # Leading zeros vanish, but for the one in front of the point.
@@ -118,6 +122,9 @@ def _put_number(lines: Bytes, at: int, values: Whole, width: int, decimals: int)
     if decimals:
         at = _put(lines, at, b".")
         lines[:, at : at + decimals] = digits[:, width - decimals :]
+        for left_out in range(1, min(width - column.digits, decimals) + 1):
+            too_long = np.abs(values) >= 10 ** (column.digits + left_out - 1)
+            lines[too_long, at + decimals - left_out] = 0
     return at + decimals
 
 

@@ -166,6 +166,8 @@ class Machine(Description):
             diameter=any(axis.diameter for axis in self.axes),
             cycles=self.program.cycles,
             unrolled_lines=self.program.unrolled_lines,
+            limits={axis.name: axis.largest() for axis in self.axes},
+            straight=self.positioning == "linear",
             subprograms={} if self.subprograms is None else self.subprograms.files,
         )
 

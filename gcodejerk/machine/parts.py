@@ -190,6 +190,15 @@ class Axis:
     servo: Servo | None = None
     """Its drive, for `gcodejerk.simulation`; None: it is where it is told to be."""
 
+    def largest(self) -> tuple[float, float, float]:
+        """Velocity, acceleration and jerk that its rapids and streams may reach."""
+        a, b = self.rapid, self.limit
+        return (
+            max(a.velocity, b.velocity),
+            max(a.acceleration, b.acceleration),
+            max(a.jerk, b.jerk),
+        )
+
     def conventional(self, lone: bool = True) -> Limits:
         """What the controller's own G0 does: this sets the conventional time.
 

@@ -23,6 +23,7 @@ from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, MODES, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.interpreter.runner import Finding, Runner
 from gcodejerk.nc.interpreter.runs import can_run, run_plain
+from gcodejerk.nc.interpreter.unfed import can_run_unfed, run_unfed
 from gcodejerk.nc.text.block import Line
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK
 from gcodejerk.nc.text.tokenizer import parse_line
@@ -164,11 +165,22 @@ class Reader:
         """Whether the lines that follow may be taken as a run."""
         alone = self._plain and not self.flow.inside and not self._structure
         quick = self.dialect.quick and self.runner.executor.rapid_feed is None
-        return quick and self.started and alone and can_run(self.state)
+        if self._unfed:
+            able = self.runner.executor.told_unfed and can_run_unfed(self.state)
+        else:
+            able = can_run(self.state)
+        return quick and self.started and alone and able
+
+    @property
+    def _unfed(self) -> bool:
+        """Whether the control refuses feed moves, since there is no F."""
+        return self.dialect.arcs_refused and not self.state.feed > 0.0
 
     def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
         """Take plain lines of a chunk as arrays; the first that was not taken."""
-        stop, certain = run_plain(self.state, self.log, lines, first, last, place, self.dialect)
+        what = (self.state, self.log, lines, first, last, place, self.dialect)
+        stays = self.runner.executor.stays
+        stop, certain = run_unfed(*what, stays) if self._unfed else run_plain(*what)
         self.blocks += int(np.count_nonzero(lines.letters[first:stop]))
         if certain is not None:
             self.runner.ask(certain)
@@ -329,6 +341,8 @@ class Reader:
                     Finding(line, f"no {codes} before the first rapid: {assumed} is assumed")
                 )
         found += runner.losses()
+        if (rapids.reason == REASONS.index(Reason.LIMIT_SET)).any():
+            found += runner.too_low()
         if not self.state.ended:
             found.append(Finding(None, "program ends without M2, M30 or a closing %"))
         return tuple(found)

@@ -234,7 +234,7 @@ def _fitted(moves: StraightMoves, knots: Counts, emphasis: float, stiffness: flo
         knots=knots,
         speeds=unfiltered(np.diff(moves.way, axis=1) * (share / interval)[:, np.newaxis]),
         rise=np.diff(speed, axis=1) * share[:, np.newaxis],
-        length=1.0 - (TAIL + 2.0 * moves.step) / moves.length,
+        length=1.0 - (TAIL + 2.0 * moves.outer * moves.step) / moves.length,
         end_speed=CREEP * share,
         acceleration=moves.most * interval * share,
         least=CREEP * share,

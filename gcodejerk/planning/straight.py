@@ -24,6 +24,10 @@ FULLEST = 1.5
 """The same at most, where the machine file does not say it."""
 FEWEST = 2.0
 """Steps that an axis moves at least."""
+OUTER = 1e-6
+"""Of the way, in front of the first point and behind the last, at least. A motion of 1e-8 machine
+units is none to the control, inches perhaps (posemath's CART_FUZZ), and this one is three of them.
+[mm]"""
 BITS = 36
 """Of length, direction and profile in which moves that are alike agree."""
 ALIKE = 1.0 - 1e-9
@@ -122,6 +126,11 @@ class StraightMoves:
             step=step,
         )
 
+    @property
+    def outer(self) -> NDArray[np.int64]:
+        """Steps in front of the first point, and behind the last."""
+        return outer_steps(self.step)
+
     def at(self, values: Array, knots: Counts) -> Array:
         """What `way` or `speed` is at knots, shape (b, k) aligned at the end."""
         last = values.shape[1] - 1
@@ -156,6 +165,21 @@ def _along(limits: Array, direction: Array) -> Array:
     with np.errstate(divide="ignore"):
         out: Array = np.where(direction != 0.0, limits / np.abs(direction), np.inf).min(axis=1)
     return np.where(np.isfinite(out), out, 1.0)
+
+
+def outer_steps(step: Array) -> NDArray[np.int64]:
+    """Whole steps that are `OUTER` at least.
+
+    Parameters
+    ----------
+    step : ndarray, shape (n,)
+        [mm]
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+    """
+    return np.ceil(OUTER / step * (1.0 - 1e-9)).astype(np.int64)
 
 
 def leading_axis(way: Array) -> NDArray[np.int64]:

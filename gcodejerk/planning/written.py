@@ -96,12 +96,12 @@ class Written:
         whole = np.zeros((len(step), count + 1, len(LINEAR)), dtype=np.int64)
         at_rest = np.where(moving, from_origin, 0.0)
         here = whole_of(np.zeros(len(step)))
-        here[rows, leading] += sign
+        here[rows, leading] += sign * moves.outer
         position = np.array(at_rest)
         position[rows, leading] = here[rows, leading] * step
         whole[:, 0] = here
         way, speed = np.zeros((len(step), count + 1)), np.zeros((len(step), count + 1))
-        ideal, begin = np.zeros(len(step)), step
+        ideal, begin = np.zeros(len(step)), moves.outer * step
         lasts, length = np.zeros(len(step)), np.zeros(len(step))
         # A length far from zero is known to some last bits only, which a slow block feels.
         far = np.abs(np.stack(limits)) * moving
@@ -135,7 +135,7 @@ class Written:
             whole[:, k] = here
             position = np.where(runs[:, np.newaxis], there, position)
         end = whole_of(moves.length)
-        end[rows, leading] -= sign
+        end[rows, leading] -= sign * moves.outer
         there = np.where(moving, end * size, 0.0)
         whole[:, count] = end
         way[:, count] = way[:, count - 1] + np.sqrt(((there - position) ** 2).sum(axis=1))

@@ -12,6 +12,7 @@ means of its own, step by step, and the processed program with it.
 from __future__ import annotations
 
 import contextlib
+import re
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -37,6 +38,7 @@ SPOOL = 8 << 20
 """A program with blocks written out is held in memory up to this size, then on disk. [bytes]"""
 TERMINATOR_LENGTH = np.array([0, 1, 2, 1])
 """Bytes of a line end, by `Rapids.terminator`."""
+_PART = re.compile(rb"(?<![A-Z])M97(?![0-9])", re.IGNORECASE)
 _COMMENTS = (b"\n(gcodejerk: ", b"\n; gcodejerk: ")
 
 
@@ -176,7 +178,7 @@ def written_out(
                 try:
                     prove(_proven(check_unrolling, used, between, machine, names, dialect, most))
                 except NotFollowedError:
-                    unrolling = unrolling.undone("a second reading does not follow its flow")
+                    unrolling = unrolling.undone(_why_unproven(source))
             used = between if unrolling.written else used
             used.seek(0)
         if front.cycles:
@@ -210,6 +212,18 @@ class Chosen:
             "start": self.start,
             "comments": self.comments,
         }
+
+
+def _why_unproven(source: BinaryIO) -> str:
+    """Say why nothing is written out that the unrolling could follow, and its proof could not."""
+    source.seek(0)
+    for number, line in enumerate(source, 1):
+        if _PART.search(line.partition(b"(")[0]):
+            return (
+                f"M97 (line {number}) runs a part of the program, which the proof does not follow; "
+                "make it a subprogram (M98)"
+            )
+    return "a second reading does not follow its flow"
 
 
 def _require_own(machine: Machine, unrolling: Unrolling | None) -> None:

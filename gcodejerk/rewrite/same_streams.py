@@ -65,6 +65,7 @@ def same_streams(
         here = moves[part]
         before = np.searchsorted(moves, here - 1)
         follows = (moves[before] == here - 1) & (rapids.line[here - 1] + 1 == rapids.line[here])
+        follows &= ~rapids.entered[here]
         behind[part] = np.where(follows, like[before], -1)
     blocks = _digests(rapids, moves, source)
     first, like = sorted_rows((like, behind, blocks), len(moves))

@@ -60,6 +60,7 @@ _FANUC_MODES = (
     *("G68 X0. Y0. R30.", "G69", "G41 D1", "G51 X0. Y0.", "G50", "M98 P100", "G65 P9000"),
     *("#5221=1.", "#500=#4109", "#[1]=5.", "G10 L2 P1 X1.", "G10 L50", "M0", "M1", "M10", "H2"),
     *("G54 P3", "G92 X5.", "G91 G92 X5.", "M198 P5", "M96 P5", "#3006=1", "G90 G54 G49 G0 X1."),
+    *("G63", "#3004=2", "#3004=0"),
 )
 _LATHE_MODES = (
     *("G98", "G99", "G54", "G61", "G64", "G18", "G4 X1.", "M9", "M5", "F.2", "G28 U0. W0."),
@@ -69,7 +70,19 @@ _LATHE_MODES = (
 )
 _PRINTER_MODES = (
     *("G90", "G91", "M82", "M106 S20", "G92 X0", "G28 X", "G28", "G1 E5 F300", "G4 P10", "T0"),
-    *("M400", "G1 F900", "G20", "G21", "M204 P500", "M3 S9", "M5", "M0", "G92", "G0Y0X10"),
+    *(
+        "M400",
+        "G1 F900",
+        "G20",
+        "G21",
+        "M204 P500",
+        "M204 T3000",
+        "M3 S9",
+        "M5",
+        "M0",
+        "G92",
+        "G0Y0X10",
+    ),
 )
 
 _PC_HEAD = ("G21 G90 G17 G94 G64", "G0 X0 Y0 Z5 F200")
@@ -160,7 +173,18 @@ VOCABULARIES: dict[str, Vocabulary] = {
             *("TRANS X5", "R1=5", "G1 X=R1", "G1 X=IC(2)", "G2 X5 Y5 CR=20", 'MSG("X5")', "T1 D1"),
             *("CYCLE81(5,0,2,-3)", "G41", "G40", "ROT Z30", "G74 X1=0", "STOPRE", "L20", "F90"),
             *("$P_UIFR[1]=CTRANS(X,5)", "FGROUP(X,Y)", "FGROUP()", "G700", "G710", "M0", "G54 D1"),
-            *('T="DRILL 8" M6', "G0 X=3 Y = +5", "DEF REAL DEPTH, _WIDE=2.5", "DEPTH=4", "FNORM"),
+            *(
+                'T="DRILL 8" M6',
+                "G0 X=3 Y = +5",
+                "DEF REAL DEPTH, _WIDE=2.5",
+                "DEPTH=4",
+                "FNORM",
+                "COMPCAD",
+                "COMPOF",
+                "SOFT DYNFINISH",
+                "DYNNORM BRISK",
+                "CYCLE832(0.05,1,1)",
+            ),
             *("G0 SUPA Z9 D0", "SUPA X4", "CYCLE800()", 'CYCLE800(1,"TC",0)', "WAITM(1,1,2)"),
         ),
         _AFTER,

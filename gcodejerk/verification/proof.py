@@ -23,7 +23,8 @@ from gcodejerk.nc import Dialect, Program, Start, read_program
 from gcodejerk.spread import Spread
 from gcodejerk.verification.bytes.alignment import Alignment, Progress
 from gcodejerk.verification.bytes.guarded_form import check_guarded
-from gcodejerk.verification.bytes.hal import CONTROLLER, Beside, HalAlignment
+from gcodejerk.verification.bytes.hal import ADAPTIVE, CONTROLLER, Beside, HalAlignment, beginning
+from gcodejerk.verification.bytes.hal_taken import check_taken
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.stamp import read_stamp
 from gcodejerk.verification.findings import Findings, Kind, Verification
@@ -282,9 +283,16 @@ def _judge_pair(
         )  # fmt: skip
         return [], 0
     about = Beside.of(beside)
-    if about is None or abs(about.interval - machine.interval) > 1e-9 * machine.interval:
-        said = "no such file" if about is None else f"for an interval of {about.interval:g} s"
-        found.add(Kind.SAMPLES, None, None, f"the file of samples is {said}")
+    if about is None:
+        found.add(
+            Kind.SAMPLES, None, None,
+            f"what stands beside the program is no file of samples: {beginning(beside)}",
+            "process the program again, and copy both files byte for byte",
+        )  # fmt: skip
+        return [], 0
+    if abs(about.interval - machine.interval) > 1e-9 * machine.interval:
+        said = f"{about.interval:g} s, the machine has {machine.interval:g} s"
+        found.add(Kind.SAMPLES, None, None, f"the file of samples is for an interval of {said}")
         return [], 0
     alignment = HalAlignment(Window(original), Window(processed), program, machine, found)
     alignment.beside = about
@@ -301,6 +309,8 @@ def _judge_pair(
                 check_dynamics(played, machine, 1, found)
     samples.finish()
     alignment.check_opening()
+    if alignment.replaced:
+        check_taken(original, about.form == ADAPTIVE, found)
     alignment.check_sum()
     return alignment.replaced, alignment.kept
 

@@ -135,6 +135,18 @@ def settings_of(machine, factor=1.0, **others):
     return out
 
 
+def in_inches(settings):
+    """The same machine, with an INI in inches."""
+    lengths = {"MAX_VELOCITY", "MAX_ACCELERATION", "MIN_LIMIT", "MAX_LIMIT"}
+    lengths |= {f"{k}_LINEAR_{q}" for k in ("MAX", "DEFAULT") for q in ("VELOCITY", "ACCELERATION")}
+    out = {
+        section: {key: n / 25.4 if key in lengths else n for key, n in values.items()}
+        for section, values in settings.items()
+    }
+    out["TRAJ"]["LINEAR_UNITS"] = "inch"
+    return out
+
+
 def run_or_skip(path, **how):
     """Play a program on LinuxCNC; where there is none, the test is skipped, and says so."""
     try:

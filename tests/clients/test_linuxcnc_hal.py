@@ -9,6 +9,7 @@ import os
 import shutil
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,15 +43,15 @@ AXIS = """  {axis}:
     modes:
 {modes}"""
 MODE = "      - {{name: m{0}, frequency: {0}, damping: 0.02, participation: 1.0}}\n"
-MACHINE = Machine.loads(
+MACHINE_TEXT = (
     "schema: 1\nname: played mill\ncontroller: linuxcnc-hal\nunits: mm\ninterval: 0.001\n"
     "positioning: linear\naxes:\n"
     + "".join(
         AXIS.format(axis=axis, modes="".join(MODE.format(f) for f in frequencies))
         for axis, frequencies in (("X", (30,)), ("Y", (50,)), ("Z", (30, 90)))
-    ),
-    "played.yaml",
+    )
 )
+MACHINE = Machine.loads(MACHINE_TEXT, "played.yaml")
 MIXED = b"""G21 G90 G17 G40 G94 G64
 G0 X0 Y0 Z0
 G4 P0.1
@@ -88,9 +89,21 @@ BETWEEN = {"axis": "X", "beyond": 100.0}
 """An event when LinuxCNC itself is at X100 of the first rapid of LONG."""
 
 
-def play(data, form, *, events=None, change=None, timeout=30):
-    """Process a program, install the form, and play it."""
-    result = process(data, MACHINE, form=form)
+def play(
+    data,
+    form,
+    *,
+    events=None,
+    change=None,
+    timeout=30,
+    acceleration=ACCELERATION,
+    inch=False,
+    machine=None,
+):
+    """Process a program, install the form, and play it; where the INI is in inches, too."""
+    unit = 25.4 if inch else 1.0
+    machine = machine or MACHINE
+    result = process(data, machine, form=form)
     output, samples = result.output, result.beside
 
     def prepare(home):
@@ -105,16 +118,22 @@ def play(data, form, *, events=None, change=None, timeout=30):
     try:
         run = run_or_skip(
             path,
-            acceleration=ACCELERATION,
-            velocity=VELOCITY,
-            settings={"TRAJ": {"MAX_LINEAR_VELOCITY": 1000}},
+            acceleration=acceleration / unit,
+            velocity=machine.axis("X").limit.velocity / unit,
+            settings={
+                "TRAJ": {
+                    "MAX_LINEAR_VELOCITY": 1000 / unit,
+                    "LINEAR_UNITS": "inch" if inch else "mm",
+                }
+            },
             timeout=timeout,
             events=events,
             prepare=prepare,
         )
     finally:
         os.unlink(path)
-    return result, run
+    rows = [(t, x * unit, y * unit, z * unit, *more) for t, x, y, z, *more in run.rows]
+    return result, replace(run, rows=rows, position=tuple(unit * x for x in run.position))
 
 
 def positions(run):
@@ -168,9 +187,10 @@ def assert_within_limits(run, *, braked=True):
     assert not braked or acceleration <= ACCELERATION * 1.01
 
 
+@pytest.mark.parametrize("inch", [False, True])
 @pytest.mark.parametrize(("form", "most"), [(ADAPTIVE, 2e-3), (POSITION, 1e-9)])
-def test_what_is_played_is_the_plan(form, most):
-    result, run = play(MIXED, form)
+def test_what_is_played_is_the_plan(form, most, inch):
+    result, run = play(MIXED, form, inch=inch)
     assert result.planned >= 8
     plans = result.plans
     tolerance = np.maximum(0.10 * result.residual, 0.03 * result.conventional_residual)
@@ -186,6 +206,16 @@ def test_what_is_played_is_the_plan(form, most):
     assert run.position == pytest.approx((100.0, result.program.rapids.target[-1, 1], 12.5))
 
 
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_a_program_of_one_rapid_is_played(form):
+    """Behind its lines stands one more, as many as it needs: what is next never came."""
+    one = b"G21 G90 G17 G40 G94 G64\nG0 X0 Y0 Z0\nG1 X1 F600\nG0 X41\nG1 X40\nM2\n"
+    result, run = play(one, form, events=[{"do": "wait", "idle": True}], timeout=10)
+    assert result.planned == 1
+    assert run.messages == []
+    assert positions(run)[:, 0].max() == pytest.approx(41.0, abs=1e-5)
+
+
 @pytest.mark.parametrize(("form", "way"), [(ADAPTIVE, 60.0), (POSITION, 110.0)])
 def test_abort_in_a_stream_stops_on_the_line_within_the_limits(form, way):
     _, run = play(LONG, form, events=[{"do": "abort", **BETWEEN}])
@@ -196,6 +226,47 @@ def test_abort_in_a_stream_stops_on_the_line_within_the_limits(form, way):
     assert run.position == pytest.approx(tuple(end), abs=1e-6)
     # With samples of its own the machine is switched off, so that LinuxCNC takes its place.
     assert run.enabled == (form == ADAPTIVE)
+
+
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_mdi_at_once_behind_an_abort_moves_nothing_by_a_jump(form):
+    """The feeder sees no rest between both: what it loaded in a stream took the drives back."""
+    events = [
+        {"do": "abort", **BETWEEN},
+        {"do": "mdi", "text": "G1 X200 F6000", "after": 0.0},
+        {"do": "wait", "after": 1.0},
+        {"do": "wait", "idle": True},
+    ]
+    _, run = play(LONG, form, events=events)
+    assert_within_limits(run)
+    assert run.position == pytest.approx(tuple(positions(run)[-1]), abs=1e-6)
+
+
+def test_a_run_at_once_behind_an_abort_leaves_the_next_one_whole():
+    """The new run ends the feeder that is braking the rapid, whatever it was about to do."""
+    events = [
+        {"do": "abort", **BETWEEN},
+        {"do": "run", "after": 0.0},
+        {"do": "wait", "after": 2.0},
+        {"do": "on", "after": 0.0},
+        {"do": "run", "after": 0.3},
+        {"do": "wait", "after": 1.0},
+        {"do": "wait", "idle": True},
+    ]
+    _, run = play(LONG, POSITION, events=events)
+    assert_within_limits(run)
+    assert run.position == pytest.approx((10.0, 0.0, 0.0))
+
+
+def test_an_abort_early_in_a_long_rapid_stops_the_drives_once():
+    """Five seconds later the feeder loads what comes next: the drives are where they stopped."""
+    slow = Machine.loads(MACHINE_TEXT.replace("velocity: 500", "velocity: 100"), "slow.yaml")
+    far = b"G21 G90 G17 G40 G94 G64\nG0 X0 Y0 Z0\nG1 X1 F600\nG0 X901\nG1 X900\nM2\n"
+    events = [{"do": "abort", **BETWEEN}, {"do": "wait", "after": 11.0}]
+    _, run = play(far, POSITION, events=events, machine=slow)
+    assert_within_limits(run)
+    assert 100.0 < positions(run)[-1][0] < 120.0
+    assert run.position == pytest.approx(tuple(positions(run)[-1]), abs=1e-6)
 
 
 @pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
@@ -242,6 +313,16 @@ def test_feed_hold_and_override_keep_the_limits_and_the_ends(form):
     assert 100.0 < held[0] < 300.0
 
 
+def test_above_100_percent_feed_override_nothing_crawls_behind_a_stream():
+    """A rapid that ends before its stream waits for it: the next one stood still for ever."""
+    chained = LONG.replace(b"G1 X299 F600\n", b"")
+    assert process(chained, MACHINE, form=ADAPTIVE).planned == 2
+    events = [{"do": "feed", "to": 1.2, "after": 0.0}, {"do": "wait", "idle": True}]
+    _, run = play(chained, ADAPTIVE, events=events, acceleration=20000.0, timeout=20)
+    assert run.messages == []
+    assert run.position == pytest.approx((10.0, 0.0, 0.0))
+
+
 def test_a_hold_in_front_of_a_stream_and_no_rapid_override_keep_it_waiting():
     """The drives stay where they are as long as LinuxCNC's own G0 may not begin."""
     events = [
@@ -281,6 +362,34 @@ def test_without_its_file_of_samples_nothing_moves(form, damage, says):
     _, run = play(LONG, form, events=events, change=change)
     assert np.abs(positions(run)).max() == 0.0
     assert any(says in message for message in run.messages), run.messages
+
+
+def operator(text):
+    """Sets something by hand before the program runs from its start."""
+    return [
+        {"do": "abort", "after": 0.0},
+        {"do": "mdi", "text": text, "after": 0.3},
+        {"do": "run", "after": 0.5},
+        {"do": "wait", "after": 1.5},
+        {"do": "abort", "after": 0.0},
+        {"do": "wait", "after": 0.3},
+    ]
+
+
+def test_in_a_turned_coordinate_system_nothing_moves():
+    """The samples are ways of X, Y and Z: the drives went along the unturned line."""
+    _, run = play(LONG, POSITION, events=operator("G10 L2 P1 R45"))
+    assert np.abs(positions(run)).max() == 0.0
+    assert any("turned by 45 degrees" in message for message in run.messages), run.messages
+
+
+def test_a_coordinate_system_that_turns_out_to_be_turned_stops_in_front_of_the_rapid():
+    selects = LONG.replace(b"G0 X0", b"G55\nG0 X0")
+    _, run = play(selects, POSITION, events=operator("G54 G10 L2 P2 R90"))
+    assert_within_limits(run)
+    assert any("is turned" in message for message in run.messages), run.messages
+    assert run.told[3]["position"] == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
+    assert np.abs(positions(run)).max() <= 1.0 + 1e-6
 
 
 @pytest.mark.parametrize("form", [ADAPTIVE, POSITION])

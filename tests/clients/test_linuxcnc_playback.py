@@ -6,7 +6,7 @@ therefore played up to three times, and a rapid counts as played well if it once
 
 import numpy as np
 import pytest
-from playing import MARKS, MIXED, mill, rapids, record, settings_of, streams
+from playing import MARKS, MIXED, in_inches, mill, rapids, record, settings_of, streams
 
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.rewrite.pipeline import process
@@ -73,6 +73,53 @@ def test_what_is_played_is_what_was_reported(name, profile, factor, period, tmp_
     lines = result.program.rapids.line
     assert len(best) == result.planned
     assert max(best.values()) <= 1.0, {int(lines[row]): value for row, value in best.items()}
+
+
+INCHES = b"""G20 G90 G17 G40 G94 G64
+G0 X0 Y0 Z0
+G4 P0.2
+G1 X2 F150
+G0 Z0.5
+G1 X4 F150
+G0 Y1.5 Z1
+G1 X5 F150
+G0 X1 Y0 Z0
+G21
+G1 X30 F3600
+G0 X80 Y20
+G1 X81 F3600
+G20
+G91
+G1 X0.2 F150
+G0 X-1
+M2
+"""
+"""Every stream stands behind a feed move at right angles, and in front of another."""
+
+
+@pytest.mark.parametrize("unit", ["inch", "mm"])
+def test_an_ini_in_inches_stops_at_the_ends_of_every_stream(unit, tmp_path):
+    """A motion of 1e-8 machine units is none: of inches, the tiny ones of a stream once were."""
+    machine = machine_of("mill", 0.001)
+    result = process(INCHES, machine, controller="linuxcnc", profile="condition3")
+    assert result.planned == 5
+    settings = settings_of(machine, 1.05)
+    if unit == "inch":
+        settings = in_inches(settings)
+    best = {}
+    for _ in range(3):
+        rows = record(result.output, tmp_path, settings)
+        rows[:, 1:4] *= 25.4 if unit == "inch" else 1.0
+        for played in streams(result, rows, 0.001):
+            now = worth(result, played, 0.001)
+            best[played.row] = min(best.get(played.row, np.inf), now)
+        if max(best.values()) <= 1.0:
+            break
+    assert max(best.values()) <= 1.0, best
+    path, stops = rows[:, 1:4], result.program.rapids
+    for row in np.flatnonzero(result.plans.planned):
+        for corner in (stops.start[row, :3], stops.target[row, :3]):
+            assert np.linalg.norm(path - corner, axis=1).min() < 2e-6, (row, corner)
 
 
 def test_the_drives_shake_less_than_behind_plain_rapids(tmp_path):

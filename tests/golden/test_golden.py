@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from gcodejerk import Machine, ProgramError, process
+from tests.unit.test_alike import hold_golden
 
 HERE = Path(__file__).parent
 CASES = sorted(path.parent.name for path in HERE.glob("*/in.ngc"))
@@ -48,16 +49,10 @@ def made(case):
 def test_output_is_the_golden_one(case, request):
     machine, _, result = made(case)
     golden = HERE / case / ("out.csv" if machine.controller == "csv" else "out.ngc")
-    if request.config.getoption("--update-golden"):
-        golden.write_bytes(result.output)
-    assert golden.exists(), f"{case} has no {golden.name} yet: run pytest --update-golden"
-    assert result.output == golden.read_bytes()
+    hold_golden(result.output, golden, request)
     assert result.verification.ok
     if result.beside is not None:
-        beside = HERE / case / "out.ngc.streams"
-        if request.config.getoption("--update-golden"):
-            beside.write_bytes(result.beside)
-        assert result.beside == beside.read_bytes()
+        hold_golden(result.beside, HERE / case / "out.ngc.streams", request)
 
 
 # A case whose rapids are all left alone has no stamp, and a table is no program.

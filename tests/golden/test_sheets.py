@@ -13,6 +13,7 @@ from gcodejerk.emit.sheets import WIDTH, Sheets
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import ControllerParameter, Machine, find_machine
 from gcodejerk.parameters import LIVE, MARKS, Moves, tune
+from tests.unit.test_alike import hold_golden
 
 HERE = Path(__file__).parent / "sheets"
 MACHINE = Machine.load(HERE / "machine.yaml")
@@ -42,11 +43,7 @@ def live_lines(controller, sheet):
 @pytest.mark.parametrize(("name", "way"), WAYS)
 def test_sheet_is_the_golden_one(name, way, request):
     found, sheet = sheet_of(name, way)
-    golden = HERE / f"{name}.{way}.txt"
-    if request.config.getoption("--update-golden"):
-        golden.write_bytes(sheet)
-    assert golden.exists(), f"no {golden.name} yet: run pytest --update-golden"
-    assert sheet == golden.read_bytes()
+    hold_golden(sheet, HERE / f"{name}.{way}.txt", request)
     controller = load_controller(name)
     # What is not sure is never a live line, and every setting says where it is from.
     sure = {s.mark for s in found.scheme.settings} <= LIVE

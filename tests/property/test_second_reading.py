@@ -37,6 +37,7 @@ def start_of(dialect, known=True):
         startup={"siemens": "G71", "klartext": ""}.get(dialect, "G21") if known else "",
         wraps={"A": "none", "B": "shortest", "C": "sign"} if known else {},
         spindle="mill" if known else None,
+        limits=dict.fromkeys("XYZABCUVW", (300.0, 2500.0, 6e5)) if known else {},
     )
 
 

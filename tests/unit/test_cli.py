@@ -205,21 +205,33 @@ def test_a_refusal_is_status_1_with_a_remedy_and_nothing_written(run, folder, ar
 
 
 @pytest.mark.parametrize(
-    "data",
+    ("data", "said"),
     [
-        b"",
-        b"\0\1\2\3" * 100,
-        "G0 X1\n".encode("utf-16"),
-        b"\xff\xd8\xff\xe0" + bytes(range(256)) * 8,
-        b"G0 X1 " + b" " * 3_000_000 + b"\n",
+        pytest.param(b"", "bad.nc: file is empty", id="empty"),
+        pytest.param(b"\0\1\2\3" * 100, "bad.nc:1:1: file holds the byte 0x00", id="NUL bytes"),
+        pytest.param(
+            b"G0 X1\nM2\n" + b"\0" * 200, "bad.nc:3:1: file holds the byte 0x00", id="padded"
+        ),
+        pytest.param("G0 X1\n".encode("utf-16"), "bad.nc:1:1: file is UTF-16", id="UTF-16"),
+        pytest.param("G0 X1\n".encode("utf-16-be"), "bad.nc:1:1: file seems to be UTF-16", id="BE"),
+        pytest.param("G0 X1\n".encode("utf-16-le"), "bad.nc:1:2: file seems to be UTF-16", id="LE"),
+        pytest.param(
+            b"\xff\xd8\xff\xe0" + bytes(range(256)) * 8,
+            "no NC program but a picture (JPEG)",
+            id="JPEG",
+        ),
+        pytest.param(
+            b"G0 X1 " + b" " * 3_000_000 + b"\n",
+            "bad.nc:1:65537: line has more",
+            id="one long line",
+        ),
     ],
-    ids=["empty", "NUL bytes", "UTF-16", "binary", "one long line"],
 )
-def test_files_that_are_no_programs_are_refused_with_their_place(run, folder, data):
+def test_files_that_are_no_programs_are_refused_with_their_place(run, folder, data, said):
     (folder / "bad.nc").write_bytes(data)
     done = run("process", "bad.nc", "-m", "vmc")
     assert done.code == 1
-    assert "bad.nc" in done.err
+    assert said in done.err
     assert sorted(p.name for p in folder.iterdir()) == ["bad.nc", "part.nc"]
 
 

@@ -234,3 +234,50 @@ def test_a_block_with_a_whole_step_more_than_the_limit_allows_is_refused(control
     )
     assert good.ok
     assert Kind.VELOCITY in {v.kind for v in bad.violations}
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize(("unit", "length", "most"), [("G21", "200.", 18000), ("G20", "8.", 709)])
+def test_where_g1_is_bounded_and_g0_is_not_the_fastest_block_is_told(name, unit, length, most):
+    head = HEADS.get(name, HEAD).replace(b"G21", unit.encode())
+    if unit == "G20":
+        head = head.replace(b"G710", b"G700")
+    made = process(
+        head + f"G0 X{length}\nX0.\nM2\n".encode(),
+        replace(MACHINE, spindle="mill"),
+        controller=name,
+        dialect=name,
+    )
+    said = [note for note in made.notes if "for G1" in note]
+    if not made.planned or name not in ("fanuc", "haas"):
+        assert not said
+        return
+    (note,) = said
+    assert f"F{most} ({'in' if unit == 'G20' else 'mm'}/min)" in note
+    assert "limit.velocity" in note
+
+
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+def test_a_lower_limit_keeps_streams_below_the_highest_cutting_feed(positioning):
+    text = TEXT.replace("jerk: 5.0e+4}", "jerk: 5.0e+4}\n    limit: {velocity: 150}")
+    machine = Machine.loads(text.replace("linear", positioning))
+    slow = replace(machine, design=replace(machine.design, max_extension=2.0))
+    data = HEAD + b"G0 X9. Z7.\nX12.\nX200. Z100.\nX20.\nM2\n"
+    made = process(data, slow, controller="fanuc", dialect="fanuc")
+    assert made.planned
+    feeds = [float(f) for f in re.findall(rb"G1 .*F([0-9.]+)", made.output)]
+    most = int(re.search(r"reach F(\d+)", " ".join(made.notes))[1])
+    assert most <= 60 * 150 * 2**0.5 + 1
+    assert max(feeds) <= most * 1.01
+
+
+@pytest.mark.parametrize(("dialect", "mode"), [("fanuc", "G95"), ("fanuc-lathe-b", "G95")])
+def test_no_dwell_counts_turns_of_a_spindle_that_may_stand(dialect, mode):
+    head = f"G21 G18 G90 G40 {mode} G64 F0.2\nM5\nG1 X1. F0.2\n".encode()
+    data = head + b"G0 X12.\nM30\n"
+    made = process(data, MACHINE, controller="fanuc", dialect=dialect)
+    assert made.planned == 1
+    lines = made.output.splitlines()
+    assert lines.index(b"G94") + 1 == lines.index(b"G4 P1")
+    swapped = made.output.replace(b"G94\nG4 P1\n", b"G4 P1\nG94\n")
+    assert not verify(data, swapped, MACHINE, controller="fanuc", dialect=dialect).ok

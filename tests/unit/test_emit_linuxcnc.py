@@ -169,6 +169,21 @@ def test_inches_come_back_in_inches():
     assert all(-v.as_tuple().exponent == 8 for v in x[:-1])
 
 
+@pytest.mark.parametrize("distance", ["G90", "G91"])
+@pytest.mark.parametrize("start", ["0", "0.123456789", "-7.1234567"])
+def test_every_motion_is_one_where_the_ini_is_in_inches(distance, start):
+    """One of 1e-8 machine units or less is left out by LinuxCNC, and its stop with it."""
+    by = Decimal("0.5")
+    to = by if distance == "G91" else Decimal(start) + by
+    program = f"G20 G90 G94 G64\nG1 X{start} F10\n{distance} G0 X{to}\nM2\n".encode()
+    lines = stream_of(program, comments=False)
+    x = words([line for line in lines if line[:1] == b"G"], "X")
+    at = x if distance == "G90" else [Decimal(start) + sum(x[: k + 1]) for k in range(len(x))]
+    assert at[-1] == Decimal(start) + by
+    moved = [b - a for a, b in pairwise([Decimal(start), *at])]
+    assert min(moved) > Decimal("1.1e-8")
+
+
 def test_a_diameter_stays_a_diameter():
     lathe = Machine.loads(TEXT.replace("X:\n", "X:\n    diameter: true\n"))
     result = process(b"G21 G90 G94 G64 G7 F250\nG0 X30\nM2\n", lathe)

@@ -47,7 +47,10 @@ def samples(beside):
 @pytest.mark.parametrize("form", FORMS)
 def test_the_program_asks_for_the_rapids_that_stand_beside_it(form):
     output, beside = pair(form)
-    asked = [int(n) for n in re.findall(rb"^M6[78] E3 Q([1-9][0-9]*)$", output, re.MULTILINE)]
+    asked = [
+        int(n)
+        for n in re.findall(rb"^M6[78] E3 Q\[?([1-9][0-9]*)(?:\+.*\])?$", output, re.MULTILINE)
+    ]
     assert asked == list(samples(beside)) == [2, 3, 4, 5]
     assert judged(output, beside).ok
 
@@ -103,7 +106,7 @@ DAMAGES = {
     "a rapid too many": lambda o, b: (o, b + b[b.index(b"rapid 5") :]),
     "the order of rapids": lambda o, b: (o, b.replace(b"rapid 3 ", b"rapid 4 ", 1)),
     "the displacement": lambda o, b: (o, b.replace(b"rapid 2 4", b"rapid 2 5", 1)),
-    "the number asked for": lambda o, b: (re.sub(rb"E3 Q3\n", b"E3 Q4\n", o), b),
+    "the number asked for": lambda o, b: (re.sub(rb"(E3 Q\[?)3\b", rb"\g<1>4", o), b),
     "the sum": lambda o, b: (re.sub(rb"M152 P[0-9]", b"M152 P9", o), b),
     "no M152": lambda o, b: (re.sub(rb"M152 [^\n]*\n", b"", o), b),
     "the end": lambda o, b: (o.replace(b"G0 X11 Z-5\n", b"G0 X11.001 Z-5\n"), b),
@@ -127,6 +130,79 @@ def test_verify_finds(form, damage):
     output, beside = DAMAGES[damage](*pair(form))
     found = judged(output, beside)
     assert not found.ok
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda b: b"", "no file of samples: it is empty"),
+        (lambda b: b.replace(b"\n", b"\r\n"), "its lines end with CR LF"),
+        (lambda b: b"\xef\xbb\xbf" + b, r"begins with b'\\xef\\xbb\\xbfgcodejerk streams 1"),
+        (lambda b: b.replace(b"\n0.1", b"\nnan", 1), "was changed since"),
+        (lambda b: b[: len(b) // 2], "not the one that was written with this program"),
+        (lambda b: b[:-1], "not the one that was written with this program"),
+        (lambda b: pair("position", PROGRAM.replace(b"X100", b"X90"))[1], "not the one that was"),
+    ],
+)
+def test_verify_says_what_became_of_the_file_of_samples(damage, says):
+    output, beside = pair("position")
+    first = judged(output, damage(beside)).violations[0]
+    assert str(first.kind) == "samples"
+    assert re.search(says, first.problem), first.problem
+
+
+def test_samples_of_ways_are_asked_for_where_no_coordinate_system_is_turned():
+    """R of G54 is kept by the control: the drives would go along the unturned way."""
+    output, beside = pair("position")
+    asks = b"M68 E3 Q[3+1000000*ABS[#[5210+20*#5220]]]"
+    assert output.count(asks) == 1
+    found = judged(output.replace(asks, b"M68 E3 Q3"), beside).violations
+    assert any(f"expected '{asks.decode()}'" in v.problem for v in found), found
+
+
+BOTH = (
+    b"M67 E3 Q2",
+    b"m 068 e +3.0 q1",
+    b"Q2 E3 M67",
+    b"M68 E[1+2] Q2",
+    b"M66 P3 L3 Q1",
+    b"M[60+7] E3 Q2",
+)
+TAKEN = [
+    *((form, line) for form in FORMS for line in BOTH),
+    ("adaptive-feed", b"M52 P0"),
+    ("adaptive-feed", b"M 52 P1"),
+    ("position", b"M66 P1 L3 Q1"),
+    ("position", b"#1 = [#5399 + 1]"),
+    ("position", b"(debug, came #5399)"),
+    ("position", b"#1 = ##2"),
+    ("position", b"M98 P100"),
+]
+
+
+@pytest.mark.parametrize(("form", "line"), TAKEN)
+def test_programs_that_say_what_the_form_says_are_refused(form, line):
+    program = PROGRAM.replace(b"G1 X5 F300\n", line + b"\nG1 X5 F300\n")
+    with pytest.raises(EmitError, match="no stream of linuxcnc-hal can stand") as caught:
+        process(program, MACHINE, form=form)
+    assert caught.value.place.line == 9
+    # Nor does the proof let such an output pass.
+    output, beside = pair(form)
+    found = judged(output.replace(b"G1 X5 F300", line + b"\nG1 X5 F300"), beside, program)
+    assert [v.original_line for v in found.violations if "no stream may stand" in v.problem] == [9]
+
+
+OWN = (b"M67 E2 Q3", b"M68 E30 Q1", b"(M67 E3 Q2)", b"; M52 P0", b"M62 P3", b"#<m67> = 5")
+
+
+@pytest.mark.parametrize(
+    ("form", "line"),
+    [*((form, line) for form in FORMS for line in OWN), ("adaptive-feed", b"M66 P13 L0")],
+)
+def test_other_outputs_and_inputs_are_the_programs_own(form, line):
+    program = PROGRAM.replace(b"G1 X5 F300\n", line + b"\nG1 X5 F300\n")
+    output, beside = pair(form, program)
+    assert judged(output, beside, program).ok
 
 
 @pytest.mark.parametrize("form", FORMS)

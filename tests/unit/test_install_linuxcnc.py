@@ -216,6 +216,8 @@ def test_a_configuration_that_does_not_fit_is_refused_and_left_alone(config, nam
         ("sim.hal", "addf sampler.0 servo-thread", "addf sampler.0 servo-thread -2", "depends on"),
         ("sim.hal", "net line", "net on motion.enable\nnet line", "motion.enable is linked"),
         ("sim.ini", "BASE_PERIOD = 0", "BASE_PERIOD = 30000", "no multiple of BASE_PERIOD"),
+        ("sim.ini", "[JOINT_1]", "[JOINT_1]\nBACKLASH = 0.02", "JOINT_1. BACKLASH is 0.02"),
+        ("sim.ini", "[JOINT_2]", "[JOINT_2]\nCOMP_FILE = z.comp", "COMP_FILE is z.comp"),
     ],
 )
 def test_the_form_position_needs_more(config, name, old, new, says):
@@ -224,6 +226,12 @@ def test_the_form_position_needs_more(config, name, old, new, says):
     with pytest.raises(EmitError, match=says):
         add(config, "position")
     assert everything(config.parent) == before
+
+
+def test_no_backlash_and_that_of_other_joints_are_none_of_the_form_position(config):
+    edit(config, "[JOINT_1]", "[JOINT_1]\nBACKLASH = 0.000")
+    config.write_text(config.read_text() + "\n[JOINT_3]\nBACKLASH = 0.1\n")
+    assert "the form position" in add(config, "position")[0]
 
 
 def test_read_only_configurations_and_unknown_versions_are_refused(config, monkeypatch):

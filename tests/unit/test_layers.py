@@ -87,7 +87,7 @@ NEVER = {
 """What the picture alone would allow, or what matters enough to be said twice."""
 SECOND_READER = (
     *("reading", "sorting", "known", "coding", "drilling", "circling", "tracking"),
-    *("operating", "computing", "routes", "walking", "klartext", "straight"),
+    *("operating", "computing", "routes", "walking", "klartext", "straight", "limiting"),
 )
 """Modules of `verification` that read programs without the help of `nc`, but for its tables."""
 FOREIGN = {
@@ -232,7 +232,7 @@ def test_the_picture_forbids_what_it_is_there_to_forbid(room, importer, imported
 @pytest.mark.parametrize("name", SECOND_READER)
 def test_the_second_reader_shares_nothing_with_the_first_but_the_tables(name):
     own = {f"gcodejerk.verification.second_reading.{other}" for other in SECOND_READER}
-    tables = {f"gcodejerk.nc.dialects.{part}" for part in ("dialect", "gcodes")}
+    tables = {f"gcodejerk.nc.dialects.{part}" for part in ("dialect", "gcodes", "limits")}
     may = own | tables | {"gcodejerk.axes", "gcodejerk.units"}
     modules = {
         found

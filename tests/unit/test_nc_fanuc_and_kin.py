@@ -187,3 +187,44 @@ def test_whether_f_beside_it_is_a_feed_nobody_says(beside):
     """A stream puts the F back that is in force behind it."""
     text = f"{beside} F90.\nG50.1 X0.\nG0 X5. Y5.\nX6.\nG1 Y6.\n"
     assert read(text.encode(), "fanuc")[-1] == Reason.FEED_UNKNOWN
+
+
+# What replaces a rapid is a feed move: where overrides and feed hold are off, nobody can slow it.
+OFF = {
+    "tapping mode": ("fanuc", "G63\nG0 X5.\n"),
+    "tapping mode of Haas": ("haas", "G63\nG0 X5.\n"),
+    "tapping mode of a lathe": ("fanuc-lathe-a", "G63\nG0 X5.\n"),
+    "all of them": ("fanuc", "#3004=7\nG90 G54 G49 G0 X1. Y1. Z1.\nX5.\n"),
+    "feed hold": ("fanuc", "#3004 = 1\nG90 G54 G49 G0 X1. Y1. Z1.\nX5.\n"),
+    "by a variable": ("fanuc", "#3004=#500\nG90 G54 G49 G0 X1. Y1. Z1.\nX5.\n"),
+    "of Haas": ("haas", "#3004=2\nG90 G54 G49 G0 X1. Y1. Z1.\nX5.\n"),
+}
+ON = {
+    "cutting mode again": ("fanuc", "G63\nG64\nG0 X5.\n"),
+    "exact stop": ("fanuc", "G63\nG61\nG0 X5.\n"),
+    "corners": ("fanuc", "G62\nG0 X5.\n"),
+    "a lathe's": ("fanuc-lathe-a", "G63\nG64\nG0 X5.\n"),
+    "on again": ("fanuc", "#3004=7\n#3004=0\nG90 G54 G49 G0 X1. Y1. Z1.\nX5.\n"),
+    "computed": ("fanuc", "#1=0\n#3004=7\n#3004=#1\nG90 G54 G49 G0 X1. Y1. Z1.\nX5.\n"),
+    "single block": ("fanuc", "#3003=1\nG90 G54 G49 G0 X1. Y1. Z1.\nX5.\n"),
+}
+
+
+@pytest.mark.parametrize(("dialect", "text"), OFF.values(), ids=OFF)
+def test_where_overrides_or_feed_hold_are_off_rapids_stay_as_they_are(dialect, text):
+    facts = {"decimal_point": "calculator"}
+    assert read(text.encode(), dialect, **facts)[-1] == Reason.OVERRIDES_OFF
+    assert also_noticed(text.encode(), dialect, **facts)
+
+
+@pytest.mark.parametrize(("dialect", "text"), ON.values(), ids=ON)
+def test_where_they_are_on_again_rapids_are_certain(dialect, text):
+    assert read(text.encode(), dialect, decimal_point="calculator")[-1] is None
+
+
+def test_a_program_that_never_switches_them_off_has_them_on_behind_a_call():
+    text = "M98 P9\nG21 G90 G40 G94 G49 G54 F9.\nG0 X1. Y1. Z1.\nX5.\n"
+    facts = {"decimal_point": "calculator"}
+    assert read(text.encode(), "fanuc", **facts)[-1] != Reason.OVERRIDES_OFF
+    again = "G63\nG64\n" + text
+    assert read(again.encode(), "fanuc", **facts)[-1] == Reason.OVERRIDES_OFF

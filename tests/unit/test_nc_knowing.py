@@ -6,9 +6,10 @@ import random
 import pytest
 
 from gcodejerk.nc import DIALECTS, Start, read_program
+from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.reasons import CERTAIN, REASONS
 from gcodejerk.verification.findings import Findings
-from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.second_reading.agreement import confirm, observations
 
 POSITIONS = {"X": 0.0, "Y": 0.0, "Z": 0.0}
 STARTUP = {
@@ -386,3 +387,31 @@ def test_what_is_no_number_of_a_spindle_is_not_understood(words):
 def test_beside_a_spindle_a_rapid_stays_as_it_is():
     reasons, _ = read(b"F9 G0 X1\nG0 X2 M3 $0\nG0 X3\nM2\n", "linuxcnc")
     assert reasons == [None, "other words of the block cannot keep their order", None]
+
+
+COMPENSATED = b"G0 X0. Y0. Z5.\nG41 D1 G1 X1. Y1.\nX5. Y5.\n"
+NO_LENGTH = [
+    *(
+        b"G40\nG1 X5. Y5.\n",
+        b"G40 G1 X5. Y5.\n",
+        b"G40\nG1 Y5.\nX5.\n",
+        b"G40\nG91 G1 X0. Y0.\nG90\n",
+    ),
+    *(b"G40\nG1 Z9.\n", b"G40\nG0 X5. Y5.\n"),
+]
+LENGTH = [b"G40\nG1 X6. Y5.\n", b"G40 G1 X5. Y4.\n", b"G40\nG91 G1 X1.\nG90 X3. Y3.\n"]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "siemens"])
+@pytest.mark.parametrize("ends", [*NO_LENGTH, *LENGTH])
+def test_g40_is_done_with_a_move_that_has_a_length(dialect, ends):
+    modes = b"G710 G90 G94 G17 G40" if dialect == "siemens" else b"G21 G90 G94 G17 G40 G49 G80"
+    head = modes + b" G54 G64 F100.\n" + COMPENSATED
+    start = Start(decimal_point="calculator")
+    text = head + ends + b"G0 X9. Y9.\n"
+    rapids = read_program(io.BytesIO(text), dialect=dialect, start=start).rapids
+    lines = [int(rapids.line[-1])]
+    ((_, seen),) = observations(io.BytesIO(text), find_dialect(dialect), start, lines)
+    certain = ends in LENGTH
+    assert (rapids.reason[-1] == CERTAIN) == certain
+    assert (seen.sure and seen.start[0] == seen.start[0]) == certain

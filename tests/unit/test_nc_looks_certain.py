@@ -168,9 +168,17 @@ NOT_CERTAIN = {
         "siemens", b"R1=5\nR[0]=SET(7,8)\nG0 X=R1\n", Reason.EXPRESSION
     ),
     "a tolerance for the path": (
-        "siemens", b"G60\nCYCLE832(0.05,1,1)\nG0 X9\n", Reason.PATH_UNKNOWN
+        "siemens", b"G60\nCYCLE832(0.05,1,1)\nCOMPOF DYNNORM\nG0 X9\n", Reason.PATH_UNKNOWN
     ),
-    "no tolerance any more": ("siemens", b"CYCLE832(0,1)\nG0 X9\n", Reason.PATH_UNKNOWN),
+    "no tolerance any more": (
+        "siemens", b"CYCLE832(0,1)\nCOMPOF DYNNORM\nG0 X9\n", Reason.PATH_UNKNOWN
+    ),
+    "curves of a Fanuc": ("fanuc", b"G5.1 Q2 X0 Y0 Z0\nG0 X9.\n", Reason.COMPRESSED),
+    "nano smoothing": ("haas", b"G05.1 Q3\nG0 X9.\n", Reason.COMPRESSED),
+    "moves that are stored": ("fanuc", b"G05 P10001 L1\nG0 X9.\n", Reason.START_UNKNOWN),
+    "curves instead of blocks": ("siemens", b"SOFT COMPCAD FFWON\nG0 X9\n", Reason.COMPRESSED),
+    "curves of a cycle": ("siemens", b"CYCLE832(0.05,1,1)\nG0 X9\n", Reason.COMPRESSED),
+    "curves as the machine has them": ("siemens", b"CYCLE832()\nG64\nG0 X9\n", Reason.COMPRESSED),
     "T may run a cycle": (
         "siemens", b"R1=5\nT2\nG0 X0 Y0 Z0\nG0 X=R1\n", Reason.EXPRESSION
     ),
@@ -277,7 +285,10 @@ STILL_CERTAIN = {
     "an absolute word behind a shift": (
         "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nG0 X5\nG91 X6\n"
     ),
-    "a path that blends still": ("siemens", b"CYCLE832(0.05,1,1)\nG0 X9\n"),
+    "a path that blends still": ("siemens", b"CYCLE832(0.05,1,1)\nCOMPOF DYNNORM\nG0 X9\n"),
+    "lines again": ("fanuc", b"G5.1 Q2 X0 Y0 Z0\nG1 X8. F100.\nG5.1 Q0\nG0 X9.\n"),
+    "look-ahead alone": ("fanuc", b"G5.1 Q1 R5\nG0 X9.\nG8 P1\nG0 X5.\n"),
+    "blocks again": ("siemens", b"COMPON\nG1 X8 F100\nCOMPOF\nG0 X9\n"),
     "ATRANS behind TRANS": (
         "siemens", b"TRANS\nG0 X0 Y0 Z50\nTRANS X10\nATRANS X5\nG0 X5\n"
     ),
@@ -529,6 +540,9 @@ def test_a_tolerance_that_holds_in_one_branch_only_makes_the_path_unknown():
     assert read_program(io.BytesIO(data)).rapids.path[-1] == 0
 
 
+CONSTANT = ("ended", "touched", "fixed", "wraps", "limits", "straight", "line", "lost")
+
+
 def _different(field, k):
     """A value of a field that another k does not give."""
     return {
@@ -541,7 +555,7 @@ def _different(field, k):
 def test_every_field_of_the_state_is_joined_forgotten_and_compared(field):
     a, b = State(), State()
     if field.kind in ("constant", "note"):
-        assert field.name in ("ended", "touched", "fixed", "wraps", "line", "lost")
+        assert field.name in CONSTANT
         return
     for k, state in enumerate((a, b)):
         value = _different(field, k)
@@ -586,6 +600,7 @@ def test_every_field_of_the_second_reading_is_joined(name):
         "modes": [{"motion": 0}, {"motion": 10}], "frames": [{"r": True}, {"r": False}],
         "axes": [[1.0] * len(AXES), [2.0] * len(AXES)], "table": [{1: 2.0}, {1: 3.0}],
         "number": [1.0, 2.0], "tolerance": [1.0, 2.0], "ever": [False, True], "mode": [1, 2],
+        "least": [{"velocity": 2.0}, {"velocity": 1.0, "jerk": 3.0}],
     }  # fmt: skip
     kind = KINDS[name]
     if kind in ("given", "place"):
@@ -603,6 +618,8 @@ def test_every_field_of_the_second_reading_is_joined(name):
         assert all(map(math.isnan, joined))
     elif kind == "table":
         assert joined == {}
+    elif kind == "least":
+        assert joined == {"velocity": 1.0, "jerk": 3.0}
     elif kind == "ever":
         assert joined is True
     else:
@@ -685,3 +702,18 @@ def test_a_plane_that_nobody_knows_is_no_error_of_the_second_reader():
     machine = replace(machine, controller="csv", dialect="heidenhain-iso")
     made = process(program, machine)
     assert (made.planned, made.verification.confirmed) == (1, 1)
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "iso-mill"])
+@pytest.mark.parametrize("words", [b"G5.1 Q1 X0. Y0. Z0.", b"G05.1Q2X0Y0Z0\nG5.1Q0"])
+def test_axes_that_are_smoothed_do_not_move(dialect, words):
+    data = HEADS["fanuc"] + b"G0 X10. Y20. Z9.\n" + words + b"\nG0 X50.\n"
+    rapids = read_program(io.BytesIO(data), dialect=dialect).rapids
+    assert rapids.reason[-1] == CERTAIN
+    assert rapids.start[-1, :3].tolist() == [10.0, 20.0, 9.0]
+    found = Findings(100)
+    confirm(io.BytesIO(data), dialect, Start(), rapids, [len(rapids) - 1], found)
+    assert not found.violations
+    rapids.start[-1, 0] = 0.0  # as if the axis had moved
+    confirm(io.BytesIO(data), dialect, Start(), rapids, [len(rapids) - 1], found)
+    assert found.violations

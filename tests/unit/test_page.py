@@ -274,6 +274,7 @@ SIEMENS_HEAD = b"G710 G40 G90 G94 G17 G64\nG1 X0 Y0 Z0 F200\n"
          {"controller": "fanuc", "dialect": "fanuc"}),
         (Reason.FEED_GROUP, b"FGROUP(X,Y)\nG0 X30.\n", b"FGROUP(X,Y)\nFGROUP()\nG0 X30.\n",
          SIEMENS),
+        (Reason.COMPRESSED, b"COMPON\nG0 X30.\n", b"COMPON\nCOMPOF\nG0 X30.\n", SIEMENS),
         (Reason.FEED_UNIT, b"G70\nG0 X3.\n", b"G700\nG0 X3.\n", SIEMENS),
     ],
 )  # fmt: skip

@@ -91,6 +91,9 @@ AT = "G0 X77.\nM2\n"
 LOOP = "o1 repeat [2]\nG91 G0 X77.\nG1 X-3.\nG90\no1 endrepeat\nM2\n"
 CALLS = "O1\n" + KNOWN + "M98 P2\nG0 X9.\nM98 P2\nM30\nO2\nG91\nG0 X77.\nG90\nM99\n"
 CYCLE = "G98 G81 X77. Y5. R1. Z-5.\nX80.\nG80\nM2\n"
+PRINTER = {"controller": "marlin", "spindle": "mill"}
+SLOWED = "M204 S2000\nG21\nG90\nG0 X3 Y3 Z3 F9000\nG0 X77\n"
+DIAGONAL = "M204 T2500\nG21\nG90\nG1 X3 Y3 Z3 F9000\nG0 X77 Z77\n"
 BEAM = MILL + "M3 S100\nG1 Z1.\n"
 
 CASES = [
@@ -201,6 +204,10 @@ CASES = [
         Reason.LOOK_AHEAD, "G103", HAAS, KNOWN + "G103 P1\n" + AT, KNOWN + "G103 P1\nG103\n" + AT
     ),
     Case(
+        Reason.COMPRESSED, "COMPOF", SIEMENS, FRAMED + "G64\nCOMPCAD\n" + AT,
+        FRAMED + "G64\nCOMPCAD\nCOMPOF\n" + AT + "COMPCAD\n",
+    ),
+    Case(
         Reason.FEED_GROUP, "FGROUP()", SIEMENS, FRAMED + "G64\nFGROUP(X,Y)\n" + AT,
         FRAMED + "G64\nFGROUP(X,Y)\nFGROUP()\n" + AT,
     ),
@@ -269,6 +276,44 @@ CASES = [
     Case(
         Reason.MIXED_AXES, "blocks of their own", FANUC,
         BOTH + "G0 X77. A20.\nM2\n", BOTH + "G0 X77.\nG0 A20.\nM2\n", machine=WRAPS,
+    ),
+    Case(
+        Reason.LIMIT_SET, "the limit in the machine file", "marlin", SLOWED,
+        machine=PRINTER, then=PRINTER | {
+            "axes": {name: one | {"rapid": RAPID | {"acceleration": 2000}}
+                     for name, one in AXES.items()},
+        },
+    ),
+    Case(
+        Reason.LIMIT_SET, "the line is taken out", "marlin", SLOWED,
+        SLOWED.replace("M204 S2000\n", ""), machine=PRINTER,
+    ),
+    Case(
+        Reason.OVERRIDES_OFF, "G64", FANUC, KNOWN + "G63\n" + AT, KNOWN + "G63\nG64\n" + AT,
+    ),
+    Case(
+        Reason.LIMIT_SET, "DYNNORM", SIEMENS, FRAMED + "G64\nDYNFINISH\n" + AT,
+        FRAMED + "G64\nDYNFINISH\nDYNNORM\n" + AT,
+    ),
+    Case(
+        Reason.LIMIT_SET, "BRISK", SIEMENS, FRAMED + "G64\nDRIVE\n" + AT,
+        FRAMED + "G64\nDRIVE\nBRISK\n" + AT,
+    ),
+    Case(
+        Reason.COMPRESSED, "COMPOF DYNNORM", SIEMENS, FRAMED + "G64\nCYCLE832(0.05,1,1)\n" + AT,
+        FRAMED + "G64\nCYCLE832(0.05,1,1)\nCOMPOF DYNNORM\n" + AT,
+    ),
+    Case(
+        Reason.LIMIT_SET, "so much higher", "marlin", DIAGONAL,
+        DIAGONAL.replace("T2500", "T3536"), machine=PRINTER,
+    ),
+    Case(
+        Reason.LIMIT_SET, "blocks of their own", "marlin", DIAGONAL,
+        DIAGONAL.replace("G0 X77 Z77", "G0 X77\nG0 Z77"), machine=PRINTER,
+    ),
+    Case(
+        Reason.LIMIT_SET, "ACC in percent", SIEMENS, FRAMED + "G64\nACC[X]=50\n" + AT,
+        FRAMED + "G64\nACC[X]=50\nACC[X]=100\n" + AT,
     ),
     Case(
         Reason.APART, "Z in a block of its own", "centroid",

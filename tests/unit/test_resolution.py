@@ -11,6 +11,7 @@ from gcodejerk.errors import MachineError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import DIALECTS
 from gcodejerk.rewrite.pipeline import process
+from gcodejerk.verification import Kind, verify
 
 VMC = Machine.load(find_machine("vmc"))
 TEXT = """\
@@ -131,3 +132,61 @@ def test_a_point_with_more_digits_than_the_control_reads_is_not_written(x, plann
         from gcodejerk.reasons import REASONS
 
         assert str(REASONS[result.plans.reason[-1]]) == "line or number too long for the control"
+
+
+FAST = """
+interval: 0.001
+positioning: linear
+axes:
+  X:
+    resolution: {}
+    rapid: {{velocity: 1800, acceleration: 10000, jerk: 1.0e+6}}
+    modes: [{{frequency: 30, damping: 0.02}}]
+program: {{start: {{X: 0}}}}
+"""
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "grbl"])
+@pytest.mark.parametrize("resolution", ["0.001", "1.0e-5"])
+def test_f_has_no_more_digits_than_the_control_reads(dialect, resolution):
+    data = (HEADS[dialect].format(u=21) + "G90\nG0 X800.\nM30\n").encode()
+    machine = Machine.loads(FAST.format(resolution))
+    made = process(data, machine, dialect=dialect, controller=dialect)
+    assert made.planned == 1
+    lines = [line for line in made.output.splitlines() if line.startswith(b"G1 ")]
+    feeds = [line.rpartition(b" F")[2] for line in lines]
+    assert max(map(float, feeds)) > 100_000.0
+    assert max(len(feed.replace(b".", b"")) for feed in feeds) == 8
+    fastest = max(feeds, key=float)
+    longer = made.output.replace(b" F" + fastest, b" F" + fastest + b"0", 1)
+    found = verify(data, longer, machine, dialect=dialect, controller=dialect)
+    assert {violation.kind for violation in found.violations} == {Kind.FORM}
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "grbl", "siemens"])
+@pytest.mark.parametrize("stream", [0, 1, 2])
+def test_f_of_the_last_point_has_no_more_digits_either(dialect, stream):
+    """The first stream is read word by word, the others by their form."""
+    head = HEADS[dialect].format(u=21, s=710)
+    data = (head + "G90\nG0 X800.\nG0 X5.\nG0 X760.\nM30\n").encode()
+    machine = Machine.loads(FAST.format("0.001"))
+    made = process(data, machine, dialect=dialect, controller=dialect)
+    assert made.planned == 3
+    lines = made.output.split(b"\n")
+    lasts = [
+        k
+        for k, line in enumerate(lines)
+        if line.startswith(b"G1 ") and not lines[k + 1].startswith(b"G1 ")
+    ]
+    assert len(lasts) == 3
+    at = lasts[stream]
+    written = lines[at].rpartition(b" F")[2].replace(b".", b"")
+    digits = len(written) if dialect == "siemens" else 8
+    for zeros, kinds in (
+        (digits - len(written), set()),
+        (digits - len(written) + (6 if dialect == "siemens" else 1), {Kind.FORM}),
+        (60, {Kind.FORM}),
+    ):
+        longer = [*lines[:at], lines[at] + b"0" * zeros, *lines[at + 1 :]]
+        found = verify(data, b"\n".join(longer), machine, dialect=dialect, controller=dialect)
+        assert {v.kind for v in found.violations if v.kind != Kind.STAMP} == kinds

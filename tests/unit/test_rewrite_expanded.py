@@ -188,3 +188,14 @@ def test_the_command_line_writes_proves_and_shows(run):
 def test_a_table_has_no_cycles(run):
     code, out = run("verify", "holes.ngc", "holes.csv", "-m", "vmc", "--expand-cycles")
     assert (code, "no cycles" in out) == (2, True)
+
+
+def test_m97_that_the_proof_does_not_follow_is_named():
+    text = (
+        "%\nO1\nG21 G90 G94 G17 G40 G49 G80 G54 G64\nG0 X0. Y0. Z50.\nG1 X5. F500.\nM97 P9 L2\n"
+        "G0 X80.\nM30\nN9 G91 G0 X10.\nG1 X-2.\nG90\nM99\n%\n"
+    )
+    machine = replace(Machine.load(find_machine("vmc")), controller="haas", dialect="haas")
+    made = process(text.encode(), machine, unroll=True)
+    assert made.planned == 1
+    assert any("M97 (line 6) runs a part" in note for note in made.notes), made.notes

@@ -122,6 +122,11 @@ DAMAGE = {
     "point with seven decimals": (line(6), line(6).replace(" F", "1 F"), Kind.FORM),
     "another axis": (line(6), line(6).replace(" F", " X0.0 F"), Kind.FORM),
     "lead-in missing": (LEAD, "", Kind.FORM),
+    "lead-in of nothing": (
+        LEAD,
+        "G0 Z0.0000002\nG1 Z0.0000004 F0.0012\nG0 Z0.000001\n",
+        Kind.FORM,
+    ),
     "lead-in in no time": (LEAD, LEAD.replace("F0.0018", "F18"), Kind.FEED),
     "lead-in of an hour": (LEAD, LEAD.replace("F0.0018", "F0.000000005"), Kind.FEED),
     "lead-in of one line": (LEAD, "G0 Z0.000001\n", Kind.FORM),

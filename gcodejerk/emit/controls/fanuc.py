@@ -5,6 +5,9 @@ whole ms (A-63512EN p. 9 for the role of 1620 and the acceleration 1420/1620; A-
 1773 and 1774 for the look-ahead rapid of the 16i, 18i and 21i). The ranges, the number 1621 and
 that G10 sets them without power off are unverified: lines that do are written for numbers that the
 machine file confirms. G10 L52 (0i, 30i; older controls L50): R.
+
+A cutting feed beyond the upper limit is clamped to it (B-63172EN/01 p. 29), and G0 is not: 1422,
+and 1430 for each axis.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ class FanucController(Sheets, GcodeController):
     """Fanuc mills and lathes."""
 
     name = "fanuc"
+    highest_feed = "the highest cutting feed (parameters 1422, 1430)"
     forms = (
         unmeasured(
             "G1 blocks of 2 ms need look-ahead (AI contour control) and its block processing time"

@@ -12,4 +12,5 @@ class HaasController(GcodeController):
     """Haas mills."""
 
     name = "haas"
+    highest_feed = "the machine's highest cutting feed"
     forms = (unmeasured("G1 blocks of 2 ms need high-speed machining (setting 191, G187)"),)

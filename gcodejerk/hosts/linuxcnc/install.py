@@ -360,6 +360,7 @@ def _joints(ini: Ini, hal: Hal) -> tuple[int, list[hal_files.Joint]]:
         if letter not in letters:
             continue
         joint = letters.index(letter)
+        _check_uncompensated(ini, joint)
         signals = []
         for pin in (f"joint.{joint}.motor-pos-cmd", f"joint.{joint}.motor-pos-fb"):
             if pin not in hal.signal:
@@ -373,6 +374,20 @@ def _joints(ini: Ini, hal: Hal) -> tuple[int, list[hal_files.Joint]]:
     if len(out) < 2:
         raise EmitError(f"there are no axes X, Y or Z in {letters!r}", None, ini.place())
     return hal.functions["servo-thread"].index("motion-controller") + 1, out
+
+
+def _check_uncompensated(ini: Ini, joint: int) -> None:
+    """Refuse a joint whose motor LinuxCNC itself leads elsewhere than its axis says."""
+    for key in ("BACKLASH", "COMP_FILE"):
+        for entry in ini.all(f"JOINT_{joint}", key):
+            if re.fullmatch(r"[-+]?(?:0*\.?0*|0+\.?0*[eE].*)", entry.value.split("#")[0].strip()):
+                continue
+            raise EmitError(
+                f"[JOINT_{joint}] {key} is {entry.value}: what LinuxCNC adds to the motor's "
+                "position is not in the samples, and the machine would switch off behind a rapid",
+                "use --form adaptive-feed, in which LinuxCNC compensates as ever",
+                ini.place(entry.line),
+            )
 
 
 def _period(ini: Ini) -> float:

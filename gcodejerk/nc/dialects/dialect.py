@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.limits import Limit, Mode
 from gcodejerk.nc.dialects.spelling import Text, Writing
 from gcodejerk.start import Start
 
@@ -41,6 +42,8 @@ ANOTHER_LANGUAGE = "another language"
 """Name, among the bars, of one that the table does not have."""
 LEFT_OVER = "compensation that ends"
 """Name, among the bars, of what G40 leaves of the offset, which goes with the next move."""
+OVERRIDES, OVERRIDES_SET = "overrides off", "overrides off by a variable"
+"""The same of overrides and feed hold that are off in a mode, or by what a variable was set to."""
 CYCLE_CALL = "cycle call"
 """Group of the M codes that run a cycle behind the motion of their block."""
 HARMLESS = "harmless"
@@ -77,7 +80,9 @@ Effect = Literal[
     "further turn",  # the same on top of what is in force; bare, nobody knows
     "corner",  # the corner behind its block is cut, so that the next one begins elsewhere
     "corners",  # so are all that follow, until it is 0
-    "smoothing",  # selects a continuous path; without a first argument, or with 0, nobody knows
+    "smoothing",  # a continuous path, unknown where its first argument is 0 or none; a compressor
+    "compressor",  # makes polynomials of G1 blocks, with speeds of its own
+    "no compressor",  # no longer
     "turn",  # positions a spindle, which may be a rotary axis as well
     "watch",  # what is said here may act at any time from here on
     "transform",  # turns, scales or mirrors what follows, for good
@@ -92,6 +97,7 @@ Effect = Literal[
     "written",  # writes offsets, tool data or parameters of the control
     "feed group",  # F means the speed of the axes that it names; of all, where it names none
     "feed override",  # scales F, and not G0
+    "limit",  # sets a limit, by `Dialect.limits`
 ]
 """What a code, or a name such as ``TRANS``, does besides changing its modal group."""
 
@@ -155,6 +161,8 @@ class Arithmetic:
     """From this number on a variable may hold data that rename where the axes stand; 0: none."""
     timers: frozenset[int] = frozenset()
     """Those of them that hold no such thing."""
+    overrides: str = ""
+    """That which switches overrides and feed hold off, by anything but 0."""
     at_selection: bool = False
     """What such a variable holds takes effect where a work system is selected, not before."""
     compared: Literal["near", "digits", "relative"] = "near"
@@ -262,13 +270,17 @@ class Dialect:
     """F counts in the unit in force in front of a block that also states one."""
     lengths_only: frozenset[int] = frozenset()
     """Codes for inch or mm that leave the unit of F as it was."""
-    bars: Mapping[int, tuple[str, bool | Literal["P"]]] = field(default_factory=dict)
+    bars: Mapping[int, tuple[str, bool | Literal["P", "Q"]]] = field(default_factory=dict)
     """G code -> a name in `eligibility.BARS`, and whether it begins or ends; "P": it begins where
-    P is given and not 0."""
+    P is given and not 0; "Q": it ends where Q is given and 0 or 1."""
     m_bars: Mapping[int, str] = field(default_factory=dict)
     """M code -> a name in `eligibility.BARS`, which begins unless P is 0."""
     m_scales: frozenset[int] = frozenset()
     """M codes that scale F, and with it rapids that run at F, to so many percent as S says."""
+    limits: Mapping[str, Mapping[str, Limit]] = field(default_factory=dict)
+    """M code, name or `limits.SETTING` -> its word -> what that limits of streams and rapids."""
+    limit_modes: Mapping[str, Mode] = field(default_factory=dict)
+    """Name -> what limits it selects by itself."""
     tool_word_moves: bool = False
     """T may call a program of the builder's."""
     dark_rapids: bool = False
@@ -299,7 +311,8 @@ class Dialect:
     rapid: int = 0
     arcs: frozenset[int] = frozenset({20, 30})
     arcs_refused: bool = False
-    """An arc that does not meet its end is refused, and whoever sends the program may go on."""
+    """An arc that does not meet its end is refused, and a feed move before any F; and whoever sends
+    the program may go on."""
     harmless: frozenset[int] = frozenset({0})
     """G codes whose effect does not depend on when, within its block, a rapid runs."""
     before_m: frozenset[int] = frozenset()

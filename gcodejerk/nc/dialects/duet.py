@@ -19,6 +19,7 @@ src/GCodes/GCodes2.cpp (HandleGcode, HandleMcode). What is different from Marlin
 
 from __future__ import annotations
 
+from gcodejerk.nc.dialects import limits
 from gcodejerk.nc.dialects.dialect import Dialect, Effect, code_names, grouped
 from gcodejerk.nc.dialects.spelling import Text, Writing
 
@@ -111,6 +112,7 @@ DUET = Dialect(
     in_turn=_MODES,
     dark_rapids=True,
     incremental_set=True,
+    limits=limits.DUET,
     tool_frame=frozenset("T"),
     macro_change=True,
     unknown_lasts=True,

@@ -16,6 +16,12 @@ beside G51.1 and G50.1 are those that are mirrored and no longer mirrored (ISO d
 which codes of the list of the 30i turn or shift for good, is general knowledge, used to leave
 rapids alone. So is that M21 to M23 mirror the axes of older controls, and that C, or on a
 lathe any rotary axis, is what M3 turns.
+G5.1 Q2 X0 Y0 Z0 makes curves of short lines of the axes that it names, until Q0 (15i-MA manual,
+4.16); that Q3 is nano smoothing, a curve too, is general knowledge that was not looked up. Nor was
+it that G5 may run stored moves, used to leave rapids alone.
+G63, tapping mode, takes feed override and feed hold away until G61, G62 or G64 (0i, B-64154EN/01 p.
+53 has the group; what G63 does: cnc.wiki, "G62 and G63", and general knowledge); #3004 does until
+it is 0 (zappettiniconsulting.com, "Feed hold").
 A thread (G32, G33) ends at its words and stays there: Haas lathes, G32 ("no automatic position
 return is performed at the end"); ADT-CNC4620 programming manual p. 27 (X, Z: end of the thread).
 Of threads of changing lead (G34) no page was found.
@@ -30,6 +36,7 @@ from dataclasses import replace
 from gcodejerk.nc.dialects.dialect import (
     COMPENSATION,
     LEFT_OVER,
+    OVERRIDES,
     Arithmetic,
     Dialect,
     Drilling,
@@ -74,6 +81,8 @@ _EFFECTS: dict[int, Effect] = {
     920: "set",
     921: "frames",
     220: "words",  # limits of travel
+    **dict.fromkeys((51, 80), "words"),  # G5.1 Q2 X0 Y0 Z0: the axes that are smoothed
+    50: "home",  # P10001 runs what is stored
     650: "flow",
     **dict.fromkeys((660, 661), "modal cycle"),
 }
@@ -176,7 +185,10 @@ FANUC = Dialect(
         670: ("modal macro", False),
     },
     units_once=True,
-    bars={400: (LEFT_OVER, True)},
+    bars={
+        **{400: (LEFT_OVER, True), 51: ("compressor", "Q"), 630: (OVERRIDES, True)},
+        **dict.fromkeys((610, 620, 640), (OVERRIDES, False)),
+    },
     tool_cancelled_by_return="named",
     whole_numbers="machine",
     packed_repeats=True,
@@ -208,6 +220,7 @@ FANUC = Dialect(
         system=1000,
         offsets=1000,
         timers=frozenset({3000, 3001, 3002}),
+        overrides="3004",
         feed=frozenset({"4109"}),
     ),
     harmless=frozenset(
@@ -227,7 +240,9 @@ FANUC = Dialect(
 )
 
 # A lathe: X is a diameter (`diameter: true` on the axis). T selects offsets, so it changes the
-# frame. G71 to G73 run the blocks from N(P) to N(Q) by themselves. An A word is an angle of direct
+# frame. G71 to G73 run the blocks from N(P) to N(Q) by themselves. Behind them the axes stand where
+# nobody knows: that they are back at the start say guides of other builders (ROBUR F1, p. 48, of
+# G71; ADT-CNC4620, p. 48, of G73), of G70 no page was found. An A word is an angle of direct
 # drawing there, from which the control computes the end: not a letter here.
 _LATHE_CYCLES = (700, 710, 720, 730, 740, 750, 760)
 _LATHE_EFFECTS: dict[int, Effect] = {
@@ -252,7 +267,7 @@ _LATHE_GROUPS = {
     "system": SYSTEMS,
     "spindle mode": (960, 970),
     "stroke limit": (220, 230),
-    "path": (610, 640),
+    "path": (610, 620, 630, 640),
     "polar interpolation": (121, 131, 1120, 1130),
     "cylinder": (71,),
     "balance": (680, 681, 690),

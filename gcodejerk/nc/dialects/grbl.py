@@ -12,6 +12,7 @@ and macros are named so that nothing is taken for certain behind them. M7 needs 
 
 from __future__ import annotations
 
+from gcodejerk.nc.dialects import limits
 from gcodejerk.nc.dialects.dialect import COMPENSATION, Dialect, code_names, grouped
 from gcodejerk.nc.dialects.spelling import Text, Writing
 
@@ -115,6 +116,7 @@ GRBL = Dialect(
     strict=True,
     paths={610: 64},
     arcs_refused=True,
+    limits=limits.GRBL,
     dark_rapids=True,
     beam_codes=frozenset({4}),
     incremental_set=True,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from gcodejerk.nc.dialects import limits
 from gcodejerk.nc.dialects.marlin import MARLIN
 from gcodejerk.nc.dialects.spelling import Text
 
@@ -40,10 +41,12 @@ KLIPPER = replace(
     redrawn=frozenset({20, 30, 50}),
     other_m="unknown",  # a macro of the owner's, perhaps
     dark_rapids=False,  # M3 is a macro there, if anything; a laser is declared
+    limits=limits.KLIPPER,
     names={
+        "SET_VELOCITY_LIMIT": "limit",
         **dict.fromkeys(
             (
-                *("SET_VELOCITY_LIMIT", "SET_PRESSURE_ADVANCE", "SET_INPUT_SHAPER", "M117"),
+                *("SET_PRESSURE_ADVANCE", "SET_INPUT_SHAPER", "M117"),
                 *("SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_FAN_SPEED", "SET_PIN"),
                 *("SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT", "RESPOND", "EXCLUDE_OBJECT_DEFINE"),
             ),

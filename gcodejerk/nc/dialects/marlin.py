@@ -13,6 +13,7 @@ scales F until it is set to 100.
 
 from __future__ import annotations
 
+from gcodejerk.nc.dialects import limits
 from gcodejerk.nc.dialects.dialect import Dialect, Effect, grouped
 from gcodejerk.nc.dialects.spelling import Text, Writing
 
@@ -82,6 +83,7 @@ MARLIN = Dialect(
     feed_on_rapids=True,
     refused=frozenset({"G20"}),
     m_scales=frozenset({220}),
+    limits=limits.MARLIN,
     tool_frame=frozenset("T"),
     other_m="positions",
     redrawn=frozenset({50}),

@@ -91,6 +91,7 @@ RS274 = Dialect(
     refused=GRBL.refused,
     feed_before_units=True,
     arcs_refused=True,
+    limits=GRBL.limits,
     dark_rapids=True,
     # Centroid's control has programs like these, and moves Z apart; nothing may tell it from them.
     apart=frozenset("Z"),

@@ -14,6 +14,16 @@ its tolerance is 0 (general knowledge, not looked up). T may run a cycle of the 
 set R parameters. G153 suppresses the basic frames, G53 leaves them in force (840Di sl, Fundamentals
 11/2006, p. 100): where either ends in the program's coordinates, only the control knows.
 
+COMPON, COMPCURV and COMPCAD make polynomials of runs of blocks ``N.. G1 X.. Y.. Z.. F..``, which is
+what a stream is (828D, Job planning 6FC5398-2BP40-0BA0, p. 249); "ideally called in CYCLE832"
+(SINUMERIK, 5-axis machining, p. 67). No stream is put between COMPOF and the compressor: CTOL, OTOL
+and ATOL would outlive that (p. 490), but which compressor CYCLE832 has selected depends on options
+(SINUMERIK ONE NC programming, p. 1108), and G0 is smoothed beside one, too (p. 184).
+
+G40 ends with a straight move in the plane, of which an axis that is not named goes to where it was
+programmed last (808D, 6FC5398-4DP10-0BA6, p. 122). What a move along Z, or one to where the program
+stands already, does of that, no page was found to say: behind both, the offset may be left.
+
 The length of a tool lies across the plane in force (Function Manual Tool Compensation, LENTOAX, p.
 2-151; NC programming p. 750), unless the setting data SD42940 says otherwise: behind another plane
 the same place has other coordinates.
@@ -21,8 +31,10 @@ the same place has other coordinates.
 
 from __future__ import annotations
 
+from gcodejerk.nc.dialects import limits
 from gcodejerk.nc.dialects.dialect import (
     ANOTHER_LANGUAGE,
+    LEFT_OVER,
     Arithmetic,
     Dialect,
     Drilling,
@@ -36,13 +48,14 @@ SYSTEMS = (540, 550, 560, 570, *range(5050, 6000, 10))
 
 _SILENT = (
     *("MSG", "LIMS", "SETMS", "STOPRE", "SOFT", "BRISK", "DRIVE", "FFWON", "FFWOF"),
-    *("COMPON", "COMPOF", "COMPCAD", "COMPCURV", "CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
+    *("CFC", "CFIN", "CFTCP", "NORM", "KONT", "KONTC"),
     *("UPATH", "SPATH", "ORIWKS", "ORIMKS", "RTLION", "ADIS", "ADISPOS"),
     *("CUT2D", "CUT2DF", "WALIMON", "WALIMOF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN"),
     *("FRC", "FRCM", "SF", "SCC"),
     *("DYNFINISH", "EXTERN", "DISPLOF", "SETAL", "WORKPIECE", "SAVE"),
     *("FNORM", "FIFOCTRL", "WAITM", "WAITMC", "SETM", "CLEARM"),  # F as it is; waiting for channels
 )
+_COMPRESSORS = ("COMPON", "COMPCAD", "COMPCURV", "COMPSURF", "COMPPATH")
 _FRAMES = ("RPL", "ROT", "ROTS", "SCALE", "MIRROR")
 _FURTHER = ("AROT", "AROTS", "ASCALE", "AMIRROR")
 _WATCHES = ("ID", "IDS", "WHEN", "WHENEVER", "EVERY", "FROM", "DO")
@@ -97,6 +110,8 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys(_FURTHER, "further turn"),
     **dict.fromkeys(("SPOS", "SPOSA"), "turn"),
     "CYCLE832": "smoothing",
+    **dict.fromkeys(_COMPRESSORS, "compressor"),
+    "COMPOF": "no compressor",
     # Between the block and the next that moves in the plane, G0 too; none behind four blocks that
     # do not: cncforum.net, "Rounding and Chamfer".
     **dict.fromkeys(("RND", "CHF", "CHR"), "corner"),
@@ -117,6 +132,7 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys(("DIAM90", "DIAMONA", "DIAMOFA", "DIAM90A", "DIACYCOFA"), "either"),
     **dict.fromkeys(("DIAMCHAN", "DIAMCHANA", "DIAMCYCOF", "DIARAD", "DIARADA"), "either"),
     "OVR": "feed override",
+    **dict.fromkeys(limits.SIEMENS, "limit"),
 }
 
 SIEMENS = Dialect(
@@ -191,7 +207,9 @@ SIEMENS = Dialect(
     # G70 and G71 leave F in the unit of the control, G700 and G710 do not (NC programming p. 170).
     lengths_only=frozenset({700, 710}),
     path_has_to_be_stated=True,
-    bars={2910: (ANOTHER_LANGUAGE, True), 2900: (ANOTHER_LANGUAGE, False)},
+    bars={400: (LEFT_OVER, True), 2910: (ANOTHER_LANGUAGE, True), 2900: (ANOTHER_LANGUAGE, False)},
+    limits=limits.SIEMENS,
+    limit_modes=limits.SIEMENS_MODES,
     tool_frame=frozenset("TD"),
     length_turns=True,
     shifts_travel=True,

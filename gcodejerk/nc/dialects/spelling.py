@@ -86,7 +86,7 @@ class Writing:
     line_limit: int = 0
     """Longest line that is written, in bytes; 0: the longest that the control reads."""
     digits: int = 15
-    """Most digits of a number of a point, leading zeros left out."""
+    """Most digits of a number of a point, F too, leading zeros left out."""
     doubles: bool = False
     """The control computes with the decimals of a double: steps finer than an axis's resolution are
     kept, and not rounded one by one."""

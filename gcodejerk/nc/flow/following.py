@@ -64,6 +64,14 @@ class Ways:
         return at, self.waiting.pop(at)
 
 
+def _entered(script: Script) -> frozenset[int]:
+    """Lines that something leads to besides the line above."""
+    units = {unit.first for unit in script.units}
+    ways = {to for at, op in script.ops.items() for to in (op.yes, op.no) if to != at + 1}
+    computed = any(op.kind == "computed" for op in script.ops.values())
+    return frozenset(units | ways | set(script.numbers.values() if computed else ()))
+
+
 def _heads(script: Script) -> frozenset[int]:
     """Lines that something leads back to: who goes round comes through one of them."""
     heads = {unit.first for unit in script.units}
@@ -85,6 +93,7 @@ class Follower:
         """Programs have run that are not followed, which may call those of the file."""
         self._calls: list[Unit] = []
         self._heads = _heads(script)
+        self._entered = _entered(script)
         self.ended: State | None = None
         self.spoiled: list[tuple[int, int]] = []
         """Lines of which not every pass is known."""
@@ -379,7 +388,9 @@ class Follower:
         unknown = [name.name for name in line.block.names if name.name not in declared]
         self._lost |= any(name and dialect.names.get(name, "flow") == "flow" for name in unknown)
         self._lost |= any(word.letter in dialect.calls for word in line.block.words)
+        runner.entered = at in self._entered
         ended = runner.run(line, visit=True)
+        runner.entered = False
         if ended is None:
             ways.go(at + 1, runner.state)
             return

@@ -1,10 +1,10 @@
-"""Arcs that a control refuses, while whoever sends it the program goes on.
+"""Feed moves that a control refuses, while whoever sends it the program goes on: arcs, mostly.
 
 grbl refuses an arc whose ends lie on no circle about its centre, or farther apart than its radius
 reaches (gnea/grbl, grbl/gcode.c: error 33 and 34), one without an axis word, and one without a word
 of its plane; nothing of the block is done then, its F included. Senders went on all the same
 (grbl/grbl issue 817; softsolder.com, "GRBL Error 33": the next arc begins where the refused one
-would have), so that whatever follows begins elsewhere.
+would have), so that whatever follows begins elsewhere. A feed move before any F is error 22.
 
 Rule: an arc of which that is not certain counts as refused or not. The limits are grbl's, less what
 its numbers of 24 bits may add within some metres.
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, PLANES, Dialect
-from gcodejerk.nc.dialects.gcodes import G91
+from gcodejerk.nc.dialects.gcodes import G1, G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.rules import AXIS_USERS, takes_axes
@@ -67,6 +67,21 @@ def in_doubt(codes: Codes, state: State, dialect: Dialect) -> bool | None:
     if any(number != number for number in numbers):
         return None
     return bool(_misses(*(np.array(number) for number in (*ways, *centre, radius))))
+
+
+def lacks_feed(codes: Codes, state: State, dialect: Dialect) -> bool:
+    """Whether a block is a feed move for which no F is certain: 0 until one is given, error 22."""
+    motion = codes.g.get("motion", state.motion)
+    if "F" in codes.values:
+        feed = codes.values["F"]
+    else:
+        mode = dialect.feed_modes.get(codes.g.get("feed mode", -1), state.feed_mode)
+        feed = state.feed if mode == state.feed_mode else NAN
+    if feed > 0.0 or codes.unknown or motion not in (G1, *dialect.arcs):
+        return False
+    if dialect.effect(codes.g.get("non-modal")) in _TAKES or takes_axes(codes):
+        return False
+    return bool(codes.moved()) or (motion != G1 and not codes.values.keys().isdisjoint("IJK"))
 
 
 def _is_arc(codes: Codes, state: State, dialect: Dialect) -> bool:

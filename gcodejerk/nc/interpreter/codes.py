@@ -64,6 +64,18 @@ class Codes:
         """List the axes that words of the block name."""
         return {axis for axis in AXES if axis in self.values} | set(self.increments)
 
+    def switched(self, begins: bool | str) -> bool | None:
+        """Whether what P or Q of the block switches is on; None where that is not known."""
+        if begins == "Q":
+            number = self.values.get("Q", NAN)
+            return None if number != number else number not in (0.0, 1.0)
+        return switched(self.values.get("P", 0.0)) if begins == "P" else bool(begins)
+
+
+def switched(number: float) -> bool | None:
+    """Whether a P that switches something turns it on; None where P is not known."""
+    return None if number != number else number != 0.0
+
 
 def sort_words(
     block: Block,

@@ -9,9 +9,16 @@ from __future__ import annotations
 import re
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import LINEAR, Dialect, Effect
-from gcodejerk.nc.interpreter import frames
-from gcodejerk.nc.interpreter.codes import Codes
+from gcodejerk.nc.dialects.dialect import (
+    ANOTHER_LANGUAGE,
+    LEFT_OVER,
+    LINEAR,
+    OVERRIDES,
+    Dialect,
+    Effect,
+)
+from gcodejerk.nc.interpreter import frames, limits
+from gcodejerk.nc.interpreter.codes import Codes, switched
 from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.expressions import evaluate
 from gcodejerk.nc.interpreter.flow_words import known_behind
@@ -22,6 +29,7 @@ from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import converted, fills, named_assignment
 from gcodejerk.nc.text.block import Name
 from gcodejerk.nc.text.tokenizer import CHECKSUM
+from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 
 _DECLARATION = re.compile(
@@ -46,6 +54,7 @@ class Effects:
         self.dialect = dialect
         self.state = state
         self.lengths = dict(start.tool_lengths)
+        self.limits = start.limits
         self.declared: dict[str, str] = {}
         """Variables with a name that the program has declared, with their types."""
         self.jumps_known = False
@@ -126,6 +135,29 @@ class Effects:
         elif effect == "flow":
             self._leave(step)
 
+    def _bar_by_g_code(self, code: int, codes: Codes, compensated: bool) -> None:
+        """Begin or end what a G code bars rapids with; `compensated` in front of the block."""
+        state = self.state
+        name, begins = self.dialect.bars[code]
+        on = codes.switched(begins)
+        # G64 alone: who has never switched overrides off, does not in a call either.
+        never = name == OVERRIDES and not on and name not in state.bars
+        if never or (name == LEFT_OVER and not compensated):
+            return
+        if name == ANOTHER_LANGUAGE:
+            state.forget(Reason.NOT_UNDERSTOOD)  # what its codes do and leave
+        state.put("bars", {**state.bars, name: on})
+
+    def _bar_by_code(self, m: int, values: dict[str, float], step: Step) -> None:
+        """Begin or end what an M code bars rapids with."""
+        state, dialect = self.state, self.dialect
+        if m in dialect.m_bars:
+            state.put("bars", {**state.bars, dialect.m_bars[m]: switched(values.get("P", 1.0))})
+        if m in dialect.m_scales:
+            scaled = values["S"] != 100.0 if "S" in values else None
+            state.put("bars", {**state.bars, "feed override": scaled})
+        step.limits |= limits.set_by_code(state, m, values, dialect, self.limits)
+
     def _select_system(self, code: int, step: Step) -> None:
         """Select a work system; whether the block's own rapid may rely on it, the step says."""
         state = self.state
@@ -186,7 +218,11 @@ class Effects:
     def _smooth(self, names: list[Name]) -> None:
         """CYCLE832(0.05,..) selects a continuous path; CYCLE832() whatever machine data say."""
         for name in names:
-            if self._named(name) == "smoothing":
+            effect = self._named(name)
+            if effect in ("smoothing", "compressor", "no compressor"):
+                bars = {**self.state.bars, "compressor": effect != "no compressor"}
+                self.state.put("bars", bars)
+            if effect == "smoothing":
                 tolerance = name.arguments.strip(b"( \t)").partition(b",")[0].strip(b" \t")
                 if self.state.path != CONTINUOUS or not tolerance.strip(b"0."):
                     self.state.lose("path")

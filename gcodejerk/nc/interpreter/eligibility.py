@@ -9,17 +9,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import (
     COMPENSATION,
     LEFT_OVER,
     LINEAR,
     MACHINE_WORDS,
+    OVERRIDES,
+    OVERRIDES_SET,
     Dialect,
     Effect,
 )
 from gcodejerk.nc.dialects.gcodes import G1, G40
 from gcodejerk.nc.interpreter.codes import Codes
+from gcodejerk.nc.interpreter.limits import beyond_path, limits_path, of_path
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import NO_FEED
 from gcodejerk.nc.text.block import Block, Line
@@ -53,8 +58,11 @@ BARS = {
     "parameters written": Reason.SYSTEM_WRITTEN,  # for good
     LEFT_OVER: Reason.CUTTER_COMPENSATION,  # until a move in its plane
     "look-ahead": Reason.LOOK_AHEAD,
+    "compressor": Reason.COMPRESSED,
     "feed group": Reason.FEED_GROUP,
     "feed override": Reason.FEED_SCALED,
+    OVERRIDES: Reason.OVERRIDES_OFF,
+    OVERRIDES_SET: Reason.OVERRIDES_OFF,
     "another language": Reason.NOT_UNDERSTOOD,
     "mirror by M code": Reason.ROTATION,  # for good
     "rounded corner": Reason.START_UNKNOWN,  # until a move in its plane
@@ -64,6 +72,16 @@ BARS = {
     "unknown code": Reason.NOT_UNDERSTOOD,  # for good
 }
 """What makes rapids unfit while it is, or may be, in force (`State.bars`), and the reason."""
+
+
+def barred(state: State) -> Reason | None:
+    """Say why rapids are unfit, if anything of that kind is, or may be, in force."""
+    names = [name for name, on in state.bars.items() if on is not False]
+    # A limit of the path depends on the move, where its number is known.
+    numbers = {name: of_path(name) for name in names}
+    name = next((n for n in names if numbers[n] is None or math.isnan(numbers[n] or 0.0)), None)
+    # All that have no name of their own are limits.
+    return None if name is None else BARS.get(name, Reason.LIMIT_SET)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +116,8 @@ class Step:
     """A code that the dialect does not know, as written."""
     refused: str = ""
     """A code that some of the dialect's controls refuse."""
+    limits: bool = False
+    """It sets a limit below what the machine file states, or may."""
     system_certain: bool = False
     """The work system that the block selects is in force already, or the machine file has it."""
     turned: int = 0
@@ -189,10 +209,7 @@ def why_left_alone(
         return Reason.CUTTER_COMPENSATION
     if state.transformed:
         return Reason.ROTATION
-    bar = next((name for name, on in state.bars.items() if on is not False), None)
-    if bar is not None:
-        return BARS[bar]
-    return _check_move(codes, step, state, dialect)
+    return barred(state) or _check_move(codes, step, state, dialect)
 
 
 def _why_compensated(step: Step, state: State) -> Reason:
@@ -211,6 +228,8 @@ def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
     unknown = any(math.isnan(a) or math.isnan(b) for a, b in ends)
     if not unknown and all(a == b for a, b in ends):
         return Reason.NO_MOTION
+    if _beyond_path(step, state, named):
+        return Reason.LIMIT_SET
     for mode in ("distance", "unit"):
         if state.unknown(mode) and mode in state.lost:
             step.since = step.since or state.lost[mode].line
@@ -222,6 +241,15 @@ def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
         return Reason.START_UNKNOWN
     mixed = len({AXES[k] in LINEAR for k in named if step.start[k] != step.end[k]}) > 1
     return _check_known_move(codes, step, state, dialect, mixed=mixed)
+
+
+def _beyond_path(step: Step, state: State, named: list[int]) -> bool:
+    """Whether a limit of the path that the program has set is in the way of a known move."""
+    if not limits_path(state) or any(math.isnan(step.end[k] - step.start[k]) for k in named):
+        return False
+    moved = np.zeros((1, len(AXES)))
+    moved[0, named] = [step.end[k] - step.start[k] for k in named]
+    return bool(beyond_path(state, moved)[0])
 
 
 def _check_known_move(

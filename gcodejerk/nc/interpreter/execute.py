@@ -9,12 +9,13 @@ out, and whatever they touched is unknown afterwards.
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.dialect import OVERRIDES_SET, Dialect
 from gcodejerk.nc.interpreter import frames
-from gcodejerk.nc.interpreter.arcs import in_doubt
+from gcodejerk.nc.interpreter.arcs import in_doubt, lacks_feed
 from gcodejerk.nc.interpreter.beams import inline_power
 from gcodejerk.nc.interpreter.codes import Codes, sort_words
 from gcodejerk.nc.interpreter.eligibility import Call, Step, looks_rapid, why_left_alone
+from gcodejerk.nc.interpreter.limits import set_by_setting
 from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.phases import Phases
 from gcodejerk.nc.interpreter.rapids import USES_FEED
@@ -34,6 +35,8 @@ class Executor(Phases):
     def __init__(self, dialect: Dialect, state: State, start: Start) -> None:
         super().__init__(dialect, state, start)
         self.decimal_point = start.decimal_point
+        self.told_unfed = False
+        """A feed move without F was named; there may be many."""
         self.calls_followed = False
         """Whoever runs the blocks runs what they call (`Step.call`)."""
 
@@ -89,15 +92,20 @@ class Executor(Phases):
         refused = codes.fault or block.problem is not None
         if refused or not is_complete(codes, state, self.dialect):
             assign(block, [NAN] * len(block.assigns), state, rules)
+            self._switch_overrides(block, [NAN] * len(block.assigns))
             self._doubt(block, codes, step)
             return
         if block.assigns:
             assign(block, values, state, rules)
+            self._switch_overrides(block, values)
         code = _first_refused(codes, self.dialect)
         doubt = self.dialect.arcs_refused and in_doubt(codes, state, self.dialect)
-        if code or doubt is not False:
-            self._run_or_refuse(codes, step, code or "the arc")
-            if doubt is None and not code:
+        slow = self.dialect.arcs_refused and lacks_feed(codes, state, self.dialect)
+        if code or slow or doubt is not False:
+            what = "a feed move without F" if slow else "the arc"
+            self._run_or_refuse(codes, step, code or what)
+            told, self.told_unfed = self.told_unfed, self.told_unfed or slow
+            if (told if slow else doubt is None) and not code:
                 step.fault, step.refused = False, ""  # nothing is known against it
         else:
             self.act(codes, step)
@@ -110,7 +118,7 @@ class Executor(Phases):
             self.state.forget(Reason.NOT_UNDERSTOOD)
             step.ends = False
         self.state = join(before, self.state)
-        if not self._stays:
+        if not self.stays:
             self.state.forget_positions()  # who refuses, stops; and somebody goes on
         step.fault, step.refused = True, code
         if step.feed_event:
@@ -144,6 +152,8 @@ class Executor(Phases):
             state.put("feed", NAN)  # what is not read may hold an F, which rapids run at
         if block.problem is not None and any(byte in b"GMOgmo#[" for byte in block.rest):
             state.forget(Reason.NOT_UNDERSTOOD)
+        if block.problem is not None:
+            step.limits |= set_by_setting(state, block.rest, self.dialect, self.limits)
         step.feed_event = USES_FEED
 
     def _assign(self, target: str) -> None:
@@ -159,6 +169,12 @@ class Executor(Phases):
             self.state.lose("home")
         else:
             frames.data_written(self.state, self.lengths)
+
+    def _switch_overrides(self, block: Block, values: list[float]) -> None:
+        """Take what is written into the variable that switches overrides and feed hold."""
+        for target, value in zip(block.assigns, values, strict=True):
+            if target and target == self.dialect.arithmetic.overrides:
+                self.state.put("bars", {**self.state.bars, OVERRIDES_SET: value != 0.0})
 
     def end(self) -> None:
         """End the program: what follows is not executed."""

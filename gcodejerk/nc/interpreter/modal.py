@@ -17,8 +17,9 @@ joining go through it, so that a field that is added is forgotten and joined lik
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 from gcodejerk.axes import AXES
@@ -98,7 +99,7 @@ FIELDS = (
     Field("cycle", "mode", together="cycle"),
     Field("cycle_level", "number", NAN),
     Field("modal_cycle", "mode"),
-    *(Field(name, "axes") for name in ("position", "g5x", "g92", "tool", "home")),
+    *(Field(name, "axes") for name in ("position", "meant", "g5x", "g92", "tool", "home")),
     *(Field(name, "named") for name in ("transforms", "bars", "shifted")),
     Field("added", "mode", False),
     *(Field(name, "table") for name in ("offsets", "variables")),
@@ -111,6 +112,8 @@ FIELDS = (
     *(Field(name, "constant", start) for name, start in (("ended", False), ("touched", None))),
     Field("fixed", "constant", frozenset()),
     Field("wraps", "constant", (None,) * len(AXES)),
+    Field("limits", "constant", MappingProxyType({})),
+    Field("straight", "constant", True),
     *(Field(name, "note", start) for name, start in (("line", None), ("lost", {}))),
 )
 """What a state holds."""
@@ -178,6 +181,8 @@ class State:
     """Where the cycle behind MCALL comes back to, and whether it leaves F alone; None: there is
     none, or nobody knows."""
     position: list[float]
+    meant: list[float]
+    """Where the program says that axes stand which cutter compensation displaces, or may."""
     g5x: list[float]
     g92: list[float]
     tool: list[float]
@@ -216,6 +221,9 @@ class State:
     """Mode that a block made unknown -> which block. Never changed, but made anew."""
     wraps: tuple[str | None, ...]
     """How each axis turns: see `gcodejerk.start.Start`; None unknown."""
+    limits: Mapping[str, tuple[float, float, float]]
+    straight: bool
+    """What each axis may do, and whether all go together: see there."""
 
     def __init__(self) -> None:
         for field in FIELDS:

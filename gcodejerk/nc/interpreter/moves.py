@@ -133,6 +133,30 @@ def plane_axes(state: State) -> list[int]:
     return [AXES.index(letter) for letter in letters]
 
 
+def displace(state: State, codes: Codes) -> None:
+    """Note where a compensated move leads by the program; where it does, the tool's radius says."""
+    axes = plane_axes(state)
+    named = {AXES.index(axis) for axis in codes.moved()}
+    meant = list(state.meant)
+    for axis in named.intersection(axes):
+        meant[axis] = state.position[axis]
+    state.put("meant", meant)
+    state.forget_positions(axes)
+
+
+def leaves_offset(state: State, codes: Codes) -> bool:
+    """Whether a straight move has a length in the plane: one without leaves G40 as it is."""
+    for axis in plane_axes(state):
+        letter = AXES[axis]
+        if letter in codes.increments or (letter in codes.values and state.distance == G91):
+            by = codes.increments.get(letter, codes.values.get(letter, 0.0))
+            if by != 0.0:
+                return True
+        elif letter in codes.values and state.position[axis] != state.meant[axis]:
+            return True
+    return False
+
+
 def way_round(stands: float, angle: float, wrap: str) -> float:
     """Where a rotary axis ends that counts turns, behind an absolute word.
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import (
-    ANOTHER_LANGUAGE,
     CYCLE_CALL,
     LEFT_OVER,
     MACHINE_WORDS,
@@ -18,7 +17,7 @@ from gcodejerk.nc.dialects.dialect import (
     Effect,
 )
 from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G64, G80
-from gcodejerk.nc.interpreter import frames
+from gcodejerk.nc.interpreter import frames, limits
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.cycles import begin_cycle, run_cycle
@@ -27,9 +26,11 @@ from gcodejerk.nc.interpreter.eligibility import Step
 from gcodejerk.nc.interpreter.mcodes import run_m_code
 from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, State
 from gcodejerk.nc.interpreter.moves import (
+    displace,
     go_straight,
     go_to_machine_position,
     go_to_stored_point,
+    leaves_offset,
     plane_axes,
 )
 from gcodejerk.nc.interpreter.named_cycles import drill_behind
@@ -59,7 +60,7 @@ class Phases(Effects):
 
     def __init__(self, dialect: Dialect, state: State, start: Start) -> None:
         super().__init__(dialect, state, start)
-        self._stays = start.resume == "same" or (start.resume is None and dialect.same_after_stop)
+        self.stays = start.resume == "same" or (start.resume is None and dialect.same_after_stop)
         """Behind M0 and M1 the axes stand where they stood."""
         self._tool_change = start.tool_change
         self.rapid_feed = start.rapid_feed
@@ -120,12 +121,7 @@ class Phases(Effects):
         for m in codes.m:
             if run_m_code(state, m, dialect, step, self._tool_change):
                 self._leave(step)
-            if m in dialect.m_bars:
-                on = _switched(codes.values.get("P", 1.0))
-                state.put("bars", {**state.bars, dialect.m_bars[m]: on})
-            if m in dialect.m_scales:
-                scaled = codes.values["S"] != 100.0 if "S" in codes.values else None
-                state.put("bars", {**state.bars, "feed override": scaled})
+            self._bar_by_code(m, codes.values, step)
 
     def _tool_words(self, codes: Codes) -> None:
         """T, D and the like where they move the tool or its frame; G43 comes with the codes."""
@@ -161,13 +157,7 @@ class Phases(Effects):
             if group == "mirror" and codes.moved():
                 state.forget_positions()
             if code in dialect.bars:
-                name, begins = dialect.bars[code]
-                if name == LEFT_OVER and not compensated:
-                    continue
-                on = _switched(codes.values.get("P", 0.0)) if begins == "P" else begins
-                if name == ANOTHER_LANGUAGE:
-                    state.forget(Reason.NOT_UNDERSTOOD)  # what its codes do and leave
-                state.put("bars", {**state.bars, name: on})
+                self._bar_by_g_code(code, codes, compensated)
         if "distance" in g:
             state.put("distance_stated", True)
 
@@ -210,6 +200,7 @@ class Phases(Effects):
         self._assign_names(codes.names)
         self._swivel(codes.names, step)
         self._smooth(codes.names)
+        step.limits |= limits.set_by_names(self.state, codes.names, self.dialect, self.limits)
         effects = [self._named(name) for name in codes.names]
         if "modal cycle" in effects:
             # MCALL with a cycle begins one, which runs later; MCALL alone ends it.
@@ -271,7 +262,7 @@ class Phases(Effects):
                 continue
             if m in _ENDS:
                 step.ends = True
-            elif m in _STOPS and not self._stays:
+            elif m in _STOPS and not self.stays:
                 # Meanwhile somebody may have moved the axes by hand.
                 self.state.forget_positions()
         if self._may_move(codes) and not self.dialect.strict:
@@ -390,9 +381,12 @@ class Phases(Effects):
         if self._in_machine_words(codes):
             state.forget_positions(AXES.index(axis) for axis in codes.moved())
         if state.compensation != G40:
-            state.forget_positions(plane_axes(state))
-        elif motion in (dialect.rapid, G1) and _in_plane(codes, state):
-            frames.end_bar(state, LEFT_OVER)
+            displace(state, codes)
+        elif motion in (dialect.rapid, G1) and state.bars.get(LEFT_OVER, False) is not False:
+            if leaves_offset(state, codes):
+                frames.end_bar(state, LEFT_OVER)
+            elif _in_plane(codes, state):
+                displace(state, codes)
         if any(on is not False for on in state.transforms.values()) and not (
             motion not in dialect.redrawn and drill_behind(state, step.start)
         ):
@@ -443,8 +437,3 @@ def _mirrored(name: str, codes: Codes) -> list[str]:
 def _in_plane(codes: Codes, state: State) -> bool:
     """Whether a block moves an axis that cutter compensation may displace."""
     return not codes.moved().isdisjoint(AXES[axis] for axis in plane_axes(state))
-
-
-def _switched(number: float) -> bool | None:
-    """Whether a P that switches something turns it on; None where P is not known."""
-    return None if number != number else number != 0.0

@@ -70,6 +70,8 @@ class Rapids:
     queued: NDArray[np.bool_]
     """A motion of some length stands in front, and nothing that the control waits for in between,
     where `neighbours` has looked: LinuxCNC's queue of motions is then filled."""
+    entered: NDArray[np.bool_]
+    """A jump or a call leads to the block: in front of it runs not only the line above."""
     offset: NDArray[np.float64]
     """Shape (n, 9): machine = program + offset [mm, deg]; NaN where unknown."""
     turned: NDArray[np.uint16]
@@ -106,6 +108,7 @@ _TYPES: dict[str, tuple[type, int]] = {
         for name in (
             *("inch", "incremental", "diameter", "distance_stated"),
             *("feed_mode_stated", "feed_needed", "feed_whole", "beam", "lone", "queued", "fed"),
+            "entered",
         )
     },
 }

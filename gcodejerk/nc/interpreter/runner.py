@@ -48,10 +48,14 @@ class Runner:
         self.steps = 0
         """Blocks run one by one so far, passes of loops among them."""
         self.problem_count = 0
+        self.limited: Line | None = None
+        """The first line that sets a limit too low."""
         self._lost: dict[int, tuple[Line, int]] = {}
         """Line behind which what is in force is unknown -> it, and rapids left alone for that."""
         self.asked_distance: int | None = None
         self.asked_feed_mode: int | None = None
+        self.entered = False
+        """A jump or a call leads to the block that is run."""
         self.call: Callable[[Call, Line], bool] | None = None
         """Runs a subprogram; whether the program goes on behind it."""
         self.left: Callable[[], None] = lambda: None
@@ -99,6 +103,8 @@ class Runner:
             self.log.feed_event(step.feed_event)
         self.log.habits |= step.habit
         self.log.outputs |= step.outputs
+        if step.limits and self.limited is None:
+            self.limited = line
         if step.leaves:
             self.left()
         if step.rapid:
@@ -161,7 +167,7 @@ class Runner:
         row.begin, row.end = line.begin, line.begin + len(line.text)
         row.start, row.target = step.start, step.end
         row.turned, row.words = step.turned, step.words
-        row.beam, row.fed = step.beam, step.fed
+        row.beam, row.fed, row.entered = step.beam, step.fed, self.entered
         row.feed, row.speed = NAN if self.dialect.feed_lost else state.feed, speed
         if visit:
             self.log.visit(line.number, reason, row)
@@ -207,6 +213,22 @@ class Runner:
                 )
             )
         return found
+
+    def too_low(self) -> list[Finding]:
+        """Name the first line that sets a limit too low."""
+        if self.limited is None:
+            return []
+        name, at = self._place(self.limited.number)
+        text = self.limited.text.strip()[:40].decode("latin-1")
+        there = "" if name == self.name else f"line {at} of {name}: "
+        return [
+            Finding(
+                None if there else self.limited.number,
+                f"{there}this sets a limit of speed, acceleration or jerk ({text}) that is not "
+                "known to be what the machine file states: rapids that may be beyond it are left "
+                "alone",
+            )
+        ]
 
     def add_problem(self, line: Line, problem: str, column: int | None = None) -> None:
         """Note a line that is not understood."""

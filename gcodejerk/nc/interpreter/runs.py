@@ -17,16 +17,17 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LEFT_OVER, LINEAR, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G40, G90, G91
 from gcodejerk.nc.interpreter.arcs import doubtful
-from gcodejerk.nc.interpreter.eligibility import BARS
+from gcodejerk.nc.interpreter.eligibility import barred
+from gcodejerk.nc.interpreter.limits import beyond_path, limits_path
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
-_AXIS_BITS = (1 << len(AXES)) - 1
-_CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
-_ARC_WORDS = _CENTRES | BIT["R"]
+AXIS_BITS = (1 << len(AXES)) - 1
+CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
+_ARC_WORDS = CENTRES | BIT["R"]
 _IS_LINEAR = np.array([axis in LINEAR for axis in AXES])
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
 
@@ -57,7 +58,7 @@ def _spread(
     return np.repeat(held, np.diff(edges))
 
 
-def _sure(
+def sure_lines(
     letters: NDArray[np.uint32], motion: NDArray[np.uint8], state: State
 ) -> NDArray[np.bool_]:
     """Which lines are complete beyond doubt."""
@@ -71,7 +72,7 @@ def _sure(
         by_centre = (arc_words != 0) & (arc_words & ~np.uint32(allowed) == 0)
         in_plane = BIT[plane[0]] | BIT[plane[1]]
         by_radius = (arc_words == BIT["R"]) & (letters & in_plane != 0)
-        silent = letters & (_AXIS_BITS | _ARC_WORDS | BIT["G"]) == 0
+        silent = letters & (AXIS_BITS | _ARC_WORDS | BIT["G"]) == 0
         sure = np.where(is_arc, by_centre | by_radius | silent, sure)
     counting = sum(
         1 << k for k, wrap in enumerate(state.wraps) if AXES[k] not in LINEAR and wrap != "none"
@@ -79,7 +80,7 @@ def _sure(
     if counting and state.distance == G90:
         sure = sure & (letters & np.uint32(counting) == 0)  # where they end, the way they go says
     if state.feed_mode == 93:
-        sure = sure & ((motion == 0) | (letters & _AXIS_BITS == 0) | (letters & BIT["F"] != 0))
+        sure = sure & ((motion == 0) | (letters & AXIS_BITS == 0) | (letters & BIT["F"] != 0))
     return sure
 
 
@@ -120,18 +121,21 @@ def run_plain(
     letters = lines.letters[first:last]
     codes, code_values = lines.cut("G", first, last)
     motion = _spread(codes, code_values.astype(np.uint8), state.motion // 10, last - first)
-    sure = _sure(letters, motion, state)
+    sure = sure_lines(letters, motion, state)
     if dialect.arcs_refused and state.unit is not None:
-        arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (_AXIS_BITS | _ARC_WORDS) != 0))
+        arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
         sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
+    if dialect.arcs_refused:
+        feeds, feed_values = lines.cut("F", first, last)
+        sure[feeds[feed_values == 0.0]] = False
     if not sure.all():
         last = first + int(np.argmin(sure))
         letters, motion = letters[: last - first], motion[: last - first]
     if last == first:
         return first, None
 
-    named = (letters & _AXIS_BITS).astype(np.uint16)
-    moves = (named != 0) | ((motion >= 2) & (letters & _CENTRES != 0))
+    named = (letters & AXIS_BITS).astype(np.uint16)
+    moves = (named != 0) | ((motion >= 2) & (letters & CENTRES != 0))
     events = np.where(moves & (motion != 0), np.uint8(USES_FEED), np.uint8(0))
     feeds, feed_values = lines.cut("F", first, last)
     events[feeds] = GIVES_FEED
@@ -152,7 +156,7 @@ def run_plain(
         feed=history[np.searchsorted(feeds, rapid, side="right")],
         # A whole number that matters would have made its line odd.
         feed_whole=np.searchsorted(feeds, rapid, side="right") == 0 if state.feed_whole else False,
-        reason=_reasons(state, named[rapid], start, target, dialect),
+        reason=reasons(state, named[rapid], start, target, dialect),
     )
     # What stands behind the end of the program uses no F.
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
@@ -182,7 +186,7 @@ def _positions(
     return start, target
 
 
-def _reasons(
+def reasons(
     state: State,
     named: NDArray[np.uint16],
     start: NDArray[np.float64],
@@ -194,9 +198,9 @@ def _reasons(
         return np.full(len(named), _INDEX[Reason.AFTER_END], dtype=np.uint8)
     if state.transformed:
         return np.full(len(named), _INDEX[Reason.ROTATION], dtype=np.uint8)
-    bar = next((name for name, on in state.bars.items() if on is not False), None)
+    bar = barred(state)
     if bar is not None:
-        return np.full(len(named), _INDEX[BARS[bar]], dtype=np.uint8)
+        return np.full(len(named), _INDEX[bar], dtype=np.uint8)
     is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
     unknown = (is_named & (np.isnan(start) | np.isnan(target))).any(axis=1)
     moving = is_named & (start != target)
@@ -208,6 +212,9 @@ def _reasons(
     if not dialect.feed_of_mixed:
         both = moving[:, _IS_LINEAR].any(axis=1) & moving[:, ~_IS_LINEAR].any(axis=1)
         reason[both] = _INDEX[Reason.MIXED_AXES]
+    if limits_path(state):
+        limited = beyond_path(state, np.where(is_named, target - start, 0.0))
+        reason[limited] = _INDEX[Reason.LIMIT_SET]
     reason[~moves] = _INDEX[Reason.NO_MOTION]
     reason[unknown] = _INDEX[Reason.START_UNKNOWN]
     if state.unit is None:

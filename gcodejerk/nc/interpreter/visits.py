@@ -49,6 +49,7 @@ class ModeColumns:
     speed: float = NAN
     turned: int = 0
     queued: bool = False
+    entered: bool = False
     fed: bool = False
 
     @classmethod
@@ -150,6 +151,7 @@ def _merge(a: Row | None, b: Row | None) -> Row | None:
         feed_whole=a.feed_whole and b.feed_whole,
         turned=a.turned | b.turned,
         beam=a.beam or b.beam,
+        entered=a.entered | b.entered,
     )
     if not same(a.feed, b.feed) or a.feed_whole != b.feed_whole:
         row.feed = NAN

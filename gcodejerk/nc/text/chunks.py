@@ -55,7 +55,9 @@ def _check_start(data: bytes, name: str) -> None:
                 Place(name, 1, 1),
             )
     head = data[:512]
-    if b"\0" in head and head.count(b"\0") * 5 > len(head) * 2:
+    # The high bytes of UTF-16 stand at every other place; elsewhere zeros are padding.
+    zeros = sorted(head[half::2].count(0) for half in (0, 1))
+    if zeros[1] * 5 > len(head) * 2 and zeros[0] * 10 < len(head):
         raise ProgramError(
             "file seems to be UTF-16 without a byte order mark",
             "save it as plain ASCII text",

@@ -201,8 +201,9 @@ class Alignment:
 
     def _follows(self, i: int) -> bool:
         """Whether the line in front of a rapid is one that has a stream: the machine then rests."""
-        line = self.program.rapids.line
-        return bool(self.replaced) and self.replaced[-1] == i - 1 and line[i - 1] + 1 == line[i]
+        line, entered = self.program.rapids.line, self.program.rapids.entered[i]
+        stands = bool(self.replaced) and self.replaced[-1] == i - 1 and not entered
+        return stands and bool(line[i - 1] + 1 == line[i])
 
     def _goes_on(self, block: bytes) -> bool:
         """Whether a last line without end is followed by more."""

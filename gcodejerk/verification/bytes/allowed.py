@@ -160,17 +160,31 @@ def point_pattern(letters: str, decimals: Mapping[str, int], dialect: Dialect, i
             rb" %c(?=-?[0-9.]{1,%d}(?![0-9.]))" % (ord(letter), digits + 1)
             + rb"-?(?:0|[1-9][0-9]{0,8})\.[0-9]{1,%d}(?![0-9.])" % min(most, MOST_DECIMALS)
         )
-    feed = rb" F(?:0|[1-9][0-9]{0,%d})\.[0-9]{1,%d}(?![0-9.])"
-    return b"G1" + b"".join(words) + feed % (FEED_DIGITS - 1, FEED_DECIMALS)
+    return b"G1" + b"".join(words) + b" F" + feed_pattern(dialect)
+
+
+def feed_pattern(dialect: Dialect) -> bytes:
+    """Pattern of F of any point, without its letter."""
+    digits = 15 if dialect.writing is None else dialect.writing.digits
+    number = rb"(?=[0-9.]{1,%d}(?![0-9.]))(?:0|[1-9][0-9]{0,%d})\.[0-9]{1,%d}(?![0-9.])"
+    return number % (digits + 1, FEED_DIGITS - 1, FEED_DECIMALS)
 
 
 _LONG = re.compile(rb"[A-Z][-+]?[0-9.]{25}")
 
 
-def too_long_a_number(line: bytes, block: bytes) -> bytes | None:
-    """Find a number of a line that is longer than any, and not the block's own."""
+def too_long(line: bytes, block: bytes) -> str | None:
+    """What is wrong with a number of a line that is longer than any, and not the block's own."""
     match = _LONG.search(line)
     own = b"".join(block.split()).upper()
     if match is None or match[0] in own:
         return None
-    return match[0]
+    return f"{match[0][:20].decode()}... has more digits than any word"
+
+
+def point_problem(line: bytes, block: bytes, dialect: Dialect) -> str | None:
+    """What is wrong with the numbers of a point that has the block's own words."""
+    problem = too_long(line, block)
+    if problem is None and re.search(b" F" + feed_pattern(dialect) + rb"\Z", line) is None:
+        problem = "F of the last point is not written as the others are"
+    return problem

@@ -18,7 +18,7 @@ from functools import lru_cache
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Block, Dialect, Rapids, parse_block
-from gcodejerk.verification.bytes.allowed import Allowed, point_pattern, too_long_a_number
+from gcodejerk.verification.bytes.allowed import Allowed, point_pattern, point_problem, too_long
 from gcodejerk.verification.bytes.modes import WORD, Modes, read_words
 from gcodejerk.verification.bytes.source import PIECE, Window
 from gcodejerk.verification.findings import Findings, Kind
@@ -265,8 +265,8 @@ class StreamReader:
 
     def _exact_setup(self, lines: list[bytes], standstill: bytes) -> None:
         """The lines in front of the points hold what they have to, and nothing else."""
-        stands = bool(lines) and lines[0] == standstill
-        rest = lines[stands:]
+        stands = bool(lines) and lines[-1] == standstill
+        rest = lines[:-1] if stands else lines
         if stands != self.allowed.standstill:
             how = "missing" if self.allowed.standstill else "not needed"
             self.complain(Kind.FORM, f"'{standstill.decode()}' in front of the points is {how}")
@@ -309,8 +309,8 @@ class StreamReader:
                 self.complain(Kind.FORM, "stream is endless")
                 return None
             self._points_in(line)
-            if number := too_long_a_number(line, self.text):
-                self.complain(Kind.FORM, f"{number[:20].decode()}... has more digits than any word")
+            if problem := point_problem(line, self.text, self.dialect):
+                self.complain(Kind.FORM, problem)
             self.next()
         self._points_in(stream.text)
         if len(stream.rest) > 1 or early:
@@ -386,8 +386,8 @@ class StreamReader:
         problem = self.allowed.tail_problem(_G1[: wanted.motion] + (words or []))
         if problem and len(self.found.violations) == before:
             self.complain(Kind.FORM, f"{problem}: '{line[:60].decode('latin-1')}'")
-        if number := too_long_a_number(line, b""):
-            self.complain(Kind.FORM, f"{number[:20].decode()}... has more digits than any word")
+        if problem := too_long(line, b""):
+            self.complain(Kind.FORM, problem)
         self.last(more=bool(self.allowed.behind))
         return self._stops()
 

@@ -58,6 +58,17 @@ class Beside:
             return None
 
 
+def beginning(file: BinaryIO) -> str:
+    """How a file begins that is no file of samples, for people."""
+    file.seek(0)
+    line = file.readline(200)
+    if not line:
+        return "it is empty"
+    if _HEAD.fullmatch(line.removesuffix(b"\r\n") + b"\n"):
+        return "its lines end with CR LF, as behind a copy that was made as text"
+    return f"it begins with {line[:40].rstrip()!r}"
+
+
 class HalAlignment(Alignment):
     """The walk through both programs, for one that asks for rapids by number."""
 
@@ -85,9 +96,13 @@ class HalAlignment(Alignment):
         for line in wanted:
             found = self.processed.peek_line()
             if found != line + self.program.newline:
-                kind = Kind.SAMPLES if found.startswith(b"M152") else Kind.FORM
                 shown = found[:60].rstrip(b"\r\n").decode("latin-1")
-                self._complain(kind, f"expected '{line.decode()}' in front of all, found '{shown}'")
+                problem = f"expected '{line.decode()}' in front of all, found '{shown}'"
+                if found.startswith(b"M152"):
+                    other = "the file of samples is not the one that was written with this program"
+                    self._complain(Kind.SAMPLES, f"{other}, or was changed since: {problem}")
+                else:
+                    self._complain(Kind.FORM, problem)
             self.processed.skip(len(found))
 
     def _reader(self, i: int, text: bytes) -> StreamReader:
@@ -172,7 +187,10 @@ class HalReader(StreamReader):
     def _position(self) -> list[dict[str, Decimal]] | None:
         """LinuxCNC's own rapid, between asking and waiting."""
         rest = b"G4 P%g" % (REST * self.interval)
-        if not self.exactly(rest) or not self.exactly(b"M68 E3 Q%d" % (self.i + 1)):
+        # The samples are ways of X, Y and Z, which a turned coordinate system would turn: the
+        # request has to miss the rapid's number there. R of the nine: #5230, #5250 to #5390.
+        asks = b"M68 E3 Q[%d+1000000*ABS[#[5210+20*#5220]]]" % (self.i + 1)
+        if not self.exactly(rest) or not self.exactly(asks):
             return None
         numbers = self._motion(0)
         if numbers is None:

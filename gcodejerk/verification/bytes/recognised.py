@@ -19,6 +19,7 @@ from decimal import Decimal
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids
+from gcodejerk.verification.bytes.allowed import feed_pattern
 from gcodejerk.verification.bytes.form import COMMENT_LENGTH, LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.states import States
@@ -273,7 +274,8 @@ class Recognised:
             pattern += (b" F" + _FEED if one[4] else b"") + re.escape(end)
         pattern += rb"(?P<points>" + run + rb")" + re.escape(last[1])
         pattern += b"".join(b" " + word[:1] + number for word in last[2].split())
-        pattern += (b" F" + _FEED if last[3] else b"") + re.escape(end)
+        feed = b" F(" + feed_pattern(self.dialect) + b")"
+        pattern += (feed if last[3] else b"") + re.escape(end)
         pattern += b"".join(re.escape(line + end) for line in behind)
         return re.compile(pattern)
 

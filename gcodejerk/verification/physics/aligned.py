@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.units import SECONDS_PER_MINUTE
+from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.physics.own_rapids import conventional_counts, rapid_limits
 from gcodejerk.verification.physics.points import Array, Index, Paths
@@ -52,6 +52,9 @@ STEP = 1e-6
 """Of the positions, in the program's unit of mm; in inches they have one decimal more."""
 LEAD, LEAD_TIME = 1e-5, (0.009, 0.011)
 """How far what leads in may move, and how long its slow block may last. [mm], [s]"""
+NOTHING = 1.02e-8 * MM_PER_INCH
+"""A motion that is no longer than 1e-8 machine units, inches perhaps, is none: where a G0 is left
+out so, the control rounds the corner at an end of the stream, and the queue runs dry. [mm]"""
 CREEP = 0.02
 """Speed at the last period, at most. [mm/s]"""
 TOLERANCE = 0.01
@@ -168,6 +171,8 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
     digit = FEED_DIGIT * paths.unit[paths.owner] / SECONDS_PER_MINUTE
     other = inner & (np.abs(motion.feed - larger) > digit)
     equal = point & ~first & (motion.feed == np.roll(motion.feed, 1))
+    moved = np.sqrt((np.diff(paths.position, axis=0, prepend=paths.position[:1]) ** 2).sum(axis=1))
+    moved[paths.begin] = np.inf
     lead = paths.position[np.where(first, np.arange(len(first)) - 1, 0)] - paths.start[paths.owner]
     far = first & (np.abs(lead).max(axis=1) > LEAD)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -189,6 +194,7 @@ def _blocks(motion: _Motion, machine: Machine) -> list[tuple[Kind, Rows, str]]:
         (Kind.FEED, equal, "two successive F are equal: the control may join the blocks"),
         (Kind.FEED, last & (motion.after > CREEP), "the tail is too fast to end in one period"),
         (Kind.FEED, hasty, "what leads into the points does not last its ten milliseconds"),
+        (Kind.FORM, moved <= NOTHING, "a motion so short is none where the INI is in inches"),
         (Kind.FORM, far, "what leads into the points moves the axis too far"),
         (Kind.FEED, off, "with these F words the block does not end on a servo period"),
         (Kind.TIME, short, "block is too short for the control"),

@@ -29,6 +29,8 @@ Rows = NDArray[np.bool_]
 
 FEED_DIGIT = 1.05e-4
 """Last digit of F, with its own rounding. [units/min]"""
+DIGIT = 1.05
+"""The same of an F that has no more digits than the control reads. [last digits]"""
 FLOAT = 4e-12
 """Rounding of float64 in a length. [mm] or [deg]"""
 NO_LENGTH = 1e-5
@@ -117,7 +119,8 @@ def check_held(paths: Paths, interval: float, moment: Index) -> list[tuple[Kind,
     short = paths.position[paths.end - 1] - (paths.start + paths.displacement)
     error = np.full(len(owner), FLOAT)
     error[paths.end - 1] += np.sqrt((short**2).sum(axis=1))
-    digit = FEED_DIGIT * unit
+    whole = np.floor(np.log10(np.maximum(np.nan_to_num(paths.feed), 1.0)) + 1e-12) + 1.0
+    digit = np.maximum(FEED_DIGIT, DIGIT * 10.0 ** (whole - paths.digits)) * unit
     off = moves & (np.abs(feed - blocks.length / time) > digit + error / time)
     said = paths.feed[np.clip(blocks.next, 0, len(owner) - 1)]
     silent = ~moves & ~blocks.first

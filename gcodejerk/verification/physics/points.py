@@ -65,6 +65,8 @@ class Paths:
     """As in `nc.Rapids`."""
     lead: Index
     """Rows behind the start that come before the first point, of each stream."""
+    digits: int = 15
+    """Most digits of F that the control reads."""
 
     @property
     def count(self) -> Index:
@@ -97,6 +99,7 @@ class Paths:
             step=self.step[streams],
             lone=self.lone[streams],
             lead=self.lead[streams],
+            digits=self.digits,
         )
 
     @property
@@ -227,6 +230,7 @@ class Reader:
             step=np.where(rapids.inch[index, np.newaxis], self.inch_step, self.step),
             lone=rapids.lone[index],
             lead=np.array([len(s.lead) for s in streams], dtype=np.int64),
+            digits=15 if self.dialect.writing is None else self.dialect.writing.digits,
         )
 
 

@@ -25,7 +25,7 @@ from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
 from gcodejerk.storage import gathered, kept, release
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.second_reading.elsewhere import lines_elsewhere
+from gcodejerk.verification.second_reading.elsewhere import lines_behind
 from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
 from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
 from gcodejerk.verification.second_reading.routes import LostError, calls, flows
@@ -77,7 +77,8 @@ def confirm(
     lines = array("q", plain.line.tobytes())
     for k, seen in observations(original, find_dialect(dialect), start, lines, plain):
         i = int(index[k])
-        problem = _disagreement(seen, rapids, i)
+        follows = k > 0 and index[k - 1] == i - 1 and rapids.line[i - 1] + 1 == rapids.line[i]
+        problem = _disagreement(seen, rapids, i, bool(follows))
         if problem:
             advice = "leave this rapid alone, and report the program: one of two readings is wrong"
             _differ(found, int(rapids.line[i]), problem, advice)
@@ -252,7 +253,7 @@ def _as_it_flows(
     original.seek(begin)
     walks = flows(whole, dialect)
     if len(whole) <= MOST_BYTES:
-        more = _elsewhere(whole, dialect, start)
+        more = lines_behind(whole, dialect, start)
         new = partial(_begin, stepper.text, dialect, start)
         for rest in ([more] if more else []) + ([[]] if walks or calls(whole, dialect) else []):
             walked = _walked(whole, stepper, new, rest)
@@ -305,15 +306,6 @@ def _from_above(
             number, at = number + 1, end + 1
 
 
-def _elsewhere(whole: bytes, dialect: Dialect, start: Start) -> list[bytes]:
-    """Lines of other files that a program goes on in."""
-    rules = dialect.text
-    numbered = bool(rules.keywords) and rules.o_word == "program"
-    if not start.subprograms or not (numbered or (rules.names and rules.variables == "R")):
-        return []
-    return lines_elsewhere(whole, start.subprograms, dialect)
-
-
 def _walked(
     whole: bytes, stepper: Stepper, begin: Callable[[], Tracker], behind: list[bytes]
 ) -> dict[int, Observation] | None:
@@ -337,7 +329,6 @@ def _behaves_like_a_laser(original: BinaryIO, dialect: Dialect, start: Start) ->
 
 def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
     """A tracker in the state that programs start in."""
-    fed = start.rapid_feed
     tracker = Tracker(
         dialect,
         Facts(
@@ -351,7 +342,9 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
             start.tool_change,
             start.resume,
             start.spindle,
-            None if fed is None else (fed.feed, fed.clearance),
+            start.limits,
+            start.straight,
+            (start.rapid_feed.feed, start.rapid_feed.clearance) if start.rapid_feed else None,
         ),
     )
     codes = text.read(start.startup.encode("latin-1", "replace"), first=False)
@@ -361,10 +354,12 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
     return tracker
 
 
-def _disagreement(seen: Observation, rapids: Rapids, i: int) -> str:
-    """In what the two readings differ; empty where they do not."""
+def _disagreement(seen: Observation, rapids: Rapids, i: int, follows: bool) -> str:
+    """In what the two readings differ, of a rapid that follows a stream or not; else empty."""
     if seen.against:
         return f"this rapid had to be left alone, since {seen.against}"
+    if seen.entered and follows and not rapids.entered[i]:
+        return "a jump or a call leads to it, and its stream begins without a standstill"
     if not seen.modes:
         return ""
     if seen.sure and seen.axes != int(rapids.words[i]):

@@ -9,16 +9,21 @@ import re
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LEFT_OVER, PLANES, Effect
-from gcodejerk.nc.dialects.gcodes import G40, G90, G91
+from gcodejerk.nc.dialects.gcodes import G1, G40, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.drilling import Drilling
-from gcodejerk.verification.second_reading.reading import Run, Text
+from gcodejerk.verification.second_reading.reading import NAN, Run, Text
 from gcodejerk.verification.second_reading.sorting import Sorted
 
 _TAKES: frozenset[Effect] = frozenset(("return", "table", "local", "set", "words", "store"))
 _ALONE = {"motion", "plane", "distance", "arc distance", "feed mode", "units"}
 _CENTRES = dict(zip("XYZ", "IJK", strict=True))
+_COMMENT = re.compile(rb"\([^()]*\)")
+_CODE = re.compile(rb"G[ \t]*0?([123])(?![0-9.])")
 _WORDS = re.compile(rb"([GIJKRXYZ])[ \t]*([-+]?[0-9.]+)")
+
+NO_FEED = re.compile(rb"F[ \t]*[-+]?0*[.]?0*(?![0-9.])")
+"""F0."""
 
 
 def misses(way: complex, centre: complex, radius: float | None) -> bool:
@@ -56,15 +61,51 @@ class Circling(Drilling):
         """Take a run of feed moves, if one begins here whose arcs all meet their ends."""
         if not self.may_run or text.tried[0] < at < text.tried[1]:
             return None
+        if self.lacks_feed():
+            return self._take_unfed(text, data, at)
         run = text.take_run(data, at, stated=not self.feeding)
-        if run is not None and self.dialect.arcs_refused and self._strays(data[at : run[1]]):
+        taken = data[at : run[1]] if run is not None and self.dialect.arcs_refused else b""
+        if NO_FEED.search(taken) or self._strays(taken):
+            assert run is not None
             text.tried = at, run[1]  # line by line, then: who looks again and again never ends
             return None
         return run
 
+    def _take_unfed(self, text: Text, data: bytes, at: int) -> tuple[Run, int] | None:
+        """Take feed moves in front of any F, each of which is refused or not."""
+        if self.g.get("compensation") != G40:
+            return None
+        stated = not (self.feeding or self.g.get("motion") is None)
+        found = text.take_run(data, at, stated)
+        first = -1 if found is None else data.find(b"F", at, found[1])
+        if first >= 0:
+            lines = data[at : data.rfind(b"\n", at, first) + 1]
+            found = text.take_run(lines, 0, stated) if lines else None
+            found = None if found is None else (found[0], at + found[1])
+        if found is not None:
+            words = _COMMENT.sub(b"", data[at : found[1]])
+            found[0].stated = tuple(int(n) * 10 for n in _CODE.findall(words))
+        return found
+
+    def _run_unfed(self, run: Run) -> None:
+        """Follow them: what may have been left out leaves nobody knows where the axes stand."""
+        motion = self.g.get("motion")
+        if motion is None or set(run.stated) - {motion}:
+            self.g["motion"] = None
+            self.lose(AXES if len(run.stated) < run.lines else "")
+        self.lose("".join(run.last) if self.stays() else AXES)
+
+    def stays(self) -> bool:
+        """Whether nobody moves an axis while the program waits."""
+        resume = self.facts.resume
+        return resume == "same" or (resume is None and self.dialect.same_after_stop)
+
     def run(self, run: Run) -> None:
         """Follow a run of feed moves."""
         self.begun = self.started = True
+        if self.lacks_feed():
+            self._run_unfed(run)
+            return
         for letter, number in run.last.items():
             if letter == "F":
                 self.feed, self.feed_whole = number, self.matters(run.feed_whole)
@@ -73,7 +114,14 @@ class Circling(Drilling):
         if run.code is not None and self.dialect.modal_motion:
             self.g["motion"] = run.code
         if self.g.get("compensation") != G40:
-            self.lose(self.in_plane())
+            self.displaced("".join(run.last))
+
+    def displaced(self, named: str) -> None:
+        """Keep where the program says that axes stand which the tool's radius displaces."""
+        for k, axis in enumerate(AXES):
+            if axis in self.in_plane() and axis in named:
+                self.meant[k] = self.at[k]
+        self.lose(self.in_plane())
 
     def matters(self, whole: bool) -> bool:
         """Whether a number without a decimal point, which this one is or not, may mean another."""
@@ -107,6 +155,22 @@ class Circling(Drilling):
         centre = complex(*(words.get(_CENTRES[axis], 0.0) for axis in axes))
         radius = words["R"] * unit if "R" in words else None
         return misses(way * unit, centre * unit, radius)
+
+    def lacks_feed(self) -> bool:
+        """Whether a feed move may be refused, since it has no F."""
+        return self.dialect.arcs_refused and not self.feed > 0.0
+
+    def doubts_feed(self, block: Sorted) -> bool:
+        """Whether a block is a feed move without F that the control may refuse."""
+        dialect, g, values = self.dialect, block.g, block.values
+        motion = g.get("motion", self.g.get("motion"))
+        moves = block.axes or (motion != G1 and {"I", "J", "K"} & values.keys())
+        if not dialect.arcs_refused or not moves or motion not in (G1, *dialect.arcs):
+            return False
+        if any(dialect.effect(code) in _TAKES for code in g.values()):
+            return False
+        another = "feed mode" in g and self.mode_of(g["feed mode"]) != self.feed_mode
+        return not values.get("F", NAN if another else self.feed) > 0.0
 
     def doubts_arc(self, block: Sorted) -> bool:
         """Whether a block is an arc that the control may refuse."""

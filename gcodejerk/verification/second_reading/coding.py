@@ -12,11 +12,13 @@ from gcodejerk.nc.dialects.dialect import (
     LEFT_OVER,
     LINEAR,
     MACHINE_WORDS,
+    OVERRIDES,
     Effect,
 )
 from gcodejerk.nc.dialects.gcodes import G4, G28, G40, G54_1, G64, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.known import Known, Observation
+from gcodejerk.verification.second_reading.limiting import Said, along_path, too_low
 from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
 
@@ -140,6 +142,12 @@ class Codes(Known):
         else:
             self.bars["feed group"] = line.group
 
+    def smooth(self, effect: Effect, line: Line) -> None:
+        """A compressor of blocks begins or ends; CYCLE832 also says how blocks are joined."""
+        self.bars["compressor"] = effect != "no compressor"
+        if effect == "smoothing" and not (line.smoothed and self.path == 64):
+            self.path, self.p, self.q = None, NAN, NAN
+
     def beam(self, block: Sorted, burnt: bool) -> bool | None:
         """Whether G1 would burn where G0 does not; None where that is not known."""
         feeds = block.axes and self.g.get("motion") != self.dialect.rapid
@@ -165,6 +173,8 @@ class Codes(Known):
             if m in self.dialect.m_scales:
                 percent = block.values.get("S", NAN)
                 self.bars["F is scaled"] = None if percent != percent else percent != 100.0
+            if f"M{m}" in self.dialect.limits:
+                self.limit([(f"M{m}", *word) for word in block.values.items()])
         return ends
 
     # Complex: one case for each group of M codes.
@@ -201,6 +211,15 @@ class Codes(Known):
             elif group == "state":
                 self.forget()
         return ends
+
+    def limit(self, said: list[Said]) -> None:
+        """Take limits of speed and acceleration."""
+        found = too_low(said, self.dialect, self.facts.limits) if said else {}
+        for thing, low in found.items():
+            self.bars.pop(f"limit of {thing}", None)
+            if low:
+                self.bars[f"limit of {thing}"] = True
+        self.slow |= along_path(said, self.dialect) if said else {}
 
     def dwell(self, block: Sorted) -> None:
         """Lose the axes that may move beside G4; X alone is its time."""
@@ -245,6 +264,11 @@ class Codes(Known):
         """Begin or end what forbids to rewrite; what another language leaves is not known."""
         if name == ANOTHER_LANGUAGE:
             self.forget()
+        if name == OVERRIDES and not begins and name not in self.bars:
+            return  # never off so far
+        if begins == "Q":
+            self.bars[name] = values.get("Q", NAN) not in (0.0, 1.0)
+            return
         self.bars[name] = _switched(values.get("P", 0.0)) if begins == "P" else bool(begins)
 
     def _mirror(self, name: str, on: bool, values: dict[str, float]) -> None:

@@ -9,7 +9,7 @@ import os
 import re
 from collections.abc import Mapping
 
-from gcodejerk.nc import Dialect
+from gcodejerk.nc import Dialect, Start
 
 MOST = 200_000
 """Lines of other files."""
@@ -20,6 +20,15 @@ _END = re.compile(rb"^[ \t]*%", re.MULTILINE)
 _REST = re.compile(rb"\(.*?(?:\)|$)|;.*$", re.MULTILINE)
 _BEHIND = re.compile(rb";.*$", re.MULTILINE)
 _IN_FILE = re.compile(r"[op]?0*([1-9][0-9]*)(?:\..*)?", re.IGNORECASE)
+
+
+def lines_behind(whole: bytes, dialect: Dialect, start: Start) -> list[bytes]:
+    """Lines of other files that a program goes on in."""
+    rules = dialect.text
+    numbered = bool(rules.keywords) and rules.o_word == "program"
+    if not start.subprograms or not (numbered or (rules.names and rules.variables == "R")):
+        return []
+    return lines_elsewhere(whole, start.subprograms, dialect)
 
 
 def lines_elsewhere(program: bytes, files: Mapping[str, bytes], dialect: Dialect) -> list[bytes]:

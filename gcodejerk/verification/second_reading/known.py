@@ -22,8 +22,9 @@ from gcodejerk.verification.second_reading.reading import NAN
 KINDS = {
     "g": "modes",
     **dict.fromkeys(("frames", "bars", "untold"), "frames"),
-    **dict.fromkeys(("at", "system", "g92", "tool"), "axes"),
+    **dict.fromkeys(("at", "meant", "system", "g92", "tool"), "axes"),
     **dict.fromkeys(("systems", "lengths", "home", "variables"), "table"),
+    "slow": "least",
     **dict.fromkeys(("feed", "level", "r"), "number"),
     **dict.fromkeys(("p", "q"), "tolerance"),
     **dict.fromkeys(("doubt", "turns", "habits", "strayed"), "ever"),
@@ -51,6 +52,8 @@ class Facts:
     tool_change: Mapping[str, float] | None = None
     resume: str | None = None
     spindle: str | None = None
+    limits: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    straight: bool = True
     rapid_feed: tuple[float, float] | None = None
     """F and least Z of feed moves that count as rapids. [program's units]"""
 
@@ -73,6 +76,8 @@ class Observation:
     """Bit k: a word for AXES[k]."""
     modes: dict[str, Any] = field(default_factory=dict)
     """In force behind it."""
+    entered: bool = False
+    """Something leads to it besides the line above."""
 
     def moved(self, end: list[float]) -> set[str]:
         """List the axes of its words that certainly move."""
@@ -108,7 +113,7 @@ class Known:
         self.diameter: bool | None = facts.diameter
         self.turns = facts.diameter
         size = len(AXES)
-        self.at = [NAN] * size
+        self.at, self.meant = [NAN] * size, [NAN] * size
         told = bool(facts.positions or facts.offsets)
         self.system, self.g92, self.tool = [NAN] * size, [0.0 if told else NAN] * size, [NAN] * size
         self.tool = list(self.g92)
@@ -129,6 +134,8 @@ class Known:
         """Rotations and their kin: whether in force."""
         self.bars: dict[str, bool | None] = {}
         """What else forbids to rewrite rapids."""
+        self.slow: dict[str, float] = {}
+        """Limits of the path that the program has set, and that may hold: quantity -> number."""
         self.untold: dict[str, bool | None] = {}
         """Axes whose frame was shifted since an absolute word, where that matters."""
         self.added: bool | None = False
@@ -195,6 +202,7 @@ class Known:
     def forget(self) -> None:
         """Lose everything but what no code can change."""
         self.lose()
+        self.meant = [NAN] * len(AXES)
         self.g = {**dict.fromkeys(self.g), **self.fixed}
         if "feed mode" not in self.fixed:
             self.feed_mode = None
@@ -421,6 +429,8 @@ def _common(kind: str, mine: Any, theirs: Any) -> Any:
         return {k: a if a == b else None for k, (a, b) in both.items()}
     if kind == "axes":
         return [a if a == b else NAN for a, b in zip(mine, theirs, strict=True)]
+    if kind == "least":
+        return {k: min(mine.get(k, v), theirs.get(k, v)) for k, v in (mine | theirs).items()}
     if kind == "table":
         return {k: v for k, v in mine.items() if theirs.get(k) == v}
     if kind == "number":

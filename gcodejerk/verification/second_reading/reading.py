@@ -21,6 +21,7 @@ from typing import BinaryIO
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 from gcodejerk.verification.second_reading.klartext import read_statement
+from gcodejerk.verification.second_reading.limiting import Said, take_limits
 
 PIECE = 1 << 20
 """Bytes in memory at a time."""
@@ -31,6 +32,7 @@ _WORD = re.compile(rb"([A-Z])[ \t]*(" + _NUMBER + rb"|[-+]?#)[ \t]*")
 _INDEX = rb"(?:[ \t]*[0-9]+|[ \t]*<[^<>]*>)"
 _VARIABLE = re.compile(rb"#(?:[ \t]*#)*" + _INDEX)
 _INNERMOST = re.compile(rb"\[[^\[\]]*\]")
+_SETTINGS = re.compile(rb"#[ \t]*([0-9]+)[ \t]*=[ \t]*([0-9]+\.?(?![0-9])(?=[ \t]*(?:$|[#\0])))?")
 _CALL = re.compile(rb"[A-Z]{2,6}[ \t]*#(?:[ \t]*/[ \t]*#)?")
 _ASSIGNMENTS = re.compile(
     rb"[ \t]*(?:N[ \t]*[0-9]+)?(?:[ \t]*(#[0-9]+|#[ \t]*<[^<>]*>)[ \t]*=[^=#;()]*)"
@@ -83,6 +85,8 @@ class Line:
     blank: bool = False
     offsets: bool = False
     """An assignment that may change offsets."""
+    switched: float | None = None
+    """What is written into the variable that switches overrides; NaN where it is computed."""
     swivelled: bool = False
     """The plane is turned from here on."""
     smoothed: bool = False
@@ -91,6 +95,7 @@ class Line:
     """F is from here on the speed of some axes only."""
     cycle: tuple[str, bytes] | None = None
     """Name and arguments of a cycle."""
+    limits: list[Said] = field(default_factory=list)
     relative: dict[str, str] = field(default_factory=dict)
     """Address -> ``IC`` or ``AC``, whatever G90 or G91 says."""
 
@@ -105,6 +110,8 @@ class Run:
     feed_whole: bool
     code: int | None
     """The last motion code stated, times ten."""
+    stated: tuple[int, ...] = ()
+    """All of them, in a run that may be refused."""
 
 
 class Text:
@@ -304,6 +311,10 @@ class Text:
     def _blanked(self, text: bytes, line: Line) -> bytes:
         """Take out names, and put a mark in the place of what is computed."""
         rules = self.dialect.text
+        if self.dialect.limits:
+            text, line.limits = take_limits(text, self.dialect)
+            if line.limits and not self.dialect.one_command:
+                line.effects.append("limit")
         if rules.strings:
             text = _STRING.sub(rb"\1#", text)
         if rules.names:
@@ -339,6 +350,9 @@ class Text:
         targets = _TARGET.findall(text)
         rules = self.dialect.arithmetic
         numbers = [int(t) for t in targets if t.isdigit()]
+        for target, value in _SETTINGS.findall(text) if rules.overrides else ():
+            if target.decode() == rules.overrides:
+                line.switched = float(value) if value else NAN
         line.offsets = bool(rules.offsets) and (
             any(n >= rules.offsets and n not in rules.timers for n in numbers)
             or _COMPUTED.match(text) is not None

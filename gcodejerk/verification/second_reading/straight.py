@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G1, G40
+from gcodejerk.verification.second_reading.circling import NO_FEED
 from gcodejerk.verification.second_reading.tracking import Tracker
 
 Column = NDArray[np.float64]
@@ -112,12 +113,14 @@ class PlainLines:
             self.possible
             and tracker.may_run
             and tracker.begun
+            and not tracker.lacks_feed()
             and not tracker.depth
             and not tracker.doubt
             and (not tracker.dark or tracker.spindle == 5)
             and tracker.g.get("compensation") == G40
             and (tracker.path is not None or not self.dialect.path_has_to_be_stated)
             and all(on is False for on in tracker.bars.values())
+            and not tracker.slow
         )
 
     def take(self, data: bytes, at: int, tracker: Tracker) -> tuple[Straight, int] | None:
@@ -148,6 +151,8 @@ class PlainLines:
         characters = np.frombuffer(text, dtype=np.uint8)
         ends = np.flatnonzero(characters == 10)
         if len(ends) < FEWEST or int(np.diff(ends, prepend=-1).max()) > rules.line_limit:
+            return None
+        if self.dialect.arcs_refused and NO_FEED.search(text):
             return None
         begins = np.flatnonzero(characters >= ord("A"))
         # The words of a line are some of N, G, X, Y, Z, F; each has one number.

@@ -19,6 +19,7 @@ from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.second_reading.circling import Circling
 from gcodejerk.verification.second_reading.coding import QUIET, SELECTIONS
 from gcodejerk.verification.second_reading.known import NEAR, Observation
+from gcodejerk.verification.second_reading.limiting import too_fast
 from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
 
@@ -31,7 +32,8 @@ _FRAMES: frozenset[Effect] = frozenset(
 _MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
 """Effects beside which the axis words are no straight move."""
 _SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame", "further turn"))
-_READ = QUIET | _SHIFTS | frozenset[Effect](("frames", "swivel", "machine", "smoothing"))
+_SMOOTH = frozenset[Effect](("smoothing", "compressor", "no compressor"))
+_READ = QUIET | _SHIFTS | _SMOOTH | frozenset[Effect](("frames", "swivel", "machine", "limit"))
 """Effects of names that are followed."""
 _WRITES: frozenset[Effect] = frozenset(("written", "feed group"))
 _STOPS = (0, 1, 60)
@@ -52,14 +54,20 @@ class Tracker(Circling):
             self.systems, self.home = {}, {}
         elif line.offsets:
             self.written()
+        if line.switched is not None:
+            known = line.switched == line.switched and line.understood and not line.deleted
+            self.bars["feed hold is off"] = line.switched != 0.0 if known else None
         if line.understood and not line.words and not line.effects:
             self.started = self.started or not line.blank
             return Observation()
         self.begun = self.started = True
         if not line.deleted:
-            return self._execute(line)
+            seen = self._execute(line)
+            self.limit(line.limits)
+            return seen
         before = self.copy()
         self._execute(line)
+        self.limit(line.limits)
         if self.ended and not before.ended:
             vars(self).update(vars(before))
         else:
@@ -128,10 +136,10 @@ class Tracker(Circling):
         for effect in line.effects:
             if effect in QUIET:
                 self.turning(effect)
-            elif effect == "smoothing" and not (line.smoothed and self.path == 64):
-                self.path, self.p, self.q = None, NAN, NAN
+            elif effect in _SMOOTH:
+                self.smooth(effect, line)
         codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}
-        if codes & dialect.refused or self.doubts_arc(block):
+        if codes & dialect.refused or self.doubts_feed(block) or self.doubts_arc(block):
             return self._run_or_refused(block)
         seen = self._run_block(block)
         seen = self.end_elsewhere(line, block) or seen
@@ -158,7 +166,7 @@ class Tracker(Circling):
             self.forget()
             self.ended = False
         self.join(before)
-        if not self._stays():
+        if not self.stays():
             self.lose()
         return Observation(against="some of the controls refuse it")
 
@@ -247,7 +255,7 @@ class Tracker(Circling):
 
     def _stop(self, block: Sorted, *, ends: bool) -> None:
         """Stop or end behind the motion."""
-        if not self._stays():
+        if not self.stays():
             stops = [m for m in block.m if m in _STOPS and self.dialect.m_groups.get(m) == "stop"]
             self.lose(AXES if stops else "")
         if self.tool_moves(block) and not self.dialect.strict:
@@ -256,11 +264,6 @@ class Tracker(Circling):
         if ends:
             self.forget()
             self.ended = self.depth == 0  # in a branch it may not run
-
-    def _stays(self) -> bool:
-        """Whether nobody moves an axis while the program waits."""
-        resume = self.facts.resume
-        return resume == "same" or (resume is None and self.dialect.same_after_stop)
 
     def in_force(self) -> dict[str, Any]:
         """What is in force, by the names of `Observation.modes`."""
@@ -373,9 +376,9 @@ class Tracker(Circling):
         """Whether the move was a rapid in a known frame."""
         compensated = self.g.get("compensation") != G40
         if compensated:
-            self.lose(self.in_plane())
-        elif self.g.get("motion") in (0, G1) and set(self.in_plane()) & set(_letters(block.axes)):
-            self.end_bar(LEFT_OVER)
+            self.displaced(_letters(block.axes))
+        elif self.bars.get(LEFT_OVER, False) is not False:
+            self._leave_offset(block)
         if self.turned() and not self.drilled_behind(seen):
             self.lose()
         seen.against = seen.against or self._barred(block, seen)
@@ -387,6 +390,25 @@ class Tracker(Circling):
         if self.depth or self.doubt:
             seen.against = None
 
+    def _leave_offset(self, block: Sorted) -> None:
+        """A straight move with a length takes back what G40 has left, one without may not."""
+        if self.g.get("motion") not in (0, G1):
+            return
+        if self._has_length(block):
+            self.end_bar(LEFT_OVER)
+        elif set(self.in_plane()) & set(_letters(block.axes)):
+            self.displaced(_letters(block.axes))
+
+    def _has_length(self, block: Sorted) -> bool:
+        """Whether the program moves in the plane: then G40 has done its work."""
+        ways = [block.increments.get(axis, 0.0) for axis in self.in_plane()]
+        for axis in self.in_plane():
+            if axis in block.values and self.g.get("distance") == G91:
+                ways.append(block.values[axis])
+            elif axis in block.values:
+                ways.append(self.at[AXES.index(axis)] - self.meant[AXES.index(axis)])
+        return any(way != 0.0 for way in ways)
+
     def _barred(self, block: Sorted, seen: Observation) -> str | None:
         """What else speaks against rewriting the move."""
         if self.g.get("compensation") not in (G40, None):
@@ -396,6 +418,8 @@ class Tracker(Circling):
         for name, on in self.bars.items():
             if on:
                 return f"rapids have to stay as they are ({name})"
+        if self.slow and self._too_fast(seen):
+            return "the program bounds the path"
         for k, axis in enumerate(AXES):
             stated = axis in LINEAR or axis in self.facts.wraps
             if stated or axis not in block.values or self.g.get("distance") != G90:
@@ -407,6 +431,13 @@ class Tracker(Circling):
         if self.dialect.lengths_only and None not in (self.unit, self.feed_unit):
             return "F is not in the unit of lengths" if self.unit != self.feed_unit else None
         return None
+
+    def _too_fast(self, seen: Observation) -> bool:
+        """Whether a limit of the path is certainly in the way."""
+        moved = {axis: self.at[k] - seen.start[k] for k, axis in enumerate(AXES)}
+        moved = {a: way for k, (a, way) in enumerate(moved.items()) if seen.axes >> k & 1 and way}
+        known = all(way == way for way in moved.values())
+        return known and too_fast(self.slow, moved, self.facts.limits, self.facts.straight)
 
 
 def _letters(axes: int) -> str:

@@ -90,6 +90,8 @@ class Walker:
         self.seen: dict[int, Observation] = {}
         self._unsaid: list[tuple[int, int]] = []
         """Lines of which nothing is said."""
+        self._entered: set[int] = set()
+        """Lines to which something leads besides the line above."""
         self.most = MOST
         self._steps = 0
         self._calls: list[Part] = []
@@ -111,6 +113,8 @@ class Walker:
         for first, last in self._unsaid:
             for at in range(first, last):
                 self.seen.pop(at, None)
+        for at in self._entered & self.seen.keys():
+            self.seen[at].entered = True
         return self.seen
 
     def _run(
@@ -118,6 +122,7 @@ class Walker:
     ) -> tuple[Tracker | None, Tracker | None]:
         """Run lines first:last of a part; what is known behind them, and where it returns."""
         waiting: dict[int, Tracker] = {begin: tracker}
+        self._entered.add(begin)
         through: Tracker | None = None
         back: list[Tracker] = []
         unsure: set[int] = set()
@@ -133,6 +138,8 @@ class Walker:
             if self._steps > self.most:
                 raise LostError
             for target, after in self._line(part, at, state, back, unsure):
+                if target != at + 1:
+                    self._entered.add(target)
                 waiting[target] = _joined(waiting.get(target), after)
         returned: Tracker | None = None
         for state in back:
