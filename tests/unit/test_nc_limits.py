@@ -34,6 +34,7 @@ AGAIN = {
     "duet": b"G21\nG90\nG94\nG1 X1 Y1 Z40 F600\n",
     "grbl": b"G21 G90 G94 G17 G40 G54 G49 G61\nG1 X1 Y1 Z40 F100\n",
     "rs274": b"G21 G90 G94 G17 G40 G49 G54 G64\nG1 X1 F100\nG1 Y1\nG1 Z40\n",
+    "siemens": b"G500\nG71 G90 G94 G17 G40 G64 F100\nG1 X1 Y1 Z40\n",
 }
 LOWER = {
     "marlin": [
@@ -106,6 +107,20 @@ def test_a_limit_below_what_the_machine_file_states_keeps_rapids_as_they_are(dia
 @pytest.mark.parametrize(("dialect", "line"), [(d, one) for d in AS_STATED for one in AS_STATED[d]])
 def test_a_limit_that_the_machine_file_states_changes_nothing(dialect, line):
     assert reasons(dialect, line) is None
+
+
+@pytest.mark.parametrize(
+    ("dialect", "lines"),
+    [
+        ("marlin", b"M204 T500\nM204 T5000 @"),
+        ("marlin", b"M201 X2000\nM201 X5000 @"),
+        ("klipper", b"M204 S500\nM204 S9000 %"),
+        ("siemens", b"ACC[X]=50\nACC[X]=100 )"),
+        ("siemens", b"DRIVE\nBRISK @"),
+    ],
+)
+def test_a_block_that_is_not_understood_ends_no_limit(dialect, lines):
+    assert reasons(dialect, lines) in (SET, Reason.NOT_UNDERSTOOD)
 
 
 def test_grbl_may_refuse_to_set_it_back():

@@ -547,7 +547,8 @@ def _different(field, k):
     """A value of a field that another k does not give."""
     return {
         "mode": k + 1, "number": k + 0.5, "axes": [k + 0.25] * len(AXES), "once": bool(k),
-        "named": {"rotation": bool(k)}, "table": {k: [1.0]}, "constant": None,
+        "named": {"rotation": bool(k)}, "lowest": {"velocity": 2.0 - k},
+        "table": {k: [1.0]}, "constant": None,
     }[field.kind]  # fmt: skip
 
 
@@ -577,6 +578,9 @@ def test_every_field_of_the_state_is_joined_forgotten_and_compared(field):
         assert joined is True
     elif field.kind == "named":
         assert joined == {"rotation": None} == gone
+    elif field.kind == "lowest":
+        assert joined == {"velocity": 1.0}
+        assert gone == {"velocity": 2.0}
     elif field.kind == "table":
         assert joined == {} == gone
     elif field.kind == "axes":

@@ -24,7 +24,7 @@ from gcodejerk.nc.dialects.dialect import (
 )
 from gcodejerk.nc.dialects.gcodes import G1, G40
 from gcodejerk.nc.interpreter.codes import Codes
-from gcodejerk.nc.interpreter.limits import beyond_path, limits_path, of_path
+from gcodejerk.nc.interpreter.limits import beyond_path
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import NO_FEED
 from gcodejerk.nc.text.block import Block, Line
@@ -76,12 +76,11 @@ BARS = {
 
 def barred(state: State) -> Reason | None:
     """Say why rapids are unfit, if anything of that kind is, or may be, in force."""
-    names = [name for name, on in state.bars.items() if on is not False]
-    # A limit of the path depends on the move, where its number is known.
-    numbers = {name: of_path(name) for name in names}
-    name = next((n for n in names if numbers[n] is None or math.isnan(numbers[n] or 0.0)), None)
-    # All that have no name of their own are limits.
-    return None if name is None else BARS.get(name, Reason.LIMIT_SET)
+    for name, on in state.bars.items():
+        if on is not False:
+            return BARS.get(name, Reason.LIMIT_SET)  # all that have no name of their own are limits
+    # One of the path depends on the move, where its number is known.
+    return Reason.LIMIT_SET if any(map(math.isnan, state.path_limits.values())) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +244,7 @@ def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
 
 def _beyond_path(step: Step, state: State, named: list[int]) -> bool:
     """Whether a limit of the path that the program has set is in the way of a known move."""
-    if not limits_path(state) or any(math.isnan(step.end[k] - step.start[k]) for k in named):
+    if not state.path_limits or any(math.isnan(step.end[k] - step.start[k]) for k in named):
         return False
     moved = np.zeros((1, len(AXES)))
     moved[0, named] = [step.end[k] - step.start[k] for k in named]

@@ -138,7 +138,9 @@ class Executor(Phases):
         step.fault = True
         step.call = None
         before, state.touched, ended = state.touched, set(), state.ended
+        bars, path_limits = state.bars, state.path_limits
         self.act(codes, step)
+        state.put_back(bars, path_limits)
         if step.ends:
             state.forget(Reason.NOT_UNDERSTOOD)
             step.ends = False

@@ -21,8 +21,6 @@ from gcodejerk.nc.text.block import Name
 
 LIMIT = "limit of "
 """How the names of these bars begin."""
-_PATH = LIMIT + "the path: "
-"""The same of those of the path; quantity and number follow."""
 Stated = Mapping[str, tuple[float, float, float]]
 _QUANTITIES = ("velocity", "acceleration", "jerk")
 _NUMBER = re.compile(rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
@@ -84,6 +82,7 @@ def _put(state: State, found: Iterable[tuple[Limit, float]], stated: Stated) -> 
     """Enter limits: of several for one thing, the lowest counts; whether any is too low."""
     kept: dict[str, bool] = {}
     paths: dict[str, float] = {}
+    low = False
     for limit, value in found:
         if limit.axis:
             bar = f"{LIMIT}{limit.quantity} {limit.axis}"
@@ -93,12 +92,13 @@ def _put(state: State, found: Iterable[tuple[Limit, float]], stated: Stated) -> 
             number = value * limit.scale if stated else NAN
             paths[limit.quantity] = NAN if number != number else min(lowest, number)
     for quantity, number in paths.items():
-        before = f"{_PATH}{quantity} "
-        kept |= {bar: True for bar in state.bars if bar.startswith(before)}
         of_all = sum(of[_QUANTITIES.index(quantity)] ** 2 for of in stated.values()) ** 0.5
-        kept[f"{before}{number!r}"] = number >= of_all * _NEAR
+        enough = number >= of_all * _NEAR
+        others = {name: lowest for name, lowest in state.path_limits.items() if name != quantity}
+        state.put("path_limits", others if enough else {**others, quantity: number})
+        low |= not enough
     _bar(state, {bar: not enough for bar, enough in kept.items()})
-    return not all(kept.values())
+    return low or not all(kept.values())
 
 
 def _bar(state: State, low: Mapping[str, bool]) -> None:
@@ -114,16 +114,6 @@ def limit_is_kept(limit: Limit, value: float, stated: Stated) -> bool:
         return False
     at = _QUANTITIES.index(limit.quantity)
     return limit.axis not in stated or value * limit.scale >= stated[limit.axis][at] * _NEAR
-
-
-def of_path(bar: str) -> float | None:
-    """The number of a bar that is a limit of the path, NaN where nobody knows it; else None."""
-    return float(bar.rpartition(" ")[2]) if bar.startswith(_PATH) else None
-
-
-def limits_path(state: State) -> bool:
-    """Whether any limit of the path is, or may be, in force."""
-    return any(on is not False and name.startswith(_PATH) for name, on in state.bars.items())
 
 
 def beyond_path(state: State, moved: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -143,14 +133,13 @@ def beyond_path(state: State, moved: NDArray[np.float64]) -> NDArray[np.bool_]:
     -------
     ndarray of bool, shape (n,)
     """
-    bars = [name for name, on in state.bars.items() if on is not False and name.startswith(_PATH)]
     beyond = np.zeros(len(moved), dtype=np.bool_)
     way = np.abs(np.nan_to_num(moved))
     ours = np.array([axis in state.limits for axis in AXES])
     linear = np.array([axis in LINEAR for axis in AXES])
     mixed = (way[:, linear] > 0.0).any(axis=1) & (way[:, ~linear] > 0.0).any(axis=1)
-    for bar in bars:
-        at = _QUANTITIES.index(bar[len(_PATH) :].partition(" ")[0])
+    for quantity, number in state.path_limits.items():
+        at = _QUANTITIES.index(quantity)
         most = np.array([state.limits[a][at] if a in state.limits else 0.0 for a in AXES])
         if state.straight:
             length = np.sqrt((way**2).sum(axis=1))[:, np.newaxis]
@@ -159,7 +148,7 @@ def beyond_path(state: State, moved: NDArray[np.float64]) -> NDArray[np.bool_]:
             reach[~(way[:, ours] > 0.0).any(axis=1)] = 0.0
         else:
             reach = np.sqrt((most**2 * (way > 0.0)).sum(axis=1))
-        beyond |= mixed | ~(of_path(bar) >= reach * _NEAR)
+        beyond |= mixed | ~(number >= reach * _NEAR)
     return beyond
 
 

@@ -47,6 +47,7 @@ Kind = Literal[
     "axes",  # one number an axis; NaN: unknown
     "once",  # true as soon as the program did something somewhere; never taken back
     "named",  # name -> in force, None unknown; a name that is not there is not in force
+    "lowest",  # name -> lowest number that may be in force, NaN unknown; not there: none is
     "table",  # key -> what is known of it; a key that is not there is unknown
     "constant",  # the same from the start to the end, or kept by whoever runs the blocks
     "note",  # for people: nothing is computed from it
@@ -101,6 +102,7 @@ FIELDS = (
     Field("modal_cycle", "mode"),
     *(Field(name, "axes") for name in ("position", "meant", "g5x", "g92", "tool", "home")),
     *(Field(name, "named") for name in ("transforms", "bars", "shifted")),
+    Field("path_limits", "lowest"),
     Field("added", "mode", False),
     *(Field(name, "table") for name in ("offsets", "variables")),
     *(
@@ -122,6 +124,8 @@ _NO_GROUP = ("feed_whole", "cycle", "modal_cycle", "system_stated", "added")
 MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in _NO_GROUP)
 """Fields that hold one modal group each."""
 _FRAME = ("g5x", "g92", "tool")
+_HOLDERS = ("axes", "named", "lowest", "table")
+"""Kinds whose values are containers, made anew for each state."""
 _GROUPS = {
     word: tuple(field.name for field in FIELDS if field.together == word)
     for word in {field.together for field in FIELDS} - {""}
@@ -192,6 +196,8 @@ class State:
     """Rotation, scaling, mirroring..."""
     bars: dict[str, bool | None]
     """What besides makes rapids ineligible while it is in force, by `eligibility.BARS`."""
+    path_limits: dict[str, float]
+    """Limits of the path that the program has set, by quantity. [mm/s, mm/s^2, mm/s^3]"""
     shifted: dict[str, bool | None]
     """Axes of which no absolute word has told the place since their frame was shifted, where that
     matters (`Dialect.shifts_travel`)."""
@@ -227,7 +233,7 @@ class State:
 
     def __init__(self) -> None:
         for field in FIELDS:
-            if field.kind in ("axes", "named", "table"):
+            if field.kind in _HOLDERS:
                 setattr(self, field.name, [NAN] * len(AXES) if field.kind == "axes" else {})
             else:
                 setattr(self, field.name, field.start)
@@ -237,7 +243,7 @@ class State:
         other = State.__new__(State)
         for field in FIELDS:
             value = getattr(self, field.name)
-            shared = field.kind not in ("axes", "named", "table")
+            shared = field.kind not in _HOLDERS
             setattr(other, field.name, value if shared else value.copy())
         return other
 
@@ -291,7 +297,7 @@ class State:
                 continue
             if name in self.fixed or (field.only_if and not getattr(self, field.only_if)):
                 continue
-            if field.kind != "named" or getattr(self, name):
+            if field.kind not in ("named", "lowest") or getattr(self, name):
                 self.put(name, _unknown(field, getattr(self, name)))
 
     def forget_frame(self) -> None:
@@ -315,6 +321,11 @@ class State:
         offsets = self.offsets
         self.forget()
         self.offsets, self.touched = offsets, touched
+
+    def put_back(self, bars: Mapping[str, bool | None], path_limits: Mapping[str, float]) -> None:
+        """Put back which bars and limits of the path a block may, or may not, have ended."""
+        self.bars = {**{name: None for name, on in bars.items() if on is not False}, **self.bars}
+        self.path_limits = _lowest(self.path_limits, path_limits)
 
     def forget_touched(self, touched: Iterable[str | int], because: Reason | None = None) -> None:
         """Forget fields and axes that may or may not have been changed, and name the reason."""
@@ -370,6 +381,8 @@ def _equal(field: Field, a: Any, b: Any) -> bool:
         return all(map(same, a, b))
     if field.kind == "named":
         return all(a.get(name, False) == b.get(name, False) for name in a.keys() | b.keys())
+    if field.kind == "lowest":
+        return a.keys() == b.keys() and all(same(a[name], b[name]) for name in a)
     if field.name == "cycle" and a is not None and b is not None:
         return all(map(same, a, b))
     return same(a, b)
@@ -397,6 +410,12 @@ def join(before: State, after: State) -> State:
     return joined
 
 
+def _lowest(a: Mapping[str, float], b: Mapping[str, float]) -> dict[str, float]:
+    """The lowest number that one of two says, by name; NaN is lower than any."""
+    lower = {n: x if x != x or x <= b.get(n, math.inf) else b[n] for n, x in a.items()}
+    return {**b, **lower}
+
+
 def _join(joined: State, field: Field, a: Any, b: Any) -> None:
     """Keep of one field what two states have in common; they differ in it."""
     if field.kind == "once":
@@ -404,6 +423,8 @@ def _join(joined: State, field: Field, a: Any, b: Any) -> None:
     elif field.kind == "named":
         both = {name: (a.get(name, False), b.get(name, False)) for name in a.keys() | b.keys()}
         joined.put(field.name, {n: x if x == y else None for n, (x, y) in both.items()})
+    elif field.kind == "lowest":
+        joined.put(field.name, _lowest(a, b))
     elif field.name == "position":
         for axis, (x, y) in enumerate(zip(a, b, strict=True)):
             if not same(x, y):

@@ -18,7 +18,7 @@ from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LEFT_OVER, LINEAR, PLANES
 from gcodejerk.nc.dialects.gcodes import G40, G90, G91
 from gcodejerk.nc.interpreter.arcs import doubtful
 from gcodejerk.nc.interpreter.eligibility import barred
-from gcodejerk.nc.interpreter.limits import beyond_path, limits_path
+from gcodejerk.nc.interpreter.limits import beyond_path
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
@@ -212,7 +212,7 @@ def reasons(
     if not dialect.feed_of_mixed:
         both = moving[:, _IS_LINEAR].any(axis=1) & moving[:, ~_IS_LINEAR].any(axis=1)
         reason[both] = _INDEX[Reason.MIXED_AXES]
-    if limits_path(state):
+    if state.path_limits:
         limited = beyond_path(state, np.where(is_named, target - start, 0.0))
         reason[limited] = _INDEX[Reason.LIMIT_SET]
     reason[~moves] = _INDEX[Reason.NO_MOTION]
