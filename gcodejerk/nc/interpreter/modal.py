@@ -410,6 +410,12 @@ def join(before: State, after: State) -> State:
     return joined
 
 
+def _either(a: Mapping[str, Any], b: Mapping[str, Any]) -> dict[str, bool | None]:
+    """What is in force where either of two is, by name; None where they differ."""
+    both = {name: (a.get(name, False), b.get(name, False)) for name in a.keys() | b.keys()}
+    return {name: x if x == y else None for name, (x, y) in both.items()}
+
+
 def _lowest(a: Mapping[str, float], b: Mapping[str, float]) -> dict[str, float]:
     """The lowest number that one of two says, by name; NaN is lower than any."""
     lower = {n: x if x != x or x <= b.get(n, math.inf) else b[n] for n, x in a.items()}
@@ -420,11 +426,8 @@ def _join(joined: State, field: Field, a: Any, b: Any) -> None:
     """Keep of one field what two states have in common; they differ in it."""
     if field.kind == "once":
         joined.put(field.name, a or b)
-    elif field.kind == "named":
-        both = {name: (a.get(name, False), b.get(name, False)) for name in a.keys() | b.keys()}
-        joined.put(field.name, {n: x if x == y else None for n, (x, y) in both.items()})
-    elif field.kind == "lowest":
-        joined.put(field.name, _lowest(a, b))
+    elif field.kind in ("named", "lowest"):
+        joined.put(field.name, _either(a, b) if field.kind == "named" else _lowest(a, b))
     elif field.name == "position":
         for axis, (x, y) in enumerate(zip(a, b, strict=True)):
             if not same(x, y):
