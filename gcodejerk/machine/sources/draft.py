@@ -131,11 +131,16 @@ class Draft:
                 "state them: --axis 'X velocity=36m/min acceleration=0.4g travel=0:500'",
             )
         if missing := self.missing():
-            first = missing[0].split()[-1]
+            first = self.axes[missing[0].split()[-1]]
+            example = (
+                "velocity=3600deg/min acceleration=200deg/s^2"
+                if first.rotary
+                else "velocity=24m/min acceleration=0.3g"
+            )
             raise MachineError(
                 f"nothing says the rapid's {', '.join(missing)}",
-                f"state it, for example --axis '{first} velocity=24m/min acceleration=0.3g'; what "
-                "the control is set to is never guessed",
+                f"state it, for example --axis '{first.name} {example}'; what the control is set "
+                "to is never guessed",
             )
         if self.interval is None:
             usual = "the usual interval of commands; ask the control's manual"

@@ -110,6 +110,12 @@ def read_fluidnc(text: str, name: str) -> Draft:
     )
     draft.positioning = "linear", "FluidNC's G0 is a straight line"
     draft.planner = "trapezoidal", "FluidNC has no jerk limit"
+    kinematics = document.get("kinematics")
+    named = next(iter(kinematics), "") if isinstance(kinematics, dict) else kinematics
+    if named and named != "cartesian":
+        draft.notes.append(
+            f"kinematics {named}: limits are taken as those of the axes; watch a first run"
+        )
     for letter in LETTERS:
         values = axes.get(letter.lower())
         if not isinstance(values, dict):
