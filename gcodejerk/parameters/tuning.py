@@ -331,7 +331,10 @@ def _ranges(scheme: Scheme, machine: Machine) -> Array:
         if setting.axis == PATH:
             quantities = {name: value for name, value in path.items()}
             most = {
-                "acceleration": max(limit.acceleration for limit in limits.values()),
+                "acceleration": min(
+                    max(limit.acceleration for limit in limits.values()),
+                    machine.path.limit.acceleration,
+                ),
                 "jerk": max(limit.jerk for limit in limits.values()),
             }
         else:

@@ -182,3 +182,14 @@ def test_fluidncs_other_kinematics_are_said(tmp_path):
     axes = "axes:\n  x:\n    max_rate_mm_per_min: 5000\n    acceleration_mm_per_sec2: 200\n"
     assert "corexy" in made(tmp_path, "kinematics:\n  corexy:\n" + axes, "a.yaml")[1]
     assert "kinematics" not in made(tmp_path, "kinematics:\n  Cartesian:\n" + axes, "b.yaml")[1]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [("", "0.5 (Klipper's own): short rapids take up to 6 %"),
+     ("minimum_cruise_ratio: 0.8\n", "0.8: short rapids take up to 34 %"),
+     ("minimum_cruise_ratio: 0\n", None)],
+)  # fmt: skip
+def test_klippers_cruise_ratio_is_said(tmp_path, line, said):
+    _, notes = made(tmp_path, PRINTER + line, "printer.cfg")
+    assert (said in notes) if said else ("minimum_cruise_ratio" not in notes)

@@ -117,7 +117,8 @@ NO_JERK = "a jerk limit: only the acceleration can be set"
 
 def path_acceleration(machine: Machine) -> dict[str, float]:
     """What the path may do today: no axis hinders it."""
-    return {"acceleration": max(axis.rapid.acceleration for axis in machine.axes)}
+    own = max(axis.rapid.acceleration for axis in machine.axes)
+    return {"acceleration": min(own, machine.path.rapid.acceleration)}
 
 
 def shared_acceleration(machine: Machine, today: dict[str, Array]) -> dict[str, float]:
@@ -138,7 +139,8 @@ def shared_acceleration(machine: Machine, today: dict[str, Array]) -> dict[str, 
     sharing = [a for a in machine.axes if not a.rotary and a.name != "Z"] or list(machine.axes)
     for axis in sharing:
         today["acceleration"][AXES.index(axis.name)] = np.inf
-    return {"acceleration": min(axis.rapid.acceleration for axis in sharing)}
+    own = min(axis.rapid.acceleration for axis in sharing)
+    return {"acceleration": min(own, machine.path.rapid.acceleration)}
 
 
 def shaped_scheme(

@@ -22,7 +22,7 @@ from gcodejerk.machine.sources.draft import Draft, Fact
 
 KIND = "Klipper printer.cfg"
 MOST_BYTES, MOST_DEPTH = 1 << 20, 8
-DEFAULT_SHAPER = "mzv"
+DEFAULT_SHAPER, DEFAULT_CRUISE = "mzv", 0.5
 STRAIGHT = ("cartesian", "corexy", "corexz", "hybrid_corexy", "hybrid_corexz", "delta", "limited_")
 _SAVED = re.compile(r"^#\*# ?", re.MULTILINE)
 _INCLUDE = re.compile(r"\[include\s+([^\]]+)\]")
@@ -73,12 +73,19 @@ def read_klipper(path: Path, text: str) -> Draft:
         )
     speed = values.fact("printer", "max_velocity")
     acceleration = values.fact("printer", "max_accel")
+    draft.path = {
+        name: fact
+        for name, fact in (("velocity", speed), ("acceleration", acceleration))
+        if fact is not None
+    }
     for letter in "XYZ":
         axis = draft.axis(letter)
         own = letter == "Z" or kinematics.startswith("limited_")
         key = f"max_{letter.lower()}_"
-        axis.velocity = (values.fact("printer", key + "velocity") if own else None) or speed
-        axis.acceleration = (values.fact("printer", key + "accel") if own else None) or acceleration
+        axis.velocity = _lower(values.fact("printer", key + "velocity") if own else None, speed)
+        axis.acceleration = _lower(
+            values.fact("printer", key + "accel") if own else None, acceleration
+        )
         low = values.number(f"stepper_{letter.lower()}", "position_min") or 0.0
         high = values.number(f"stepper_{letter.lower()}", "position_max")
         if high is not None and low < high and kinematics != "delta":
@@ -87,9 +94,16 @@ def read_klipper(path: Path, text: str) -> Draft:
                 "position_min (0 unless said), position_max",
             )
     _shapers(draft, values)
+    _cruise(draft, values)
     if config.has_section("printer") and config.has_option("printer", "unified_planner"):
         draft.controller = "kalico"
     return draft
+
+
+def _lower(own: Fact | None, of_all: Fact | None) -> Fact | None:
+    """What bounds an axis: its own limit, or that of the tool head."""
+    known = [fact for fact in (own, of_all) if fact is not None]
+    return min(known, key=lambda fact: fact.value, default=None)
 
 
 def _shapers(draft: Draft, values: _Config) -> None:
@@ -107,6 +121,25 @@ def _shapers(draft: Draft, values: _Config) -> None:
             f"[input_shaper] is on today ({', '.join(found)}). A machine file has one filter for "
             "straight rapids of all axes, so it is left out: what this file calls today's "
             "vibration is that without it"
+        )
+
+
+def _cruise(draft: Draft, values: _Config) -> None:
+    """The part of every move without acceleration, which slows short rapids down."""
+    ratio = values.number("printer", "minimum_cruise_ratio")
+    if ratio is None:
+        ratio, said = DEFAULT_CRUISE, " (Klipper's own)"
+        if values.text("printer", "max_accel_to_decel") is not None:
+            return
+    else:
+        said = ""
+    if 0.0 < ratio < 1.0:
+        # A move that never reaches its speed peaks at sqrt((1 - r) d a), not at sqrt(d a).
+        longer = 50.0 * (2.0 - ratio) / (1.0 - ratio) ** 0.5 - 100.0
+        draft.notes.append(
+            f"minimum_cruise_ratio is {ratio:g}{said}: short rapids take up to {longer:.0f} % "
+            "longer today than this file says, and streams are played slower: set it to 0 while "
+            "they run"
         )
 
 

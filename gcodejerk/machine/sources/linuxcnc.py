@@ -272,10 +272,7 @@ def _trajectory(draft: Draft, values: _Values, unit: float) -> None:
                 axis.velocity = Fact(speed, f"{origin}, below the axis's own")
         together = sum(axis.velocity.value**2 for axis in lengths if axis.velocity) ** 0.5
         if together > speed * (1.0 + 1e-9):
-            draft.notes.append(
-                f"{origin}: rapids of several axes are slower today than this file says, which "
-                "knows limits of single axes only; their time is then shorter than today's"
-            )
+            draft.path["velocity"] = Fact(speed, origin)
     blend = values.number("TRAJ", "ARC_BLEND_ENABLE")
     if blend is not None and blend[0] == 0.0:
         draft.notes.append("[TRAJ] ARC_BLEND_ENABLE is 0; streams need 1")

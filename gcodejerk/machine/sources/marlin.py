@@ -71,6 +71,8 @@ def read_marlin(text: str, name: str) -> Draft:
     draft.planner = "trapezoidal", "it has no jerk limit (its jerk is a step of the speed)"
     per = SECONDS_PER_MINUTE if rrf else 1.0
     shared = _of_travel(found, rrf, name)
+    if shared is not None:
+        draft.path["acceleration"] = Fact(shared[0], f"{shared[1]}, of all travel")
     for letter in LETTERS:
         speed, own = _last(found, "M203", letter, name), _last(found, "M201", letter, name)
         if speed is None and own is None:
