@@ -69,9 +69,10 @@ def machine_new(
 ) -> None:  # fmt: skip
     """Make a commented machine file from a control's own configuration, or from answers."""
     from gcodejerk.batch.files import new_file
+    from gcodejerk.emit import load_controller
     from gcodejerk.errors import MachineError
-    from gcodejerk.machine import Machine
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
+    from gcodejerk.nc import AUTO, find_dialect
 
     if output != "-" and os.path.lexists(output) and not force:
         raise MachineError(
@@ -84,6 +85,10 @@ def machine_new(
             "name a control's configuration, or state axes: --axis 'X velocity=36m/min "
             "acceleration=0.4g'; questions are asked at a terminal only"
         )
+    if controller is not None:
+        load_controller(controller)
+    if dialect is not None and dialect != AUTO:
+        find_dialect(dialect)
     draft = draft_of(files or (), folder)
     draft.name = name or draft.name
     draft.controller = controller or draft.controller
@@ -97,14 +102,39 @@ def machine_new(
         stated_mode(draft, words)
     draft.settle(headroom)
     text = text_of(draft)
-    # What is not a machine file never leaves.
-    Machine.loads(text, output if output != "-" else str(folder / "new.yaml"))
+    _prove(text, output if output != "-" else str(folder / "new.yaml"), draft)
     if output != "-" or not as_json:
         with new_file(output) as file:
             file.write(text.encode())
     if as_json:
         print(json.dumps(_record(draft, text, output), indent=1, ensure_ascii=False))
     _say(draft, text, output)
+
+
+def _prove(text: str, name: str, draft: Draft) -> None:
+    """What is not a machine file never leaves; where its numbers come from, messages say.
+
+    Raises
+    ------
+    MachineError
+        By its key and origin: lines of a file that nobody has seen lead nowhere.
+    """
+    from gcodejerk.errors import MachineError, Place
+    from gcodejerk.machine import Machine, MachineFileError
+
+    try:
+        Machine.loads(text, name)
+    except MachineFileError as error:
+        lines = text.splitlines()
+        source = Place(", ".join(draft.sources)) if draft.sources else None
+        found = []
+        for one in error.problems:
+            line = one.place.line if one.place is not None else None
+            said = lines[line - 1].partition("#")[2].strip() if line else ""
+            found.append(
+                MachineError(f"{one.problem}{f' ({said})' if said else ''}", one.remedy, source)
+            )
+        raise MachineFileError(found) from None
 
 
 def _record(draft: Draft, text: str, output: str) -> dict[str, Any]:

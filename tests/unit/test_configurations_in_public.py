@@ -193,3 +193,22 @@ def test_fluidncs_other_kinematics_are_said(tmp_path):
 def test_klippers_cruise_ratio_is_said(tmp_path, line, said):
     _, notes = made(tmp_path, PRINTER + line, "printer.cfg")
     assert (said in notes) if said else ("minimum_cruise_ratio" not in notes)
+
+
+@pytest.mark.parametrize("number", ["1e3", "5,000", "5000,0", "nan", ""])
+def test_a_setting_of_grbl_is_a_whole_number_or_none(tmp_path, number):
+    with pytest.raises(MachineError, match=r"\$110 is ") as refused:
+        made(tmp_path, f"$100=80\n$110={number}\n$120=500\n", "dump.txt")
+    assert refused.value.place.line == 2
+
+
+@pytest.mark.parametrize("number", ["0", "-5"])
+def test_a_rate_of_grbl_that_stands_still_is_refused_by_its_line(tmp_path, number):
+    with pytest.raises(MachineError, match=rf"\$120 is {number}, expected") as refused:
+        made(tmp_path, f"$110=5000\n$120={number}\n", "dump.txt")
+    assert refused.value.place.line == 2
+
+
+def test_settings_of_grbl_that_are_no_numbers_do_not_matter(tmp_path):
+    text = "$74=My Net (ssid)\n$110 = 6000.000 (x max rate)\n$120=500\n"
+    assert rapid(made(tmp_path, text, "dump.txt")[0]) == (100.0, 500.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -64,7 +65,8 @@ def draft_of(files: Sequence[str], folder: Path) -> Draft:
     Parameters
     ----------
     files : sequence of str
-        Paths: at most one configuration; spectra name their axis (`resonances_x_1.csv`).
+        Paths, - for standard input: at most one configuration; spectra name their axis
+        (`resonances_x_1.csv`).
     folder : Path
         Where the machine file will be: names of spectra are written from there.
 
@@ -84,6 +86,12 @@ def draft_of(files: Sequence[str], folder: Path) -> Draft:
         path = Path(name)
         text = _text(path)
         kind = recognise(text)
+        path = Path("<stdin>") if name == "-" else path
+        if kind == "spectrum" and name == "-":
+            raise MachineError(
+                "a spectrum came from standard input",
+                "name its file: the machine file refers to it",
+            )
         if kind == "spectrum":
             spectra.append(path)
         elif kind == "machine":
@@ -144,7 +152,8 @@ def _spectrum(draft: Draft, path: Path, folder: Path) -> None:
 def _text(path: Path) -> str:
     place = Place(str(path))
     try:
-        data = read_file(path, MOST_BYTES + 1)
+        piped = str(path) == "-"
+        data = sys.stdin.buffer.read(MOST_BYTES + 1) if piped else read_file(path, MOST_BYTES + 1)
     except FileNotFoundError:
         raise MachineError("there is no such file", f"name {KINDS}", place) from None
     except IsADirectoryError:
