@@ -212,3 +212,33 @@ def test_a_rate_of_grbl_that_stands_still_is_refused_by_its_line(tmp_path, numbe
 def test_settings_of_grbl_that_are_no_numbers_do_not_matter(tmp_path):
     text = "$74=My Net (ssid)\n$110 = 6000.000 (x max rate)\n$120=500\n"
     assert rapid(made(tmp_path, text, "dump.txt")[0]) == (100.0, 500.0)
+
+
+def test_rates_of_a_30i_are_behind_m_or_i(tmp_path):
+    metric = "%\nN01420Q1A1M30000.0A2M24000.0\nN01620Q1A1P64A2P64\n%\n"
+    machine, _ = made(tmp_path, metric, "cnc-para.txt")
+    assert rapid(machine) == (500.0, 500.0 / 0.064)
+    assert machine.axis("Y").rapid.velocity == 400.0
+    inch = metric.replace("M30000.0", "I1000.0").replace("%\n", "%\nN01320Q1A1I10.A2M5.\n", 1)
+    inch = inch.replace("N01420", "N01321Q1A1I-10.A2M-5.\nN01420")
+    machine, _ = made(tmp_path, inch, "inch.txt")
+    assert machine.axis("X").rapid.velocity == pytest.approx(25400 / 60)
+    assert machine.axis("X").travel == (-254.0, 254.0)
+    assert machine.axis("Y").travel == (-5.0, 5.0)
+
+
+@pytest.mark.parametrize("bits", ["00000001", "1"])
+def test_rates_of_a_fanuc_machine_in_inch_are_refused(tmp_path, bits):
+    text = f"N01001P{bits}\nN01420 A1 P1200 A2 P1200\nN01620 A1 P64 A2 P64\n"
+    with pytest.raises(MachineError, match="INM") as refused:
+        made(tmp_path, text, "cnc-para.txt")
+    assert refused.value.place.line == 2
+    made(tmp_path, text.replace(f"P{bits}", "P00000010"), "cnc-para.txt")
+
+
+@pytest.mark.parametrize("number", ["1.2.3", "30,000", "3e4"])
+@pytest.mark.parametrize("form", ["N01420 A1 P{}", "1420 X{}", "1420: X={}"])
+def test_a_rate_of_fanuc_is_a_plain_number(tmp_path, form, number):
+    with pytest.raises(MachineError, match="expected a number") as refused:
+        made(tmp_path, f"N01620 A1 P64\n{form.format(number)}\n", "list.txt")
+    assert refused.value.place.line == 2
