@@ -242,3 +242,11 @@ def test_a_rate_of_fanuc_is_a_plain_number(tmp_path, form, number):
     with pytest.raises(MachineError, match="expected a number") as refused:
         made(tmp_path, f"N01620 A1 P64\n{form.format(number)}\n", "list.txt")
     assert refused.value.place.line == 2
+
+
+def test_travel_that_is_an_expression_is_left_out(tmp_path):
+    text = CONFIG_G + "M208 X0:200 Z{global.height} S0\nM208 Z0 S1\n"
+    machine, notes = made(tmp_path, text, "config.g")
+    assert machine.axis("X").travel == (0.0, 200.0)
+    assert machine.axis("Z").travel is None
+    assert "config.g:5: Z of M208 is '{global.height}'" in notes

@@ -181,6 +181,13 @@ def _travel(draft: Draft, letter: str, found: Found, name: str) -> None:
         if letter not in words:
             continue
         place = Place(name, line)
+        if "{" in words[letter]:
+            draft.notes.append(
+                f"{place}: {letter} of M208 is {words[letter]!r}, which is not known: travel of "
+                f"{letter} is left out"
+            )
+            low = high = None
+            break
         origin = f"M208 ({place})"
         ends = [_number(part, f"{letter} of M208", place) for part in words[letter].split(":")]
         if len(ends) == 2:
