@@ -250,3 +250,12 @@ def test_travel_that_is_an_expression_is_left_out(tmp_path):
     assert machine.axis("X").travel == (0.0, 200.0)
     assert machine.axis("Z").travel is None
     assert "config.g:5: Z of M208 is '{global.height}'" in notes
+
+
+def test_a_table_of_a_calibration_is_no_spectrum(tmp_path):
+    (tmp_path / "calibration_data_x.csv").write_text(
+        "freq,psd_x,psd_y,psd_z,psd_xyz,zv(52.6),mzv(54.2)\n5.0,1,0,0,1,1.000,1.000\n"
+    )
+    with pytest.raises(MachineError, match="no spectrum to judge by") as refused:
+        draft_of([str(tmp_path / "calibration_data_x.csv")], tmp_path)
+    assert "TEST_RESONANCES" in refused.value.remedy

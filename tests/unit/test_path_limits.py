@@ -1,6 +1,8 @@
 """What a control bounds along the path, whichever axes move: planned, written, verified."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,14 +10,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcodejerk import plan_move
+from gcodejerk.emit import load_controller
 from gcodejerk.errors import PlanError
-from gcodejerk.machine import FREE, PLANNERS, Machine, MachineFileError, machine_yaml
+from gcodejerk.machine import (
+    FREE,
+    PLANNERS,
+    Limits,
+    Machine,
+    MachineFileError,
+    PathLimits,
+    machine_yaml,
+)
 from gcodejerk.machine.sources import draft_of, text_of
+from gcodejerk.parameters import Moves
+from gcodejerk.parameters.judge import Judge, Rows
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing import assert_stream_valid
 from gcodejerk.testing.machines import machines
 from gcodejerk.verification import Kind, verify
 
+GOLDEN = Path(__file__).parent.parent / "golden"
 AXIS = """
     resolution: 0.0001
     rapid: {velocity: 500, acceleration: 3000, planner: trapezoidal}
@@ -190,3 +204,35 @@ def test_grbl_names_its_own_settings():
     machine = Machine.loads(AXES.replace("marlin", "grbl"))
     said = " ".join(process(DIAGONAL + b"M2\n", machine).notes)
     assert "$120 to $125 of X 6000, Y 6000 (mm, s)" in said
+
+
+LOOSE = PATH.replace("{velocity: 500,", "{velocity: 200,").replace(
+    "path: {rapid: {velocity: 300, acceleration: 3000}, limit: {acceleration: 6000}}",
+    "path: {rapid: {acceleration: 4000}, limit: {acceleration: 8000}}",
+)
+"""M204 T above M201 of every axis, below both together."""
+
+
+@pytest.mark.parametrize("controller", ["marlin", "rrf"])
+def test_settings_as_today_are_todays_rapids_on_diagonals_too(controller):
+    machine = Machine.loads(LOOSE)
+    scheme = load_controller(controller).scheme(machine)
+    assert scheme.path["acceleration"] == 4000.0
+    moves = Moves(np.array([[70.0, 70.0, *[0.0] * 7]]), np.ones(1), np.ones(1), np.full(1, np.inf))
+    judge = Judge(scheme, Rows.of(moves, machine))
+    today = plan_move({"X": 70.0, "Y": 70.0}, machine, profile="conventional").conventional_time
+    assert judge.times(scheme.today()[np.newaxis]).ravel()[0] == pytest.approx(today)
+
+
+@pytest.mark.parametrize("controller", ["marlin", "klipper"])
+def test_settings_in_a_program_go_back_to_the_paths_own(controller):
+    case = GOLDEN / f"settings_{controller}"
+    machine = Machine.load(case / "machine.yaml")
+    own = 1.1 * max(axis.rapid.acceleration for axis in machine.axes)
+    limits = Limits(math.inf, own, math.inf)
+    machine = replace(machine, path=PathLimits(limits, replace(limits, acceleration=2.0 * own)))
+    program = (case / "in.ngc").read_bytes()
+    written = process(program, machine, form="parameters").output
+    assert verify(program, written, machine).violations == ()
+    assert f"{own:.0f}".encode() in written
+    assert f"{own:.0f}".encode() not in (case / "out.ngc").read_bytes()

@@ -116,9 +116,9 @@ NO_JERK = "a jerk limit: only the acceleration can be set"
 
 
 def path_acceleration(machine: Machine) -> dict[str, float]:
-    """What the path may do today: no axis hinders it."""
+    """What the path may do today; where the machine file does not say, no axis hinders it."""
     own = max(axis.rapid.acceleration for axis in machine.axes)
-    return {"acceleration": min(own, machine.path.rapid.acceleration)}
+    return {"acceleration": _along(machine, own)}
 
 
 def shared_acceleration(machine: Machine, today: dict[str, Array]) -> dict[str, float]:
@@ -140,7 +140,13 @@ def shared_acceleration(machine: Machine, today: dict[str, Array]) -> dict[str, 
     for axis in sharing:
         today["acceleration"][AXES.index(axis.name)] = np.inf
     own = min(axis.rapid.acceleration for axis in sharing)
-    return {"acceleration": min(own, machine.path.rapid.acceleration)}
+    return {"acceleration": _along(machine, own)}
+
+
+def _along(machine: Machine, otherwise: float) -> float:
+    """Acceleration of the path today, or what axes say of it."""
+    stated = machine.path.rapid.acceleration
+    return stated if math.isfinite(stated) else otherwise
 
 
 def shaped_scheme(

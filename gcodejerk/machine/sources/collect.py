@@ -25,6 +25,8 @@ KINDS = (
 _SPECTRUM = re.compile(
     r"^\s*#?\s*\"?(freq|frequency|f)\b[^,\n]*,.*psd|^\s*[\d.eE+-]+\s*,\s*[\d.eE+-]+", re.I
 )
+_SCORES = re.compile(r",\w+\([\d.]+\)")
+"""Columns of shapers, which stand beside what SHAPER_CALIBRATE has scaled for them."""
 _AXIS_OF_FILE = re.compile(r"(?:^|[_\-. ])([xyz])(?:[_\-. ]|$)", re.IGNORECASE)
 
 
@@ -93,6 +95,12 @@ def draft_of(files: Sequence[str], folder: Path) -> Draft:
                 "name its file: the machine file refers to it",
             )
         if kind == "spectrum":
+            if _SCORES.search(text.partition("\n")[0]):
+                raise MachineError(
+                    "this is Klipper's table of a calibration: scaled, no spectrum to judge by",
+                    "give resonances_*.csv (TEST_RESONANCES AXIS=X OUTPUT=resonances)",
+                    Place(name),
+                )
             spectra.append(path)
         elif kind == "machine":
             raise MachineError(
