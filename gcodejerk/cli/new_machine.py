@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -182,7 +183,9 @@ def _axes(draft: Draft) -> str:
 
 def _ask(draft: Draft) -> None:
     """The questions; every answer has a unit, and an empty one to an optional question is no."""
-    from gcodejerk.errors import MachineError
+    from gcodejerk.axes import AXES
+    from gcodejerk.emit import load_controller
+    from gcodejerk.errors import GcodejerkError, MachineError
     from gcodejerk.machine.sources import stated_axis, stated_mode
 
     def ask(question: str, default: str | None = None) -> str:
@@ -191,15 +194,30 @@ def _ask(draft: Draft) -> None:
         return str(answer).strip()
 
     draft.name = ask("What is the machine called", draft.name or "My machine")
-    draft.controller = ask(f"Which control ({_NAMED})", "linuxcnc")
-    for letter in ask("Its axes", "X Y Z").replace(" ", "").upper():
+    while True:
+        draft.controller = ask(f"Which control ({_NAMED})", "linuxcnc")
+        try:
+            load_controller(draft.controller)
+            break
+        except GcodejerkError as error:
+            print(error, file=sys.stderr)
+    while not (letters := _letters(ask("Its axes", "X Y Z"))):
+        print(f"name them by their letters, of {' '.join(AXES)}", file=sys.stderr)
+    for letter in letters:
+        turns = letter in "ABC"
+        speed, rise, jump = (
+            ("3600 deg/min", "200 deg/s^2", "4000 deg/s^3")
+            if turns
+            else ("36 m/min", "0.4 g", "50 m/s^3")
+        )
         while True:
             words = [letter]
-            words.append(f"velocity={_joined(ask(f'{letter}: rapid speed, as in 36 m/min'))}")
-            words.append(f"acceleration={_joined(ask(f'{letter}: acceleration, as in 0.4 g'))}")
-            if jerk := ask(f"{letter}: jerk limit, as in 50 m/s^3 (empty: it has none)", ""):
+            words.append(f"velocity={_joined(ask(f'{letter}: rapid speed, as in {speed}'))}")
+            words.append(f"acceleration={_joined(ask(f'{letter}: acceleration, as in {rise}'))}")
+            if jerk := ask(f"{letter}: jerk limit, as in {jump} (empty: it has none)", ""):
                 words.append(f"jerk={_joined(jerk)}")
-            if travel := ask(f"{letter}: travel, as in -500:50 mm (empty: not known)", ""):
+            unit = "deg" if turns else "mm"
+            if travel := ask(f"{letter}: travel, as in -500:50 {unit} (empty: not known)", ""):
                 words.append(f"travel={_joined(travel)}")
             try:
                 stated_axis(draft, " ".join(words))
@@ -213,6 +231,14 @@ def _ask(draft: Draft) -> None:
                 stated_mode(draft, f"{letter} frequency={_joined(frequency)}{extra}")
             except MachineError as error:
                 print(error, file=sys.stderr)
+
+
+def _letters(answer: str) -> list[str]:
+    """Axes of an answer such as ``XYZ`` or ``x, y, z``; none where anything else is in it."""
+    from gcodejerk.axes import AXES
+
+    named = re.sub(r"[\s,;.+/]", "", answer.upper())
+    return list(dict.fromkeys(named)) if set(named) <= set(AXES) else []
 
 
 def _joined(answer: str) -> str:

@@ -90,6 +90,29 @@ def test_questions(command, tmp_path, monkeypatch):
     assert made.axis("X").modes[0].frequency == 30.0
 
 
+def test_questions_whose_answer_is_no_control_or_no_axis_are_asked_again(
+    command, tmp_path, monkeypatch
+):
+    import sys
+
+    from gcodejerk.cli import new_machine
+
+    class Terminal:
+        stdin = type("Stdin", (), {"isatty": staticmethod(lambda: True)})
+        stderr = property(lambda self: sys.stderr)
+
+    monkeypatch.setattr(new_machine, "sys", Terminal())
+    axis = ["36 m/min", "0.4 g", "", "", ""]
+    turning = ["3600 deg/min", "200 deg/s^2", "", "", ""]
+    answers = ["Shed mill", "lnuxcnc", "linuxcnc", "x, q", "x, y; a", *axis, *axis, *turning]
+    code, out = command("machine", "new", "-o", "m.yaml", input="\n".join(answers) + "\n")
+    assert code == 0, out
+    assert "did you mean 'linuxcnc'" in out
+    assert "name them by their letters, of X Y Z" in out
+    assert "A: rapid speed, as in 3600 deg/min" in out
+    assert Machine.load(tmp_path / "m.yaml").axis_names == ("X", "Y", "A")
+
+
 def test_the_shipped_machines(command):
     code, out = command("machine", "list")
     assert (code, "vmc" in out, "router" in out) == (0, True, True)
