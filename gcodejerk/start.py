@@ -7,6 +7,7 @@ other: so everyone who reads a program for a machine reads it from the same star
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -112,6 +113,8 @@ class Start:
     limits: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     """Axis -> largest velocity, acceleration and jerk that its rapids and streams may have [mm/s,
     mm/s^2, mm/s^3; deg]; one that a program sets lower is in their way."""
+    along: tuple[float, float, float] = (math.inf, math.inf, math.inf)
+    """The same of the path of all linear axes together."""
     straight: bool = True
     """Rapids are straight lines, all axes together; else every axis runs on its own."""
     subprograms: Mapping[str, bytes] = field(default_factory=dict)

@@ -97,13 +97,18 @@ def main() -> None:
 
 def _end_in_order() -> None:
     """Asked to end, put temporary files away first; show whatever name a file has."""
+    # Services start programs with streams closed; the lowest one first, so that each gets its own.
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            stream = open(os.devnull, mode, encoding="utf-8")  # noqa: SIM115 (until the end)
+            setattr(sys, name, stream)
     for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP, and nohup ignores it
         asked = getattr(signal, name, None)
         if asked is not None and signal.getsignal(asked) == signal.SIG_DFL:
             exit_on(asked)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+    for shown in (sys.stdout, sys.stderr):
+        if isinstance(shown, io.TextIOWrapper):
+            shown.reconfigure(errors="backslashreplace")
 
 
 def _version(value: bool) -> None:

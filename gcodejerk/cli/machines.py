@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,6 +12,7 @@ import typer
 from gcodejerk.cli.common import JsonOption, MachineOption, console, load_machine
 
 if TYPE_CHECKING:
+    from gcodejerk.errors import MachineError
     from gcodejerk.identification import Excitation
     from gcodejerk.machine import Machine
 
@@ -18,12 +21,16 @@ DEFAULT_ROOM, DEFAULT_LENGTHS, DEFAULT_REPEATS, DEFAULT_DWELL = 50.0, 4, 3, 2.0
 
 def machine_check(
     machine: Annotated[
-        str, typer.Argument(metavar="M", help="machine file, or the name of a shipped machine")
+        str,
+        typer.Argument(
+            metavar="M", help="machine file, or the name of a shipped machine; - is standard input"
+        ),
     ],
     as_json: JsonOption = False,
 ) -> None:
     """Validate a machine file; every problem with its line and column."""
-    described = load_machine(machine)
+    described = _piped() if machine == "-" else load_machine(machine)
+    described = replace(described, warnings=(*described.warnings, *_unknown_names(described)))
     axes = ", ".join(f"{axis.name} ({len(axis.modes)})" for axis in described.axes)
     structure = f", and {len(described.modes)} of the structure" if described.modes else ""
     if as_json:
@@ -35,6 +42,37 @@ def machine_check(
     count = len(described.warnings)
     doubts = "" if not count else f"; {count} warning{'' if count == 1 else 's'}"
     print(f"{described.source}: {described.name}: good{doubts}; axes (modes): {axes}{structure}")
+
+
+def _piped() -> Machine:
+    """The machine that standard input describes."""
+    from gcodejerk.machine import Machine
+    from gcodejerk.machine.file.document import MOST_BYTES, decode
+
+    name = "<stdin>"
+    return Machine.loads(decode(sys.stdin.buffer.read(MOST_BYTES + 1), name), name)
+
+
+def _unknown_names(described: Machine) -> list[MachineError]:
+    """A controller or dialect that nothing installed has: no program can be processed with it."""
+    from gcodejerk.emit import load_controller
+    from gcodejerk.errors import GcodejerkError, MachineError, Place
+    from gcodejerk.nc import AUTO, find_dialect
+
+    found = []
+    for key, name, load in (
+        ("controller", described.controller, load_controller),
+        ("dialect", described.dialect, find_dialect),
+    ):
+        if name == AUTO:
+            continue
+        try:
+            load(name)
+        except GcodejerkError as error:
+            found.append(
+                MachineError(f"{key}: {error.problem}", error.remedy, Place(described.source))
+            )
+    return found
 
 
 def machine_schema() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -69,9 +70,10 @@ def machine_new(
 ) -> None:  # fmt: skip
     """Make a commented machine file from a control's own configuration, or from answers."""
     from gcodejerk.batch.files import new_file
+    from gcodejerk.emit import load_controller
     from gcodejerk.errors import MachineError
-    from gcodejerk.machine import Machine
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
+    from gcodejerk.nc import AUTO, find_dialect
 
     if output != "-" and os.path.lexists(output) and not force:
         raise MachineError(
@@ -84,6 +86,10 @@ def machine_new(
             "name a control's configuration, or state axes: --axis 'X velocity=36m/min "
             "acceleration=0.4g'; questions are asked at a terminal only"
         )
+    if controller is not None:
+        load_controller(controller)
+    if dialect is not None and dialect != AUTO:
+        find_dialect(dialect)
     draft = draft_of(files or (), folder)
     draft.name = name or draft.name
     draft.controller = controller or draft.controller
@@ -97,14 +103,39 @@ def machine_new(
         stated_mode(draft, words)
     draft.settle(headroom)
     text = text_of(draft)
-    # What is not a machine file never leaves.
-    Machine.loads(text, output if output != "-" else str(folder / "new.yaml"))
+    _prove(text, output if output != "-" else str(folder / "new.yaml"), draft)
     if output != "-" or not as_json:
         with new_file(output) as file:
             file.write(text.encode())
     if as_json:
         print(json.dumps(_record(draft, text, output), indent=1, ensure_ascii=False))
     _say(draft, text, output)
+
+
+def _prove(text: str, name: str, draft: Draft) -> None:
+    """What is not a machine file never leaves; where its numbers come from, messages say.
+
+    Raises
+    ------
+    MachineError
+        By its key and origin: lines of a file that nobody has seen lead nowhere.
+    """
+    from gcodejerk.errors import MachineError, Place
+    from gcodejerk.machine import Machine, MachineFileError
+
+    try:
+        Machine.loads(text, name)
+    except MachineFileError as error:
+        lines = text.splitlines()
+        source = Place(", ".join(draft.sources)) if draft.sources else None
+        found = []
+        for one in error.problems:
+            line = one.place.line if one.place is not None else None
+            said = lines[line - 1].partition("#")[2].strip() if line else ""
+            found.append(
+                MachineError(f"{one.problem}{f' ({said})' if said else ''}", one.remedy, source)
+            )
+        raise MachineFileError(found) from None
 
 
 def _record(draft: Draft, text: str, output: str) -> dict[str, Any]:
@@ -152,7 +183,9 @@ def _axes(draft: Draft) -> str:
 
 def _ask(draft: Draft) -> None:
     """The questions; every answer has a unit, and an empty one to an optional question is no."""
-    from gcodejerk.errors import MachineError
+    from gcodejerk.axes import AXES
+    from gcodejerk.emit import load_controller
+    from gcodejerk.errors import GcodejerkError, MachineError
     from gcodejerk.machine.sources import stated_axis, stated_mode
 
     def ask(question: str, default: str | None = None) -> str:
@@ -161,15 +194,30 @@ def _ask(draft: Draft) -> None:
         return str(answer).strip()
 
     draft.name = ask("What is the machine called", draft.name or "My machine")
-    draft.controller = ask(f"Which control ({_NAMED})", "linuxcnc")
-    for letter in ask("Its axes", "X Y Z").replace(" ", "").upper():
+    while True:
+        draft.controller = ask(f"Which control ({_NAMED})", "linuxcnc")
+        try:
+            load_controller(draft.controller)
+            break
+        except GcodejerkError as error:
+            print(error, file=sys.stderr)
+    while not (letters := _letters(ask("Its axes", "X Y Z"))):
+        print(f"name them by their letters, of {' '.join(AXES)}", file=sys.stderr)
+    for letter in letters:
+        turns = letter in "ABC"
+        speed, rise, jump = (
+            ("3600 deg/min", "200 deg/s^2", "4000 deg/s^3")
+            if turns
+            else ("36 m/min", "0.4 g", "50 m/s^3")
+        )
         while True:
             words = [letter]
-            words.append(f"velocity={_joined(ask(f'{letter}: rapid speed, as in 36 m/min'))}")
-            words.append(f"acceleration={_joined(ask(f'{letter}: acceleration, as in 0.4 g'))}")
-            if jerk := ask(f"{letter}: jerk limit, as in 50 m/s^3 (empty: it has none)", ""):
+            words.append(f"velocity={_joined(ask(f'{letter}: rapid speed, as in {speed}'))}")
+            words.append(f"acceleration={_joined(ask(f'{letter}: acceleration, as in {rise}'))}")
+            if jerk := ask(f"{letter}: jerk limit, as in {jump} (empty: it has none)", ""):
                 words.append(f"jerk={_joined(jerk)}")
-            if travel := ask(f"{letter}: travel, as in -500:50 mm (empty: not known)", ""):
+            unit = "deg" if turns else "mm"
+            if travel := ask(f"{letter}: travel, as in -500:50 {unit} (empty: not known)", ""):
                 words.append(f"travel={_joined(travel)}")
             try:
                 stated_axis(draft, " ".join(words))
@@ -183,6 +231,14 @@ def _ask(draft: Draft) -> None:
                 stated_mode(draft, f"{letter} frequency={_joined(frequency)}{extra}")
             except MachineError as error:
                 print(error, file=sys.stderr)
+
+
+def _letters(answer: str) -> list[str]:
+    """Axes of an answer such as ``XYZ`` or ``x, y, z``; none where anything else is in it."""
+    from gcodejerk.axes import AXES
+
+    named = re.sub(r"[\s,;.+/]", "", answer.upper())
+    return list(dict.fromkeys(named)) if set(named) <= set(AXES) else []
 
 
 def _joined(answer: str) -> str:

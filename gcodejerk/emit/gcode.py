@@ -38,6 +38,7 @@ from gcodejerk.emit.base import Controller, Options, axis_steps, step_sizes
 from gcodejerk.emit.feeds import Feeds, mean_feeds
 from gcodejerk.emit.frame import Frame, plain, writing_of
 from gcodejerk.emit.number_format import Column, format_lines
+from gcodejerk.emit.raised import has_to_rise
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids, parse_block
 from gcodejerk.planning.batch import Batch, NumberFormat
@@ -57,6 +58,10 @@ class GcodeController(Controller):
     """Writes G1 blocks of 2 ms, F their mean speed; a control adds its name and its facts."""
 
     play = Play.HELD
+    planner_limits: tuple[str, str] = ("", "")
+    path_limits: str = ""
+    """What bounds velocity and acceleration of G1 and G0 alike, of an axis and of the path, by
+    their names; empty where nobody knows."""
     highest_feed: str = ""
     """What bounds G1 and not G0, by its name; empty where nothing does, or nobody knows."""
 
@@ -93,7 +98,9 @@ class GcodeController(Controller):
             for form in self.forms
             if (form.name, form.confidence) == ("stream", "unverified")
         ]
-        return unmeasured + [_fastest(self.highest_feed, rapids, plans)] * bool(self.highest_feed)
+        if self.highest_feed:
+            unmeasured.append(_fastest(self.highest_feed, rapids, plans))
+        return unmeasured + has_to_rise(plans, self.planner_limits, self.path_limits, self.name)
 
     def render(
         self,

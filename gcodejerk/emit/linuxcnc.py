@@ -37,6 +37,7 @@ from gcodejerk.emit.gcode import line_ends_of, origins
 from gcodejerk.emit.guard import guarded, in_structures
 from gcodejerk.emit.linuxcnc_settings import LinuxcncSettings
 from gcodejerk.emit.number_format import Column, format_lines
+from gcodejerk.emit.raised import NEAR, moving_axes
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import LINUXCNC, STREAM_HEADROOM, Machine
 from gcodejerk.nc import Dialect, Program, Rapids, parse_block
@@ -44,7 +45,6 @@ from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.straight import LINEAR, leading_axis, outer_steps
-from gcodejerk.storage import windows
 from gcodejerk.units import MM_PER_INCH, per_minute
 
 BLOCK_TIME = 0.002
@@ -177,16 +177,11 @@ def restored(frame: Frame) -> list[bytes]:
 def _too_slow(plans: Plans) -> list[str]:
     """What the INI file has to allow before streams run, where today's rapids have less."""
     raised = []
-    for axis in plans.machine.axes:
+    for axis in moving_axes(plans):
         stated = plans.machine.controller_options.max_acceleration
         today, needed = axis.rapid.acceleration, STREAM_HEADROOM * axis.limit.acceleration
         today = stated.get(axis.name, today)
-        k, planned = AXES.index(axis.name), plans.planned
-        moves = any(
-            bool((planned[part] & (plans.displacement[part, k] != 0.0)).any())
-            for part in windows(len(plans))
-        )
-        if axis.planner == LINUXCNC and today < needed * (1.0 - 1e-6) and moves:
+        if axis.planner == LINUXCNC and today < needed * NEAR:
             raised.append(f"{axis.name} from {today:g} to {needed:g}")
     if not raised:
         return []

@@ -14,7 +14,7 @@ import math
 import textwrap
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,14 +103,13 @@ class Sheets:
             There is none of that name.
         """
         known = self.schemes(machine)
-        if way is None:
-            return next(iter(known.values()))
+        way = next(iter(known)) if way is None else way
         if way not in known:
             raise EmitError(
                 f"controller {self.name} has no settings {way!r}",
                 f"it has: {', '.join(known)}",
             )
-        return known[way]
+        return _on_path(known[way], machine)
 
     def frame(self, lines: list[str]) -> list[str]:
         """Live lines with what has to stand around them."""
@@ -291,3 +290,12 @@ def axis_settings(
         groups.append(tuple(range(len(settings), len(settings) + len(own))))
         settings += own
     return tuple(settings), tuple(groups)
+
+
+def _on_path(scheme: Scheme, machine: Machine) -> Scheme:
+    """A way of setting a control, within what it bounds along the path besides."""
+    own = machine.path.rapid
+    stated = {"velocity": own.velocity, "acceleration": own.acceleration}
+    known = {q.name for q in scheme.family.quantities}
+    more = {name: x for name, x in stated.items() if math.isfinite(x) and name in known}
+    return replace(scheme, path={**more, **scheme.path}) if more else scheme

@@ -21,6 +21,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,6 +35,8 @@ LARGEST = 1 << 30
 """Bytes of a file."""
 HEAD_LINES = 40
 SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+NO_NUMBERS = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
+"""What numpy reads all the same; the record is refused with its place later."""
 _NUMBER = re.compile(r"[-+]?(\d+(?:[.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?$")
 _TIME = re.compile(r"^#?\W*(time|t|zeit|timestamp)\b|^#?\W*(time|t)[ _(\[]", re.IGNORECASE)
 _COUNT = re.compile(r"^\W*(sample|count|index|n|no\.?)\W*$", re.IGNORECASE)
@@ -107,13 +110,17 @@ def read_file(
 
 def _content(path: str | Path) -> bytes:
     """The bytes of a file, if they are not too many."""
+    if str(path) == "-":
+        return sys.stdin.buffer.read()
     try:
         size = Path(path).stat().st_size
         if size > LARGEST:
             raise RecordError(f"{path} has {size >> 20} MB, expected at most 1024", "cut it")
         return Path(path).read_bytes()
     except OSError as error:
-        raise RecordError(f"{path} cannot be read: {error.strerror}") from None
+        raise RecordError(
+            f"{path} cannot be read: {error.strerror}", "check the name and the folder"
+        ) from None
 
 
 def _read_table(
@@ -123,33 +130,37 @@ def _read_table(
     text = data.decode("utf-8-sig", "replace")
     if "\x00" in text[:4096]:
         raise RecordError(f"{name} is no text", "export the record as CSV")
-    lines = [line for line in text.splitlines() if line.strip()]
+    lines = {k: line for k, line in enumerate(text.splitlines(), 1) if line.strip()}
     if not lines:
         raise RecordError(f"{name} is empty", "record again")
-    return _Table(name, lines).read(time, columns, rate)
+    return _Table(name, list(lines.values()), list(lines)).read(time, columns, rate)
 
 
 class _Table:
     """Lines of a file, taken apart."""
 
-    def __init__(self, name: str, lines: list[str]) -> None:
+    def __init__(self, name: str, lines: list[str], numbers: list[int]) -> None:
         self.name = name
         self.period = self._stated(lines, r"Sampling period is ([\d.]+) *ns", 1e-9)
         ends = self._stated(lines[-1:], r"Rate[ :]+([\d.]+)", 1.0)
         rated = self._stated(lines[:HEAD_LINES], r"data_rate\W+([\d.]+)", 1.0)
         self.rate = ends or rated or (1.0 / self.period if self.period else None)
         self.lost = [k for k, line in enumerate(lines) if line.strip() == "overrun"]
-        body = [line for line in lines if line.strip() != "overrun"]
+        kept = [k for k, line in enumerate(lines) if line.strip() != "overrun"]
         if ends:
-            body = body[:-1]
+            kept = kept[:-1]
+        body = [lines[k] for k in kept]
         self.separator = self._find_separator(body)
         first = next((k for k, line in enumerate(body) if self._is_row(line)), None)
         if first is None:
-            raise RecordError(f"{name} has no line of numbers", "a table of samples is expected")
+            raise RecordError(
+                f"{name} has no line of numbers",
+                "a table of samples is expected: times and accelerations, one sample a line",
+            )
         self.header = self._find_header(body[:first])
         self.comma = self.separator != "," and any("," in line for line in body[first : first + 5])
         self.rows = body[first:]
-        self.first = first
+        self.numbers = [numbers[k] for k in kept[first:]]
 
     @staticmethod
     def _stated(lines: list[str], pattern: str, scale: float) -> float | None:
@@ -238,12 +249,28 @@ class _Table:
                 io.StringIO(text), delimiter=self.separator, ndmin=2, comments="#", quotechar='"'
             )
         except ValueError as error:
-            found = re.search(r"row (\d+)", str(error))
-            where = f" line {self.first + int(found[1]) + 1}" if found else ""
-            raise RecordError(
-                f"{self.name}{where}: {error}".split(";")[0], "every row is as many numbers"
-            ) from None
+            raise self._bad_row() or RecordError(f"{self.name}: {error}") from None
         return out
+
+    def _bad_row(self) -> RecordError | None:
+        """The first row that is not as the first one, or holds no number."""
+        wide = len(self._cells(self.rows[0]))
+        for number, row in zip(self.numbers, self.rows, strict=True):
+            if row.lstrip().startswith("#"):
+                continue
+            cells = self._cells(row)
+            if len(cells) != wide:
+                return RecordError(
+                    f"{self.name}:{number}: {len(cells)} columns, above it {wide}",
+                    "every row is as many numbers: mend it, or cut the record there",
+                )
+            for k, cell in enumerate(cells):
+                if not _NUMBER.match(cell) and cell.lower() not in NO_NUMBERS:
+                    return RecordError(
+                        f"{self.name}:{number}: {cell[:40]!r} in column {k + 1} is no number",
+                        "every row is as many numbers: mend it, or cut the record there",
+                    )
+        return None
 
     def _spectrum(self, names: list[str], values: Array) -> Spectrum:
         axes = [k for k, name in enumerate(names) if re.fullmatch(r"psd_[xyz]", name.lower())]

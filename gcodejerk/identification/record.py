@@ -29,6 +29,8 @@ GAP = 3.0
 """A step so many times the usual one is a gap."""
 CLIPPED = 3
 """Samples at the extreme of which a channel has so many are clipped."""
+MOST_FELT = 50.0
+"""What sensors of machines hardly feel: a slip of the unit. [g]"""
 STILL = 1e-9
 LEAST_SAMPLES = 32
 
@@ -168,6 +170,12 @@ def make_record(samples: Samples, unit: str | None = None) -> Record:
     for k in samples.breaks:
         broken[max(0, k - 1) : k + 1] = True
     values = scale * (values - np.median(values, axis=1, keepdims=True))
+    most = float(np.abs(values).max(initial=0.0)) / GRAVITY
+    if most > MOST_FELT:
+        notes.append(
+            f"{name} reaches {most:.3g} g, above {MOST_FELT:g}: is the unit right? --unit states "
+            f"another, one of {', '.join(UNITS)}"
+        )
     return Record(name, rate, begin, samples.channels, values, broken, tuple(notes))
 
 

@@ -8,6 +8,7 @@ from gcodejerk.machine.model import Machine
 from gcodejerk.machine.parts import (
     BELL,
     FILTERS,
+    FREE,
     JERK_LIMITED,
     LAWS,
     LINUXCNC,
@@ -21,6 +22,7 @@ from gcodejerk.machine.parts import (
     Filter,
     Limits,
     Mode,
+    PathLimits,
     ProgramStart,
     Spectrum,
 )
@@ -30,6 +32,7 @@ __all__ = [
     "BELL",
     "DIALECT_OF_CONTROLLER",
     "FILTERS",
+    "FREE",
     "JERK_LIMITED",
     "LAWS",
     "LINUXCNC",
@@ -45,6 +48,7 @@ __all__ = [
     "Machine",
     "MachineFileError",
     "Mode",
+    "PathLimits",
     "ProgramStart",
     "Spectrum",
     "find_machine",

@@ -167,6 +167,7 @@ class Machine(Description):
             cycles=self.program.cycles,
             unrolled_lines=self.program.unrolled_lines,
             limits={axis.name: axis.largest() for axis in self.axes},
+            along=self.path.largest(),
             straight=self.positioning == "linear",
             subprograms={} if self.subprograms is None else self.subprograms.files,
         )

@@ -220,6 +220,34 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True)
+class PathLimits:
+    """What a control bounds along the path, of all linear axes together; infinite where nothing.
+
+    An axis alone is a path, too: no axis is faster than this.
+    """
+
+    rapid: Limits
+    """Of the control's own rapids."""
+    limit: Limits
+    """That designed profiles may use."""
+
+    def largest(self) -> tuple[float, float, float]:
+        """Velocity, acceleration and jerk that rapids and streams may reach."""
+        a, b = self.rapid, self.limit
+        return max(a.velocity, b.velocity), max(a.acceleration, b.acceleration), math.inf
+
+    def of_rapid(self, lone: bool, planner: str) -> Limits:
+        """What the control's own G0 does, by the rule of `Axis.conventional`."""
+        share = LONE_SHARE if lone and planner == LINUXCNC else 1.0
+        return Limits(self.rapid.velocity, share * self.rapid.acceleration, math.inf)
+
+
+UNBOUNDED = Limits(math.inf, math.inf, math.inf)
+FREE = PathLimits(UNBOUNDED, UNBOUNDED)
+"""Limits of a control that knows those of single axes alone."""
+
+
+@dataclass(frozen=True, slots=True)
 class Design:
     """How profiles are chosen, unless the command line says otherwise."""
 
@@ -338,6 +366,8 @@ class Description:
     controller_parameters: tuple[ControllerParameter, ...] = ()
     spindle: str | None = None
     """What M3 turns on: ``mill``, ``laser`` or ``plasma``; None where the file does not say."""
+    path: PathLimits = FREE
+    """What bounds all linear axes together."""
     rapid_feed: RapidFeed | None = None
     """Feed moves that count as rapids in one run; no machine file says so."""
     subprograms: Subprograms | None = None

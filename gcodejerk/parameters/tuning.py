@@ -331,7 +331,9 @@ def _ranges(scheme: Scheme, machine: Machine) -> Array:
         if setting.axis == PATH:
             quantities = {name: value for name, value in path.items()}
             most = {
-                "acceleration": max(limit.acceleration for limit in limits.values()),
+                "acceleration": machine.path.limit.acceleration
+                if np.isfinite(machine.path.limit.acceleration)
+                else max(limit.acceleration for limit in limits.values()),
                 "jerk": max(limit.jerk for limit in limits.values()),
             }
         else:

@@ -17,7 +17,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, LAWS, Limits, Machine
 from gcodejerk.motion import Profiles, SymmetricProfiles, conventional_profiles
 from gcodejerk.motion.families import FAMILIES, Family, Kind, unit_quantities
-from gcodejerk.motion.families.family import VELOCITY
+from gcodejerk.motion.families.family import ACCELERATION, VELOCITY
 from gcodejerk.motion.families.filtered import filtered
 from gcodejerk.motion.profiles.bell import bell_profiles
 from gcodejerk.motion.profiles.profile import Array
@@ -85,6 +85,10 @@ def law_profiles(
         if quantity.name not in values:
             values[quantity.name] = _of_axes(machine, quantity.name, quantity.kind)
     unit = unit_quantities(family, values, share)
+    along = _over(machine.path.rapid, _way(machine, share))
+    for name, limit in zip((VELOCITY.name, ACCELERATION.name), along, strict=False):
+        if name in unit:
+            unit[name] = np.minimum(unit[name], limit)
     if speed is not None:
         unit[VELOCITY.name] = np.fmin(unit[VELOCITY.name], speed)
     return family.build(**unit)
@@ -121,6 +125,8 @@ def behind_filters(machine: Machine, profiles: Profiles, share: Array) -> Profil
 def unit_limits(machine: Machine, share: Array) -> tuple[Array, Array, Array]:
     """Limits of unit profiles of a design: each axis's `limit`, divided by its displacement.
 
+    What bounds the path counts likewise, divided by its length.
+
     Parameters
     ----------
     machine : Machine
@@ -133,7 +139,8 @@ def unit_limits(machine: Machine, share: Array) -> tuple[Array, Array, Array]:
     velocity, acceleration, jerk : ndarray, shape (n,)
         [1/s], [1/s^2], [1/s^3]
     """
-    return _unit({axis.name: axis.limit for axis in machine.axes}, share)
+    own = _unit({axis.name: axis.limit for axis in machine.axes}, share)
+    return _least(own, _over(machine.path.limit, _way(machine, share)))
 
 
 def conventional_limits(
@@ -149,9 +156,33 @@ def conventional_limits(
         No other motion follows directly; all of them by default.
     """
     alone = np.ones(len(share), dtype=bool) if lone is None else lone
-    with_all = _unit({axis.name: axis.conventional(lone=False) for axis in machine.axes}, share)
-    halved = _unit({axis.name: axis.conventional(lone=True) for axis in machine.axes}, share)
-    V, A, J = (np.where(alone, a, b) for a, b in zip(halved, with_all, strict=True))
+    way = _way(machine, share)
+    each = []
+    for halved in (True, False):
+        own = _unit({axis.name: axis.conventional(halved) for axis in machine.axes}, share)
+        along = machine.path.of_rapid(halved, machine.planner)
+        each.append(_least(own, _over(along, way)))
+    V, A, J = (np.where(alone, a, b) for a, b in zip(*each, strict=True))
+    return V, A, J
+
+
+def _way(machine: Machine, share: Array) -> Array:
+    """Way of the linear axes together, shape (n,) [mm]."""
+    linear = np.array([a in machine.axis_names and not machine.axis(a).rotary for a in AXES])
+    out: Array = np.sqrt((share[:, linear] ** 2).sum(axis=1))
+    return out
+
+
+def _over(limits: Limits, way: Array) -> tuple[Array, Array, Array]:
+    """Limits of the path as those of unit profiles."""
+    with np.errstate(divide="ignore"):
+        return limits.velocity / way, limits.acceleration / way, limits.jerk / way
+
+
+def _least(
+    a: tuple[Array, Array, Array], b: tuple[Array, Array, Array]
+) -> tuple[Array, Array, Array]:
+    V, A, J = (np.minimum(p, q) for p, q in zip(a, b, strict=True))
     return V, A, J
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
+from gcodejerk.machine import FREE
 from gcodejerk.motion import Objective, grouped
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
@@ -167,4 +168,8 @@ class Cubics:
             velocity, acceleration, _ = self._peaks(axis)
             out |= velocity > (1.0 + MOST_PASSED) * limit.velocity
             out |= acceleration > (1.0 + MOST_PASSED) * limit.acceleration
+        if machine.path != FREE:
+            along, path = self.peaks(), machine.path.limit
+            out |= along[0] > (1.0 + MOST_PASSED) * path.velocity
+            out |= along[1] > (1.0 + MOST_PASSED) * path.acceleration
         return out

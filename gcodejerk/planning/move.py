@@ -222,7 +222,7 @@ def not_planned(reason: str) -> PlanError:
     """The refusal of a move that a controller makes better by itself, or that is none."""
     return PlanError(
         f"the move is not planned: {reason}",
-        "a controller would make it by itself; see 'What is left alone' in the README",
+        "the control's own move is left as it is; docs/reasons.md says what helps",
     )
 
 

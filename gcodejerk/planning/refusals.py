@@ -60,7 +60,23 @@ def limit_error(machine: Machine, share: Array, profile: SymmetricProfiles, how:
                     f"in {total:.3f} s, above its limit of {limit:.6g} {unit}",
                     f"allow more time (--time), or raise axes.{axis.name}.limit.{quantity}",
                 )
+    way = np.abs(share[[not _turns(machine, a) for a in AXES]])
+    for quantity in ("velocity", "acceleration"):
+        peak = float(getattr(profile, quantity)[0] * np.sqrt((way**2).sum()))
+        limit = getattr(machine.path.limit, quantity)
+        if peak > limit * (1.0 + 1e-9):
+            unit = "mm" + units[quantity]
+            return PlanError(
+                f"{how}the path reaches {peak:.6g} {unit} of {quantity} in {total:.3f} s, above "
+                f"its limit of {limit:.6g} {unit}",
+                f"allow more time (--time), or raise path.limit.{quantity}",
+            )
     raise AssertionError("a profile outside its range keeps every limit")
+
+
+def _turns(machine: Machine, axis: str) -> bool:
+    """Whether a letter is no linear axis of the machine."""
+    return axis not in machine.axis_names or machine.axis(axis).rotary
 
 
 def time_error(

@@ -107,6 +107,7 @@ class StraightMoves:
                 limit[k], velocity[k] = axis.limit.acceleration, axis.limit.velocity
                 most[k] = options.max_acceleration.get(axis.name, STREAM_HEADROOM * limit[k])
                 full[k] = options.max_acceleration.get(axis.name, FULLEST * limit[k])
+        path = plans.machine.path.limit
         every = Grid.every(count, 1, sampler.interval)
         unit, speed = sample_profiles(profiles, every.knots, sampler.interval)
         peak = profiles.peak_acceleration * length
@@ -120,8 +121,12 @@ class StraightMoves:
             speed=speed * length[:, np.newaxis],
             length=length,
             direction=direction,
-            velocity=_along(velocity, direction),
-            most=USED * _along(np.minimum(most, STREAM_HEADROOM * limit), direction),
+            velocity=np.minimum(_along(velocity, direction), path.velocity),
+            most=USED
+            * np.minimum(
+                _along(np.minimum(most, STREAM_HEADROOM * limit), direction),
+                STREAM_HEADROOM * path.acceleration,
+            ),
             full=_along(full, direction),
             step=step,
         )

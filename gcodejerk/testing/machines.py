@@ -24,6 +24,7 @@ def machines(
     interval: float | None = None,
     planner: str | None = None,
     filtered: bool | None = False,
+    path: bool | None = None,
 ) -> Machine:
     """Strategy for machines over the range that is found in workshops.
 
@@ -46,6 +47,8 @@ def machines(
         `gcodejerk.machine.LAWS` needs besides is drawn.
     filtered : bool, optional
         Whether an average or a shaper acts behind it, the same for all axes; None: drawn.
+    path : bool, optional
+        Whether limits of the path bound the linear axes, where rapids are straight; None: drawn.
 
     Returns
     -------
@@ -68,11 +71,12 @@ def machines(
         shared += f", filter: {{{draw(_filter())}}}"
     letters = axes if axes is not None else draw(_letters)
     dt = interval if interval is not None else draw(st.sampled_from(_INTERVALS))
-    lines = [
-        f"interval: {dt!r}",
-        f"positioning: {positioning or draw(st.sampled_from(['linear', 'independent']))}",
-        "axes:",
-    ]
+    goes = positioning or draw(st.sampled_from(["linear", "independent"]))
+    lines = [f"interval: {dt!r}", f"positioning: {goes}"]
+    slides = not set(letters) <= set("ABC")
+    if goes == "linear" and slides and (path or (path is None and draw(st.integers(0, 2)) == 0)):
+        lines += draw(_path())
+    lines.append("axes:")
     for letter in letters:
         lines += draw(_axis(letter, modes, dt, jerk_limited, planner, shared))
     if len(letters) > 1 and modes[1] > 0:
@@ -89,6 +93,20 @@ def machines(
     if currently_in_test_context():
         note(f"drawn.yaml:\n{text}")
     return Machine.loads(text, name="drawn.yaml")
+
+
+@st.composite
+def _path(draw: st.DrawFn) -> list[str]:
+    """What bounds all linear axes together."""
+    acceleration = draw(_number(100.0, 30000.0))
+    rapid = [f"velocity: {draw(_number(5.0, 2000.0))}"] if draw(st.booleans()) else []
+    if not rapid or draw(st.booleans()):
+        rapid.append(f"acceleration: {acceleration}")
+    lines = ["path:", f"  rapid: {{{', '.join(rapid)}}}"]
+    if len(rapid) > 1 and draw(st.booleans()):
+        reserve = float(draw(st.sampled_from(["1.2", "2.0", "3.0"])))
+        lines.append(f"  limit: {{acceleration: {reserve * float(acceleration)!r}}}")
+    return lines
 
 
 _INTERVALS = [0.0005, 0.001, 0.002, 0.004]

@@ -80,6 +80,7 @@ def assert_stream_valid(stream: Stream, machine: Machine) -> None:
         _assert_axis(machine.axis(name), np.asarray(q), dt)
     if machine.positioning == "linear":
         _assert_straight({a: np.asarray(q) for a, q in positions.items()}, machine)
+        _assert_path({a: np.asarray(q) for a, q in positions.items()}, machine)
 
 
 def _assert_axis(axis: Axis, q: Array, dt: float) -> None:
@@ -110,6 +111,22 @@ def _assert_axis(axis: Axis, q: Array, dt: float) -> None:
         assert jerk.max(initial=0.0) <= allowed, (
             f"axis {axis.name} reaches {jerk.max():.6g} of jerk, limit {limit.jerk:.6g}"
         )
+
+
+def _assert_path(positions: Mapping[str, Array], machine: Machine) -> None:
+    """The linear axes together keep what bounds the path."""
+    dt, most = machine.interval, machine.path.limit
+    slides = [axis for axis in positions if not machine.axis(axis).rotary]
+    steps = np.sqrt(sum((np.diff(positions[a]) ** 2 for a in slides), start=np.zeros(1)))
+    error = 2.0 * sum(machine.axis(a).resolution for a in slides)
+    velocity = steps.max(initial=0.0) / dt
+    assert velocity <= most.velocity * (1 + 1e-6) + error / dt, (
+        f"the path reaches {velocity:.6g} of velocity, limit {most.velocity:.6g}"
+    )
+    acceleration = np.abs(np.diff(steps, prepend=0.0, append=0.0)).max(initial=0.0) / dt**2
+    assert acceleration <= most.acceleration * (1 + 1e-6) + 2.0 * error / dt**2, (
+        f"the path reaches {acceleration:.6g} of acceleration, limit {most.acceleration:.6g}"
+    )
 
 
 def _assert_straight(positions: Mapping[str, Array], machine: Machine) -> None:

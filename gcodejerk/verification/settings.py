@@ -11,6 +11,7 @@ the lines that set, those that take it back, or first those and then these.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from typing import BinaryIO
@@ -333,6 +334,9 @@ def _old(key: Key, control: Control, machine: Machine) -> str | None:
         return "100"
     if number and number == control.acceleration:
         own = [a.rapid.acceleration for a in _moved(control, machine, axis)]
+        along = machine.path.rapid.acceleration
+        if axis == PATH and math.isfinite(along):
+            return f"{along:.0f}"
         return f"{min(own) if control.shared else max(own):.0f}"
     return None
 
@@ -376,6 +380,8 @@ def _impossible(
         moved = _moved(control, machine, axis)
         own = [max(a.limit.acceleration, a.rapid.acceleration) for a in moved]
         most = min(own) if control.shared else max(own)
+        path = max(machine.path.limit.acceleration, machine.path.rapid.acceleration)
+        most = path if axis == PATH and math.isfinite(path) else most
         if not 0.0 < float(text) <= most + 1.0:
             return f"is beyond the acceleration limit {most:g}"
     elif number == control.frequency and not 0.1 <= float(text) <= 1000.0:

@@ -132,3 +132,41 @@ def test_the_drives_shake_less_than_behind_plain_rapids(tmp_path):
     shares = np.array([after[row] / before[row] for row in after])
     assert np.median(shares) < 0.5
     assert sum(after.values()) < 0.6 * sum(before.values())
+
+
+BOUNDED = b"""G21 G90 G17 G40 G94 G64
+G0 X0 Y0 Z0
+G4 P0.3
+G0 X60 Y80
+G4 P0.3
+G0 X0 Y0 Z50
+G4 P0.3
+G0 X100
+G4 P0.3
+M2
+"""
+
+
+def test_max_linear_velocity_bounds_the_path_of_rapids_and_streams(tmp_path):
+    """`path.rapid.velocity` is what LinuxCNC does with MAX_LINEAR_VELOCITY, on diagonals, too."""
+    text = mill(more=f"{NO_GUARD}path: {{rapid: {{velocity: 250}}}}\n")
+    text = text.replace(", jerk: 5.0e+5", ", planner: linuxcnc-2.9").replace(
+        "acceleration: 5000, jerk: 5.0e+6", "acceleration: 6000, jerk: 5.0e+6"
+    )
+    machine = Machine.loads(text, "mill")
+    result = process(BOUNDED, machine)
+    assert result.planned == 3
+    late, best = {}, {}
+    for _ in range(3):
+        bound = {"MAX_LINEAR_VELOCITY": 250.0}
+        today = settings_of(machine, 5000.0 / 6000.0, TRAJ=bound)
+        for played in rapids(result, record(BOUNDED, tmp_path, today), 0.001):
+            late[played.row] = min(late.get(played.row, np.inf), abs(played.late))
+        raised = settings_of(machine, 1.05, TRAJ=bound)
+        for played in streams(result, record(result.output, tmp_path, raised), 0.001):
+            best[played.row] = min(best.get(played.row, np.inf), worth(result, played, 0.001))
+        if max(late.values()) <= 3 and max(best.values()) <= 1.0:
+            break
+    assert (len(late), len(best)) == (3, 3)
+    assert max(late.values()) <= 3, late
+    assert max(best.values()) <= 1.0, best

@@ -78,6 +78,11 @@ def test_a_file_in_inches_is_the_file_in_mm_with_every_length_converted(machine)
         if axis.travel is not None:
             assert axis_inch.travel == (k * axis.travel[0], k * axis.travel[1])
         assert axis_inch.modes == axis.modes
+    for limits, limits_inch in zip(
+        (machine.path.rapid, machine.path.limit), (inch.path.rapid, inch.path.limit), strict=True
+    ):
+        assert limits_inch.velocity == 25.4 * limits.velocity
+        assert limits_inch.acceleration == 25.4 * limits.acceleration
     assert inch.modes == machine.modes
     assert inch.design.tolerance == 25.4 * machine.design.tolerance
     assert inch.design.minimum_length == 25.4 * machine.design.minimum_length
@@ -86,16 +91,17 @@ def test_a_file_in_inches_is_the_file_in_mm_with_every_length_converted(machine)
 
 @settings(max_examples=40)
 @given(machine=machines())
-def test_every_number_of_a_machine_is_finite_but_for_an_absent_jerk(machine):
+def test_every_number_of_a_machine_is_finite_but_for_what_is_not_bounded(machine):
     def check(value, name):
         if is_dataclass(value):
             for field in fields(value):
-                check(getattr(value, field.name), field.name)
+                inner = name if name == "path" else field.name
+                check(getattr(value, field.name), inner)
         elif isinstance(value, tuple):
             for part in value:
                 check(part, name)
         elif isinstance(value, float):
-            assert math.isfinite(value) or name == "jerk"
+            assert math.isfinite(value) or (name in ("jerk", "path") and value > 0.0)
 
     check(machine, "machine")
 

@@ -338,3 +338,12 @@ def test_linear_algebra_has_one_thread_unless_the_user_says_otherwise(given, thr
         [sys.executable, "-c", code], env=own, capture_output=True, text=True, check=True
     )
     assert run.stdout.splitlines()[-1] == f"False {threads}"
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-"])
+def test_streams_that_are_closed_do_not_matter(tmp_path, closed):
+    """As services start programs."""
+    call = f"{sys.executable} -m gcodejerk.cli plan --machine vmc Z=1 --csv m.csv {closed}"
+    done = subprocess.run(["sh", "-c", call], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "m.csv").read_text().startswith("t,X,Y,Z")

@@ -90,6 +90,29 @@ def test_questions(command, tmp_path, monkeypatch):
     assert made.axis("X").modes[0].frequency == 30.0
 
 
+def test_questions_whose_answer_is_no_control_or_no_axis_are_asked_again(
+    command, tmp_path, monkeypatch
+):
+    import sys
+
+    from gcodejerk.cli import new_machine
+
+    class Terminal:
+        stdin = type("Stdin", (), {"isatty": staticmethod(lambda: True)})
+        stderr = property(lambda self: sys.stderr)
+
+    monkeypatch.setattr(new_machine, "sys", Terminal())
+    axis = ["36 m/min", "0.4 g", "", "", ""]
+    turning = ["3600 deg/min", "200 deg/s^2", "", "", ""]
+    answers = ["Shed mill", "lnuxcnc", "linuxcnc", "x, q", "x, y; a", *axis, *axis, *turning]
+    code, out = command("machine", "new", "-o", "m.yaml", input="\n".join(answers) + "\n")
+    assert code == 0, out
+    assert "did you mean 'linuxcnc'" in out
+    assert "name them by their letters, of X Y Z" in out
+    assert "A: rapid speed, as in 3600 deg/min" in out
+    assert Machine.load(tmp_path / "m.yaml").axis_names == ("X", "Y", "A")
+
+
 def test_the_shipped_machines(command):
     code, out = command("machine", "list")
     assert (code, "vmc" in out, "router" in out) == (0, True, True)
@@ -211,3 +234,46 @@ def test_linuxcncs_interpreter_comes_back_to_where_it_began(tmp_path):
     assert np.max(ends) <= 25.0 + 1e-9
     assert np.min(ends) >= -1e-9
     assert Path(tmp_path / "ring.ngc").read_text().isascii()
+
+
+def test_a_configuration_from_standard_input(command):
+    code, out = command("machine", "new", "-", input="$110=6000\n$120=500\n")
+    assert code == 0, out
+    assert "$110=6000 (<stdin>:1)" in out
+
+
+def test_a_machine_file_from_standard_input(command):
+    code, out = command("machine", "check", "-", input=find_machine("vmc").read_text())
+    assert (code, "<stdin>: Small vertical" in out) == (0, True)
+    code, out = command("machine", "check", "-", input="interval: fast\n")
+    assert (code, "<stdin>:1:11: interval is 'fast'" in out) == (1, True)
+
+
+@pytest.mark.parametrize(("key", "option"), [("controller", "lnuxcnc"), ("dialect", "fanc")])
+def test_a_name_that_nothing_has_is_said_before_a_program_is_processed(
+    command, tmp_path, key, option
+):
+    code, out = command("machine", "new", "--axis", AXIS, f"--{key}", option, "-o", "m.yaml")
+    assert code == 1
+    assert "did you mean" in out
+    assert not (tmp_path / "m.yaml").exists()
+    (tmp_path / "n.yaml").write_text(
+        f"interval: 0.001\npositioning: linear\n{key}: {option}\n"
+        "axes: {X: {rapid: {velocity: 500, acceleration: 5000}}}\n"
+    )
+    code, out = command("machine", "check", "n.yaml")
+    assert code == 0
+    assert f"n.yaml: warning: {key}: " in out
+    assert "did you mean" in out
+
+
+def test_a_number_that_no_machine_has_is_refused_with_where_it_comes_from(command, tmp_path):
+    (tmp_path / "printer.cfg").write_text(
+        "[printer]\nkinematics: corexy\nmax_velocity: 300\nmax_accel: inf\n"
+    )
+    code, out = command("machine", "new", "printer.cfg", "-o", "m.yaml")
+    assert code == 1
+    assert "printer.cfg: axes.X.rapid.acceleration is 'inf'" in out
+    assert "[printer] max_accel)" in out
+    assert "m.yaml" not in out
+    assert not (tmp_path / "m.yaml").exists()

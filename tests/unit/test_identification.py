@@ -4,6 +4,7 @@ The records are simulated and disturbed here; the decays of single oscillators a
 and share no code with what takes them apart.
 """
 
+import io
 import json
 import re
 from functools import cache
@@ -668,3 +669,35 @@ def test_real_klipper_tables():
     for path in public("**/*calibration_data_*.csv"):
         with pytest.raises(RecordError, match="calibration"):
             find_peaks(read_file(path), BAND)
+
+
+@pytest.mark.parametrize(
+    ("bad", "says"),
+    [("0.4,-", "r.csv:42: '-' in column 2 is no number"),
+     ("0.4", "r.csv:42: 1 columns, above it 2"),
+     ("0.4,1,2", "r.csv:42: 3 columns, above it 2")],
+)  # fmt: skip
+def test_a_row_that_cannot_be_read_is_named_by_its_line(tmp_path, monkeypatch, bad, says):
+    monkeypatch.chdir(tmp_path)
+    rows = [f"{k / 100},{k % 7}" for k in range(39)]
+    text = "\n".join(["time [s],az [m/s^2]", "", *rows, bad, *rows, *rows]) + "\n"
+    (tmp_path / "r.csv").write_text(text)
+    with pytest.raises(RecordError) as refused:
+        read_file("r.csv")
+    assert says in str(refused.value)
+    assert "numpy" not in str(refused.value)
+
+
+def test_an_acceleration_that_no_machine_has_asks_for_the_unit():
+    t = np.arange(200) / 1000.0
+    found = make_record(Samples("r", t, None, ("az",), 1e6 * np.sin(t)[np.newaxis], "m/s^2"))
+    assert any("is the unit right? --unit" in note for note in found.notes)
+    calm = make_record(Samples("r", t, None, ("az",), np.sin(t)[np.newaxis], "m/s^2"))
+    assert not calm.notes
+
+
+def test_a_record_from_standard_input(monkeypatch):
+    rows = "".join(f"{k / 100},{k % 7}\n" for k in range(64))
+    data = f"time [s],az [m/s^2]\n{rows}".encode()
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(data)))
+    assert read_file("-").values.shape == (1, 64)

@@ -173,7 +173,8 @@ def test_a_linuxcnc_ini(tmp_path):
     assert made.program.startup == "G17 G20 G40"
     assert "MAX_VELOCITY = 2.0 inch (mill.ini:20)" in text
     assert any("halcmd show thread" in note for note in draft.notes)
-    assert any("MAX_LINEAR_VELOCITY" in note for note in draft.notes)
+    assert made.path.rapid.velocity == made.path.limit.velocity == pytest.approx(76.2)
+    assert math.isinf(made.path.limit.acceleration)
     assert not made.warnings
 
 

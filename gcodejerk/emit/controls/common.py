@@ -116,8 +116,9 @@ NO_JERK = "a jerk limit: only the acceleration can be set"
 
 
 def path_acceleration(machine: Machine) -> dict[str, float]:
-    """What the path may do today: no axis hinders it."""
-    return {"acceleration": max(axis.rapid.acceleration for axis in machine.axes)}
+    """What the path may do today; where the machine file does not say, no axis hinders it."""
+    own = max(axis.rapid.acceleration for axis in machine.axes)
+    return {"acceleration": _along(machine, own)}
 
 
 def shared_acceleration(machine: Machine, today: dict[str, Array]) -> dict[str, float]:
@@ -138,7 +139,14 @@ def shared_acceleration(machine: Machine, today: dict[str, Array]) -> dict[str, 
     sharing = [a for a in machine.axes if not a.rotary and a.name != "Z"] or list(machine.axes)
     for axis in sharing:
         today["acceleration"][AXES.index(axis.name)] = np.inf
-    return {"acceleration": min(axis.rapid.acceleration for axis in sharing)}
+    own = min(axis.rapid.acceleration for axis in sharing)
+    return {"acceleration": _along(machine, own)}
+
+
+def _along(machine: Machine, otherwise: float) -> float:
+    """Acceleration of the path today, or what axes say of it."""
+    stated = machine.path.rapid.acceleration
+    return stated if math.isfinite(stated) else otherwise
 
 
 def shaped_scheme(

@@ -29,6 +29,7 @@ class GrblController(Sheets, GcodeController):
         ),
         Form("parameters", "documented", "$120 to $122: acceleration, there is no jerk"),
     )
+    planner_limits = "$110 to $115 (mm/s here, mm/min there)", "$120 to $125"
     sheet_suffix = ".grbl-settings.txt"
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:

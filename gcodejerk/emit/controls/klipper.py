@@ -28,9 +28,15 @@ class KlipperController(Sheets, GcodeController):
 
     name = "klipper"
     forms = (
-        unmeasured("Klipper slows down at corners and by max_accel; an input shaper adds to this"),
+        unmeasured(
+            "Klipper slows down at corners, by max_accel and by minimum_cruise_ratio (0.5 unless "
+            "the printer says another: SET_VELOCITY_LIMIT MINIMUM_CRUISE_RATIO=0 while streams "
+            "run); an input shaper adds to this"
+        ),
         Form("parameters", "documented", "SET_VELOCITY_LIMIT ACCEL, SET_INPUT_SHAPER"),
     )
+    planner_limits = "max_velocity", "max_accel (of Z, max_z_accel)"
+    path_limits = "max_velocity, max_accel"
     sheet_suffix = ".klipper.cfg.txt"
     remark = ("# ", "")
     program_way = "shaper"

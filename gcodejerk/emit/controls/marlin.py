@@ -32,6 +32,8 @@ class MarlinController(Sheets, GcodeController):
         unmeasured("G1 blocks of 2 ms need a planner buffer that is fed fast enough"),
         Form("parameters", "documented", "M204 T, and M593 (ZV) or M493 (FT motion)"),
     )
+    planner_limits = "M203", "M201"
+    path_limits = "M204 T"
     sheet_suffix = ".marlin.g"
     program_way = "m593"
     program_damping = "M593 D"

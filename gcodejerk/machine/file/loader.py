@@ -20,6 +20,7 @@ from gcodejerk.machine.file.planner import choose_planners, own_law, planner_war
 from gcodejerk.machine.file.plausibility import COARSEST_RESOLUTION, plausibility_warnings
 from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.parts import (
+    FREE,
     Axis,
     ControllerOptions,
     ControllerParameter,
@@ -28,6 +29,7 @@ from gcodejerk.machine.parts import (
     Filter,
     Limits,
     Mode,
+    PathLimits,
     ProgramStart,
     Spectrum,
 )
@@ -70,6 +72,7 @@ def load_text(text: str, name: str) -> Description:
     _check_frequencies(values, checker)
     _check_participations(values, checker)
     _check_m_codes(values, checker)
+    _check_path(values, checker)
     check_servos(values, checker)
     folder = Path(name).parent
     structure = structure_of(values.get("structure", {}), values.get("axes", {}), folder, checker)
@@ -139,6 +142,24 @@ def _modes(values: dict[str, Any]) -> list[tuple[KeyPath, dict[str, Any]]]:
     for name, axis in values.get("axes", {}).items():
         found += [(("axes", name, "modes", i), mode) for i, mode in axis.get("modes", {}).items()]
     return found + [(("modes", i), mode) for i, mode in values.get("modes", {}).items()]
+
+
+def _check_path(values: dict[str, Any], checker: Checker) -> None:
+    """Refuse limits of the path where there is none: axes that run on their own, or only turn."""
+    if not checker.given(("path",)):
+        return
+    if values.get("positioning") == "independent":
+        checker.problems.add(
+            checker.place(("path",)),
+            "path is given beside positioning: independent, where every axis runs on its own",
+            "leave path out, or write positioning: linear if the control bounds the path of G0",
+        )
+    elif values.get("axes") and not set(values["axes"]) - checker.rotary:
+        checker.problems.add(
+            checker.place(("path",)),
+            "path bounds linear axes, and the machine has none",
+            "leave path out",
+        )
 
 
 def _check_m_codes(values: dict[str, Any], checker: Checker) -> None:
@@ -250,6 +271,7 @@ def _machine(
 ) -> Description:
     controller = values["controller"]
     axes = values["axes"]
+    path = _path(values.get("path", {}))
     return Description(
         name=values.get("name", Path(name).stem),
         controller=controller,
@@ -257,8 +279,9 @@ def _machine(
         interval=values["interval"],
         positioning=values["positioning"],
         spindle=values.get("spindle"),
+        path=path,
         axes=tuple(
-            _axis(a, axes[a], a in checker.rotary, spectra.get(a), planners[a])
+            _on_path(_axis(a, axes[a], a in checker.rotary, spectra.get(a), planners[a]), path)
             for a in AXES
             if a in axes
         ),
@@ -282,6 +305,34 @@ def _machine(
                 key=place_order,
             )
         ),
+    )
+
+
+def _path(values: dict[str, Any]) -> PathLimits:
+    if "rapid" not in values:
+        return FREE
+    own, more = values["rapid"], values.get("limit", {})
+    velocity, acceleration = own.get("velocity", math.inf), own.get("acceleration", math.inf)
+    return PathLimits(
+        Limits(velocity, acceleration, math.inf),
+        Limits(more.get("velocity", velocity), more.get("acceleration", acceleration), math.inf),
+    )
+
+
+def _on_path(axis: Axis, path: PathLimits) -> Axis:
+    """An axis alone is a path: what it may do beyond that it never does."""
+    if axis.rotary or path == FREE:
+        return axis
+    return replace(
+        axis,
+        rapid=_narrowed(axis.rapid, path.rapid),
+        limit=_narrowed(axis.limit, path.limit),
+    )
+
+
+def _narrowed(own: Limits, most: Limits) -> Limits:
+    return Limits(
+        min(own.velocity, most.velocity), min(own.acceleration, most.acceleration), own.jerk
     )
 
 

@@ -85,9 +85,15 @@ def plausibility_warnings(values: dict[str, Any], checker: Checker) -> list[Mach
         for which in ("rapid", "limit"):
             slips.limits(("axes", name, which), axis.get(which, {}), axis["rapid"], rotary)
         slips.below(("axes", name, "limit"), axis.get("limit", {}), axis["rapid"], share)
+        if not rotary:
+            slips.above(("axes", name, "rapid"), axis["rapid"], values.get("path", {}))
         slips.resolution(("axes", name, "resolution"), axis["resolution"], rotary)
         for k, mode in axis.get("modes", {}).items():
             slips.mode(("axes", name, "modes", k), mode)
+    path = values.get("path", {})
+    for which, given in path.items():
+        slips.limits(("path", which), given, given, rotary=False)
+    slips.below(("path", "limit"), path.get("limit", {}), path.get("rapid", {}), share)
     for k, mode in values.get("modes", {}).items():
         slips.mode(("modes", k), mode)
     return slips.found
@@ -167,6 +173,18 @@ class _Slips:
                     f"{limit[quantity]:g}, below rapid.{quantity} {rapid[quantity]:g}",
                     "a designed rapid then takes longer than today's, or is left alone; leave the "
                     "entry out to allow what rapids do today",
+                )
+
+    def above(self, at: KeyPath, rapid: dict[str, Any], path: dict[str, Any]) -> None:
+        """A rapid of one axis that is faster than the path may be."""
+        most = path.get("rapid", {})
+        for quantity in ("velocity", "acceleration"):
+            if quantity in most and rapid[quantity] > most[quantity] * (1.0 + 1e-6):
+                self._warn(
+                    (*at, quantity),
+                    f"{rapid[quantity]:g}, above path.rapid.{quantity} {most[quantity]:g}, which "
+                    "counts: an axis alone is a path, too",
+                    "lower it, or raise path.rapid if the control bounds the path less",
                 )
 
     def mode(self, path: KeyPath, mode: dict[str, Any]) -> None:

@@ -218,6 +218,29 @@ _AXIS = Section(
     )
 )  # fmt: skip
 
+
+def _along(doc: str) -> Section:
+    """Keys of `path.rapid` and `path.limit`."""
+    return Section(
+        (
+            Key("velocity", Number("mm/s", above=0.0), f"Velocity along the path {doc}.",
+                example="300"),
+            Key("acceleration", Number("mm/s^2", above=0.0), f"Acceleration along the path {doc}.",
+                example="3000"),
+        )
+    )  # fmt: skip
+
+
+_PATH = Section(
+    (
+        Key("rapid", _along("of the controller's own G0. Left out: not bounded"),
+            "What the controller's own G0 is set to today.", required=True,
+            example="{velocity: 300, acceleration: 3000}"),
+        Key("limit", _along("that a designed profile may use. Left out: as in rapid"),
+            "What a designed profile may use; what is left out is as in rapid."),
+    )
+)  # fmt: skip
+
 _DESIGN = Section(
     (
         Key("profile", Choice(PROFILES), "How a rapid moves.", default="condition3"),
@@ -393,6 +416,11 @@ MACHINE: Final = Section(
             "What M3 turns on. A beam is dark in G0 and burns in G1, so with laser and plasma "
             "rapids are left alone while it is on. Left out: unknown where the dialect's controls "
             "drive beams too (grbl, mach, marlin, klipper), a mill elsewhere.", example="mill"),
+        Key("path", _PATH,
+            "What the control bounds along the path, of all linear axes together (Klipper's "
+            "max_velocity and max_accel, M204 T of Marlin and RepRapFirmware, LinuxCNC's "
+            "MAX_LINEAR_VELOCITY), with positioning: linear. Left out: axes are bounded one by "
+            "one.", example="{rapid: {velocity: 300, acceleration: 3000}}"),
         Key("axes", Table(((_LETTERS, _AXIS),), _AXIS_NAMES, tuple(AXES), at_least=1),
             "The axes that the machine has.", required=True,
             example="{Z: {rapid: {velocity: 600, acceleration: 5000}}}"),

@@ -18,6 +18,7 @@ from gcodejerk.machine.file.scalar_text import braces, number_text, quoted
 from gcodejerk.machine.file.table import SCHEMA_VERSION
 from gcodejerk.machine.parts import (
     AVERAGES,
+    FREE,
     Axis,
     ControllerOptions,
     ControllerParameter,
@@ -25,6 +26,7 @@ from gcodejerk.machine.parts import (
     Filter,
     Limits,
     Mode,
+    PathLimits,
     ProgramStart,
     Spectrum,
 )
@@ -58,6 +60,7 @@ def machine_yaml(machine: Description) -> str:
             f"interval: {number_text(machine.interval)}",
             f"positioning: {machine.positioning}",
             *([f"spindle: {machine.spindle}"] if machine.spindle is not None else []),
+            *_path(machine.path),
             "axes:",
             *(line for axis in machine.axes for line in _axis(axis)),
             *_modes(machine.modes, ""),
@@ -106,6 +109,22 @@ def machine_yaml(machine: Description) -> str:
             "",
         ]
     )
+
+
+def _path(path: PathLimits) -> list[str]:
+    """Limits of the path, where there are any."""
+    if path == FREE:
+        return []
+    return [
+        "path:",
+        f"  rapid: {_along(path.rapid)}",
+        *([f"  limit: {_along(path.limit)}"] if path.limit != path.rapid else []),
+    ]
+
+
+def _along(limits: Limits) -> str:
+    values = {"velocity": limits.velocity, "acceleration": limits.acceleration}
+    return _flow({key: value for key, value in values.items() if math.isfinite(value)})
 
 
 def _cycles(cycles: CycleSettings) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,6 +25,8 @@ KINDS = (
 _SPECTRUM = re.compile(
     r"^\s*#?\s*\"?(freq|frequency|f)\b[^,\n]*,.*psd|^\s*[\d.eE+-]+\s*,\s*[\d.eE+-]+", re.I
 )
+_SCORES = re.compile(r",\w+\([\d.]+\)")
+"""Columns of shapers, which stand beside what SHAPER_CALIBRATE has scaled for them."""
 _AXIS_OF_FILE = re.compile(r"(?:^|[_\-. ])([xyz])(?:[_\-. ]|$)", re.IGNORECASE)
 
 
@@ -64,7 +67,8 @@ def draft_of(files: Sequence[str], folder: Path) -> Draft:
     Parameters
     ----------
     files : sequence of str
-        Paths: at most one configuration; spectra name their axis (`resonances_x_1.csv`).
+        Paths, - for standard input: at most one configuration; spectra name their axis
+        (`resonances_x_1.csv`).
     folder : Path
         Where the machine file will be: names of spectra are written from there.
 
@@ -84,7 +88,19 @@ def draft_of(files: Sequence[str], folder: Path) -> Draft:
         path = Path(name)
         text = _text(path)
         kind = recognise(text)
+        path = Path("<stdin>") if name == "-" else path
+        if kind == "spectrum" and name == "-":
+            raise MachineError(
+                "a spectrum came from standard input",
+                "name its file: the machine file refers to it",
+            )
         if kind == "spectrum":
+            if _SCORES.search(text.partition("\n")[0]):
+                raise MachineError(
+                    "this is Klipper's table of a calibration: scaled, no spectrum to judge by",
+                    "give resonances_*.csv (TEST_RESONANCES AXIS=X OUTPUT=resonances)",
+                    Place(name),
+                )
             spectra.append(path)
         elif kind == "machine":
             raise MachineError(
@@ -144,7 +160,8 @@ def _spectrum(draft: Draft, path: Path, folder: Path) -> None:
 def _text(path: Path) -> str:
     place = Place(str(path))
     try:
-        data = read_file(path, MOST_BYTES + 1)
+        piped = str(path) == "-"
+        data = sys.stdin.buffer.read(MOST_BYTES + 1) if piped else read_file(path, MOST_BYTES + 1)
     except FileNotFoundError:
         raise MachineError("there is no such file", f"name {KINDS}", place) from None
     except IsADirectoryError:

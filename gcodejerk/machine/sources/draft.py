@@ -18,7 +18,7 @@ NEEDED = ("velocity", "acceleration")
 TODAYS_LIMITS = (
     "designed rapids may accelerate no more than today's (limit), which leaves little to gain in "
     "unchanged time: where the drives have more to give, say so with --headroom 1.5, or raise "
-    "limit.acceleration; with design.max_extension they may take longer instead"
+    "limit.acceleration{}; with design.max_extension they may take longer instead"
 )
 
 
@@ -89,6 +89,10 @@ class Draft:
     spindle: tuple[str, str] | None = None
     planner: tuple[str, str] | None = None
     startup: tuple[str, str] | None = None
+    path: dict[str, Fact] = field(default_factory=dict)
+    """Velocity and acceleration that the control bounds along the path, of all linear axes."""
+    path_limit: dict[str, Fact] = field(default_factory=dict)
+    """The same of designed profiles, where it is more."""
     options: dict[str, tuple[str, str]] = field(default_factory=dict)
     """Of `controller_options`: text and origin."""
     axes: dict[str, DraftAxis] = field(default_factory=dict)
@@ -131,11 +135,16 @@ class Draft:
                 "state them: --axis 'X velocity=36m/min acceleration=0.4g travel=0:500'",
             )
         if missing := self.missing():
-            first = missing[0].split()[-1]
+            first = self.axes[missing[0].split()[-1]]
+            example = (
+                "velocity=3600deg/min acceleration=200deg/s^2"
+                if first.rotary
+                else "velocity=24m/min acceleration=0.3g"
+            )
             raise MachineError(
                 f"nothing says the rapid's {', '.join(missing)}",
-                f"state it, for example --axis '{first} velocity=24m/min acceleration=0.3g'; what "
-                "the control is set to is never guessed",
+                f"state it, for example --axis '{first.name} {example}'; what the control is set "
+                "to is never guessed",
             )
         if self.interval is None:
             usual = "the usual interval of commands; ask the control's manual"
@@ -143,7 +152,12 @@ class Draft:
         if self.positioning is None:
             self.positioning = "linear", "ASSUMED: G0 goes straight; independent if it bends"
         if headroom is None:
-            self.notes.append(TODAYS_LIMITS)
+            more = " (that of the path, too)" if "acceleration" in self.path else ""
+            self.notes.append(TODAYS_LIMITS.format(more))
+        if headroom is not None and "acceleration" in self.path:
+            self.path_limit["acceleration"] = Fact(
+                headroom * self.path["acceleration"].value, f"{headroom:g} times rapid's, as stated"
+            )
         for axis in self.axes.values():
             if headroom is not None and axis.acceleration is not None:
                 axis.limit_acceleration = Fact(

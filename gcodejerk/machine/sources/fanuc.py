@@ -1,11 +1,13 @@
 """Fanuc: parameters as text, punched by the control or typed.
 
 Read are `N01420 A1 P24000 A2 P24000` (also with Q1 and L words), and lines such as
-`1420 X24000 Y24000 Z18000` or `1420: X=24000`. Facts: 1420 rapid rate [mm/min] (IS-B, metric; role
-M, unit U), 1620 time constant of rapids [ms] (A-63512EN p. 9: acceleration = rate/constant), 1621
-bell time [ms] (U), 1401 bit 1 straight rapids (U), 1020 names of the axes (character codes), 1320
-and 1321 stored stroke limits. That rapids have constant acceleration and not constant time (1603)
-is assumed.
+`1420 X24000 Y24000 Z18000` or `1420: X=24000`. In place of P, 15i and 30i punch M in front of
+lengths and feedrates in mm, I in front of those in inch, whatever the machine is (B-63330EN/03
+p. 21 and 25, B-63950EN/02 p. 8). Facts: 1420 rapid rate [mm/min] (IS-B, metric; role M, unit U),
+1620 time constant of rapids [ms] (A-63512EN p. 9: acceleration = rate/constant), 1621 bell time
+[ms] (U), 1001 bit 0 a machine in inch, whose P are inch (U), 1401 bit 1 straight rapids (U), 1020
+names of the axes (character codes), 1320 and 1321 stored stroke limits. That rapids have constant
+acceleration and not constant time (1603) is assumed.
 """
 
 from __future__ import annotations
@@ -14,17 +16,19 @@ import re
 
 from gcodejerk.errors import MachineError, Place
 from gcodejerk.machine.sources.draft import Draft, Fact
-from gcodejerk.units import SECONDS_PER_MINUTE
+from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 
 KIND = "Fanuc parameters"
 LETTERS = "XYZABCUVW"
 ORDER = "XYZABC"
 MS = 1e-3
 _LINE = re.compile(
-    r"^\s*(?:N0*|No\.?\s*)?(1020|1320|1321|1401|1420|1620|1621)(?!\d)[\s:=]*(.*)$", re.I | re.M
+    r"^\s*(?:N0*|No\.?\s*)?(1001|1020|1320|1321|1401|1420|1620|1621)(?!\d)[\s:=]*(.*)$", re.I | re.M
 )
-_PUNCHED = re.compile(r"A\s*(\d{1,2})\s*(?:Q\d+\s*)?P\s*(-?[\d.]+)", re.I)
-_TYPED = re.compile(r"([XYZABCUVW])\s*[:=]?\s*(-?\d+(?:\.\d*)?)", re.I)
+_PUNCHED = re.compile(r"A\s*(\d{1,2})\s*(?:Q\d+\s*)?([PMI])\s*([^A;%\s]*)", re.I)
+_TYPED = re.compile(r"([XYZABCUVW])\s*[:=]?\s*([-+.\d][^\sXYZABCUVW;]*)", re.I)
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)")
+OF_LENGTH = (1320, 1321, 1420)
 _SINGLE = re.compile(r"P?\s*(-?[\d.]+)\s*$", re.I)
 
 Value = tuple[float, str]
@@ -50,8 +54,8 @@ def read_fanuc(text: str, name: str) -> Draft:
     for match in _LINE.finditer(text):
         number, rest = int(match[1]), match[2].strip()
         place = Place(name, text.count("\n", 0, match.start(1)) + 1)
-        if number == 1401:
-            if single := _SINGLE.search(rest):
+        if number in (1001, 1401):
+            if (single := _SINGLE.search(rest)) and _NUMBER.fullmatch(single[1]):
                 bits[number] = single[1], str(place)
         elif number != 1020:
             found.setdefault(number, {}).update(_values(number, rest, names, place))
@@ -82,6 +86,7 @@ def read_fanuc(text: str, name: str) -> Draft:
         low, high = found.get(1321, {}).get(letter), found.get(1320, {}).get(letter)
         if low and high and low[0] < high[0] and not axis.rotary and _plausible(low[0], high[0]):
             axis.travel, axis.travel_origin = (low[0], high[0]), "1321, 1320"
+    _refuse_inch(text, bits, name)
     _positioning(draft, bits)
     draft.interval = Fact(1e-3, "the usual interval of commands; blocks are 2 ms", assumed=True)
     draft.notes.append(
@@ -89,6 +94,32 @@ def read_fanuc(text: str, name: str) -> Draft:
         "rapid that `gcodejerk inspect` shows, and compare its time with the machine's"
     )
     return draft
+
+
+def _refuse_inch(text: str, bits: dict[int, tuple[str, str]], name: str) -> None:
+    """Numbers behind P are in the unit of the machine, which bit 0 of 1001 says."""
+    said = bits.get(1001, ("0", ""))[0]
+    inch = said[-1] == "1" if re.fullmatch(r"[01]{8}", said) else bool(int(float(said)) & 1)
+    rates = [m for m in _LINE.finditer(text) if int(m[1]) == 1420]
+    kinds = {kind.upper() for m in rates for _, kind, _ in _PUNCHED.findall(m[2])} or {"P"}
+    if inch and "P" in kinds:
+        raise MachineError(
+            "1001#0 (INM) is 1: the machine counts in inch, and so do its rates",
+            "in place of the list, state --controller fanuc and each axis: --axis 'X "
+            "velocity=945in/min acceleration=0.3g'",
+            Place(name, text.count("\n", 0, rates[0].start(1)) + 1),
+        )
+
+
+def _value(text: str, number: int, letter: str, place: Place) -> float:
+    """A number as it is punched or typed."""
+    if not _NUMBER.fullmatch(text):
+        raise MachineError(
+            f"{number} of {letter} is {text!r}, expected a number",
+            f"write {number} {letter}24000, with a point and without other marks",
+            place,
+        )
+    return float(text)
 
 
 def _positioning(draft: Draft, bits: dict[int, tuple[str, str]]) -> None:
@@ -112,8 +143,9 @@ def _names(text: str) -> dict[int, str]:
     out: dict[int, str] = {}
     for match in _LINE.finditer(text):
         if int(match[1]) == 1020:
-            for number, code in _PUNCHED.findall(match[2]):
-                letter = chr(int(float(code))) if 65 <= float(code) <= 90 else "?"
+            for number, _, text in _PUNCHED.findall(match[2]):
+                code = float(text) if _NUMBER.fullmatch(text) else 0.0
+                letter = chr(int(code)) if 65 <= code <= 90 else "?"
                 if letter in LETTERS:
                     out[int(number)] = letter
     return out
@@ -124,14 +156,17 @@ def _values(number: int, rest: str, names: dict[int, str], place: Place) -> dict
     out: dict[str, Value] = {}
     punched = _PUNCHED.findall(rest)
     if punched:
-        for index, value in punched:
+        for index, kind, value in punched:
             k = int(index)
             letter = names.get(k) if names else (ORDER[k - 1] if 1 <= k <= len(ORDER) else None)
             if letter is not None:
-                out[letter] = float(value), str(place)
+                inch = kind.upper() == "I" and number in OF_LENGTH and letter not in "ABC"
+                told = f"{value} inch, {place}" if inch else str(place)
+                scale = MM_PER_INCH if inch else 1.0
+                out[letter] = scale * _value(value, number, letter, place), told
         return out
     for letter, value in _TYPED.findall(rest):
-        out[letter.upper()] = float(value), str(place)
+        out[letter.upper()] = _value(value, number, letter.upper(), place), str(place)
     if not out and rest:
         raise MachineError(
             f"{number} {rest!r} names no axis", f"write it as {number} X24000 Y24000 Z18000", place

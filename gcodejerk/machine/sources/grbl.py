@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from gcodejerk.errors import MachineError
+from gcodejerk.errors import MachineError, Place
 from gcodejerk.machine.sources.draft import Draft, Fact
 from gcodejerk.units import SECONDS_PER_MINUTE
 
@@ -24,7 +24,9 @@ NO_BEAM = (
     "if M3 turns a mill's spindle and no laser or plasma, add the line `spindle: mill`: until then "
     "rapids behind M3 are left alone"
 )
-_SETTING = re.compile(r"^[^$\n]{0,40}\$(\d{1,3})\s*=\s*([+-]?\d+(?:\.\d*)?|\.\d+)", re.MULTILINE)
+_SETTING = re.compile(r"^[^$\n]{0,40}\$(\d{1,3})[ \t]*=[ \t]*([^\s(;]*)", re.MULTILINE)
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
+OF_AXES = {base + k for base in (100, 110, 120, 130, 800) for k in range(6)}
 _VERSION = re.compile(r"(grblhal|grbl)\s+(\d\S*)|\[VER:([^\]]*)\]", re.IGNORECASE)
 
 
@@ -37,9 +39,18 @@ def is_grbl(text: str) -> bool:
 def read_grbl(text: str, name: str) -> Draft:
     """What a `$$` dump says; a setting that comes twice counts as it came last."""
     found: dict[int, tuple[float, str]] = {}
+    places: dict[int, Place] = {}
     for match in _SETTING.finditer(text):
-        line = text.count("\n", 0, match.start(1)) + 1
-        found[int(match[1])] = float(match[2]), f"${match[1]}={match[2]} ({name}:{line})"
+        place = Place(name, text.count("\n", 0, match.start(1)) + 1)
+        if _NUMBER.fullmatch(match[2]):
+            found[int(match[1])] = float(match[2]), f"${match[1]}={match[2]} ({place})"
+            places[int(match[1])] = place
+        elif int(match[1]) in OF_AXES:
+            raise MachineError(
+                f"${match[1]} is {match[2]!r}, expected a number as grbl reports it",
+                f"write ${match[1]}=5000.000, with a point and without other marks",
+                place,
+            )
     jerks = {k for k in range(len(LETTERS)) if 800 + k in found}
     version = " ".join(m[0] for m in _VERSION.finditer(text)).lower()
     is_hal = "grblhal" in version or bool(jerks) or max(found) >= 300
@@ -51,6 +62,13 @@ def read_grbl(text: str, name: str) -> Draft:
             continue
         axis = draft.axis(letter)
         rate, origin = found[110 + k]
+        for number in (110 + k, 120 + k):
+            if found[number][0] <= 0.0:
+                raise MachineError(
+                    f"${number} is {found[number][0]:g}, expected a number above 0",
+                    "send $$ again, or mend the dump",
+                    places[number],
+                )
         axis.velocity = Fact(rate / SECONDS_PER_MINUTE, f"{origin}, per minute")
         axis.acceleration = Fact(*found[120 + k])
         if 800 + k in found and found[800 + k][0] > 0.0:
@@ -110,6 +128,12 @@ def read_fluidnc(text: str, name: str) -> Draft:
     )
     draft.positioning = "linear", "FluidNC's G0 is a straight line"
     draft.planner = "trapezoidal", "FluidNC has no jerk limit"
+    kinematics = document.get("kinematics")
+    named = next(iter(kinematics), "") if isinstance(kinematics, dict) else kinematics
+    if named and named != "cartesian":
+        draft.notes.append(
+            f"kinematics {named}: limits are taken as those of the axes; watch a first run"
+        )
     for letter in LETTERS:
         values = axes.get(letter.lower())
         if not isinstance(values, dict):

@@ -1,9 +1,11 @@
 """Klipper and Kalico: printer.cfg with what it includes and what SAVE_CONFIG put at its end.
 
-Facts (Klipper, Config_Reference.md, toolhead.py): max_velocity [mm/s] and max_accel [mm/s^2] are of
-the tool head, whichever axes move; max_z_velocity and max_z_accel bound Z; a trapezoid without jerk
-limit. [input_shaper] acts behind it, per axis: mzv where nothing is said.
-Lines that begin with `#*#` are SAVE_CONFIG's and count.
+Facts (Klipper, Config_Reference.md, toolhead.py, configfile.py): max_velocity [mm/s] and max_accel
+[mm/s^2] are of the tool head, whichever axes move; max_z_velocity and max_z_accel bound Z, with
+Kalico's limited_ kinematics max_x_velocity and its kin the others; a trapezoid without jerk limit.
+[input_shaper] acts behind it, per axis: mzv where nothing is said. Lines that begin with `#*#` are
+SAVE_CONFIG's and count. What comes later counts, and an include stands where it is named; # begins
+a comment anywhere in a line.
 """
 
 from __future__ import annotations
@@ -20,10 +22,10 @@ from gcodejerk.machine.sources.draft import Draft, Fact
 
 KIND = "Klipper printer.cfg"
 MOST_BYTES, MOST_DEPTH = 1 << 20, 8
-DEFAULT_SHAPER = "mzv"
+DEFAULT_SHAPER, DEFAULT_CRUISE = "mzv", 0.5
 STRAIGHT = ("cartesian", "corexy", "corexz", "hybrid_corexy", "hybrid_corexz", "delta", "limited_")
 _SAVED = re.compile(r"^#\*# ?", re.MULTILINE)
-_INCLUDE = re.compile(r"\s*\[include\s+([^\]]+)\]", re.IGNORECASE)
+_INCLUDE = re.compile(r"\[include\s+([^\]]+)\]")
 
 
 def is_klipper(text: str) -> bool:
@@ -71,14 +73,19 @@ def read_klipper(path: Path, text: str) -> Draft:
         )
     speed = values.fact("printer", "max_velocity")
     acceleration = values.fact("printer", "max_accel")
+    draft.path = {
+        name: fact
+        for name, fact in (("velocity", speed), ("acceleration", acceleration))
+        if fact is not None
+    }
     for letter in "XYZ":
         axis = draft.axis(letter)
-        axis.velocity = (
-            values.fact("printer", "max_z_velocity") if letter == "Z" else None
-        ) or speed
-        axis.acceleration = (
-            values.fact("printer", "max_z_accel") if letter == "Z" else None
-        ) or acceleration
+        own = letter == "Z" or kinematics.startswith("limited_")
+        key = f"max_{letter.lower()}_"
+        axis.velocity = _lower(values.fact("printer", key + "velocity") if own else None, speed)
+        axis.acceleration = _lower(
+            values.fact("printer", key + "accel") if own else None, acceleration
+        )
         low = values.number(f"stepper_{letter.lower()}", "position_min") or 0.0
         high = values.number(f"stepper_{letter.lower()}", "position_max")
         if high is not None and low < high and kinematics != "delta":
@@ -87,9 +94,16 @@ def read_klipper(path: Path, text: str) -> Draft:
                 "position_min (0 unless said), position_max",
             )
     _shapers(draft, values)
+    _cruise(draft, values)
     if config.has_section("printer") and config.has_option("printer", "unified_planner"):
         draft.controller = "kalico"
     return draft
+
+
+def _lower(own: Fact | None, of_all: Fact | None) -> Fact | None:
+    """What bounds an axis: its own limit, or that of the tool head."""
+    known = [fact for fact in (own, of_all) if fact is not None]
+    return min(known, key=lambda fact: fact.value, default=None)
 
 
 def _shapers(draft: Draft, values: _Config) -> None:
@@ -110,33 +124,60 @@ def _shapers(draft: Draft, values: _Config) -> None:
         )
 
 
+def _cruise(draft: Draft, values: _Config) -> None:
+    """The part of every move without acceleration, which slows short rapids down."""
+    ratio = values.number("printer", "minimum_cruise_ratio")
+    if ratio is None:
+        ratio, said = DEFAULT_CRUISE, " (Klipper's own)"
+        if values.text("printer", "max_accel_to_decel") is not None:
+            return
+    else:
+        said = ""
+    if 0.0 < ratio < 1.0:
+        # A move that never reaches its speed peaks at sqrt((1 - r) d a), not at sqrt(d a).
+        longer = 50.0 * (2.0 - ratio) / (1.0 - ratio) ** 0.5 - 100.0
+        draft.notes.append(
+            f"minimum_cruise_ratio is {ratio:g}{said}: short rapids take up to {longer:.0f} % "
+            "longer today than this file says, and streams are played slower: set it to 0 while "
+            "they run"
+        )
+
+
 def _parts(path: Path, text: str, notes: list[str], depth: int) -> Iterator[str]:
-    """Texts in the order in which they count: includes first, where they stand; the saved last."""
+    """Texts in the order in which they count: includes where they stand; the saved last."""
     if depth > MOST_DEPTH:
         raise MachineError(
             f"{path.name} is included more than {MOST_DEPTH} deep", "does a file include itself?"
         )
-    own, saved = [], []
+    own: list[str] = []
+    saved: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):
-        if match := _INCLUDE.match(line):
-            named = match[1].strip()
-            files = sorted(glob.glob(str(path.parent / named)))
-            if not files:
-                notes.append(f"{Place(path.name, number)}: {named} was not found, and not read")
-            for name in files:
-                try:
-                    data = read_file(Path(name), MOST_BYTES)
-                except OSError as error:
-                    notes.append(f"{Place(path.name, number)}: {named}: {error}")
-                    continue
-                yield from _parts(Path(name), data.decode("utf-8", "replace"), notes, depth + 1)
-        elif line.startswith("#*#"):
+        if line.startswith("#*#"):
             saved.append(_SAVED.sub("", line))
+        elif match := _INCLUDE.match(line):
+            yield "\n".join(own)
+            own = []
+            yield from _included(path, match[1].strip(), Place(path.name, number), notes, depth)
         else:
-            own.append(line)
+            own.append(line.partition("#")[0])
     yield "\n".join(own)
     first = next((k for k, line in enumerate(saved) if line.startswith("[")), len(saved))
     yield "\n".join(saved[first:])
+
+
+def _included(path: Path, named: str, place: Place, notes: list[str], depth: int) -> Iterator[str]:
+    """Texts of the files that an include names, in their order."""
+    files = sorted(glob.glob(named, root_dir=path.parent))
+    if not files:
+        notes.append(f"{place}: {named} was not found, and not read")
+    for name in files:
+        inner = path.parent / name
+        try:
+            data = read_file(inner, MOST_BYTES)
+        except OSError as error:
+            notes.append(f"{place}: {named}: {error}")
+            continue
+        yield from _parts(inner, data.decode("utf-8", "replace"), notes, depth + 1)
 
 
 class _Config:

@@ -30,6 +30,7 @@ LINEAR_RESOLUTION, ROTARY_RESOLUTION = 1e-4, 1e-3
 _SECTION = re.compile(r"\s*\[\s*(\w+)\s*\]")
 _PAIR = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*?)\s*$")
 _INCLUDE = re.compile(r"#INCLUDE\s+(\S.*?)\s*$")
+_INCLUDES = re.compile(r"^#INCLUDE[ \t]+\S", re.MULTILINE)
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
 _STARTUP = re.compile(r"(\s*[A-Za-z][+-]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+))*\s*")
 _SETP = re.compile(
@@ -65,10 +66,12 @@ class _Values:
 
 
 def is_linuxcnc(text: str) -> bool:
-    """Whether it is the INI of a configuration."""
+    """Whether it is the INI of a configuration; all that matters may stand in what it includes."""
+    if _INCLUDES.search(text):
+        return True
     sections = {match[1] for line in text.splitlines() if (match := _SECTION.match(line))}
-    return bool(sections & {"EMC", "EMCMOT", "TRAJ", "KINS"}) and (
-        "AXIS_X" in sections or "#INCLUDE" in text or bool(sections & {"JOINT_0", "AXIS_0", "TRAJ"})
+    return bool(sections & {"EMC", "EMCMOT", "TRAJ", "KINS"}) and bool(
+        sections & {"AXIS_X", "JOINT_0", "AXIS_0", "TRAJ"}
     )
 
 
@@ -104,6 +107,7 @@ def read_linuxcnc(path: Path, text: str) -> Draft:
     draft.positioning = "linear", "LinuxCNC's G0 is a straight line, all axes arrive together"
     draft.planner = LINUXCNC, "trapezoids of velocity; half of the acceleration for a lone G0"
     letters = _letters(values)
+    _refuse_old(values, letters)
     for letter in letters:
         _axis(draft, letter, values, 1.0 if letter in "ABC" else unit, hal)
     _trajectory(draft, values, unit)
@@ -194,6 +198,17 @@ def _letters(values: _Values) -> list[str]:
     return letters
 
 
+def _refuse_old(values: _Values, letters: list[str]) -> None:
+    """Up to LinuxCNC 2.7 the sections of axes had numbers."""
+    old = values.text("AXIS_0", "MAX_VELOCITY")
+    if old is not None and all(values.text(f"AXIS_{a}", "MAX_VELOCITY") is None for a in letters):
+        raise MachineError(
+            "the limits stand in [AXIS_0] and on, as LinuxCNC 2.7 had them",
+            "convert the INI with LinuxCNC's own update_ini: later ones read [AXIS_X], [JOINT_0]",
+            old[1],
+        )
+
+
 def _axis(
     draft: Draft, letter: str, values: _Values, unit: float, hal: list[tuple[str, Place]]
 ) -> None:
@@ -257,10 +272,7 @@ def _trajectory(draft: Draft, values: _Values, unit: float) -> None:
                 axis.velocity = Fact(speed, f"{origin}, below the axis's own")
         together = sum(axis.velocity.value**2 for axis in lengths if axis.velocity) ** 0.5
         if together > speed * (1.0 + 1e-9):
-            draft.notes.append(
-                f"{origin}: rapids of several axes are slower today than this file says, which "
-                "knows limits of single axes only; their time is then shorter than today's"
-            )
+            draft.path["velocity"] = Fact(speed, origin)
     blend = values.number("TRAJ", "ARC_BLEND_ENABLE")
     if blend is not None and blend[0] == 0.0:
         draft.notes.append("[TRAJ] ARC_BLEND_ENABLE is 0; streams need 1")

@@ -57,6 +57,7 @@ def text_of(draft: Draft) -> str:
         lines.append(_line(f"positioning: {draft.positioning[0]}", draft.positioning[1]))
     if draft.spindle is not None:
         lines.append(_line(f"spindle: {draft.spindle[0]}", draft.spindle[1]))
+    lines += _path(draft)
     lines += ["", "axes:"]
     for axis in draft.ordered():
         lines += _axis(axis, draft)
@@ -72,6 +73,20 @@ def text_of(draft: Draft) -> str:
         ]
     lines += _rest(draft)
     return "\n".join(lines) + "\n"
+
+
+def _path(draft: Draft) -> Iterable[str]:
+    """What bounds all linear axes together."""
+    if not draft.path or draft.positioning is None or draft.positioning[0] != "linear":
+        return
+    units = {"velocity": "mm/s", "acceleration": "mm/s^2"}
+    yield ""
+    yield _line("path:", "what the control bounds along the path, whichever axes move")
+    for name, facts in (("rapid", draft.path), ("limit", draft.path_limit)):
+        if facts:
+            yield f"  {name}:"
+        for key, fact in facts.items():
+            yield _fact(f"    {key}", fact, units[key])
 
 
 def _axis(axis: DraftAxis, draft: Draft) -> Iterable[str]:

@@ -92,7 +92,10 @@ def _put(state: State, found: Iterable[tuple[Limit, float]], stated: Stated) -> 
             number = value * limit.scale if stated else NAN
             paths[limit.quantity] = NAN if number != number else min(lowest, number)
     for quantity, number in paths.items():
-        of_all = sum(of[_QUANTITIES.index(quantity)] ** 2 for of in stated.values()) ** 0.5
+        at = _QUANTITIES.index(quantity)
+        of_all = sum(of[at] ** 2 for of in stated.values()) ** 0.5
+        if LINEAR.issuperset(stated):
+            of_all = min(of_all, state.along[at])
         enough = number >= of_all * _NEAR
         others = {name: lowest for name, lowest in state.path_limits.items() if name != quantity}
         state.put("path_limits", others if enough else {**others, quantity: number})
@@ -119,8 +122,9 @@ def limit_is_kept(limit: Limit, value: float, stated: Stated) -> bool:
 def beyond_path(state: State, moved: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which straight moves may be beyond a limit of the path.
 
-    On a line, the axis that is first at its own limit bounds all; axes that run on their own may
-    all be there at once. Of linear and rotary axes together nobody says what the path is.
+    On a line, the axis that is first at its own limit bounds all, and so does what the machine file
+    says of the path; axes that run on their own may all be there at once. Of linear and rotary axes
+    together nobody says what the path is.
 
     Parameters
     ----------
@@ -146,6 +150,8 @@ def beyond_path(state: State, moved: NDArray[np.float64]) -> NDArray[np.bool_]:
             with np.errstate(divide="ignore", invalid="ignore"):
                 reach = np.where((way > 0.0) & ours, most * length / way, np.inf).min(axis=1)
             reach[~(way[:, ours] > 0.0).any(axis=1)] = 0.0
+            slides = (way[:, linear] > 0.0).any(axis=1)
+            reach = np.where(slides, np.minimum(reach, state.along[at]), reach)
         else:
             reach = np.sqrt((most**2 * (way > 0.0)).sum(axis=1))
         beyond |= mixed | ~(number >= reach * _NEAR)

@@ -115,6 +115,7 @@ FIELDS = (
     Field("fixed", "constant", frozenset()),
     Field("wraps", "constant", (None,) * len(AXES)),
     Field("limits", "constant", MappingProxyType({})),
+    Field("along", "constant", (math.inf,) * 3),
     Field("straight", "constant", True),
     *(Field(name, "note", start) for name, start in (("line", None), ("lost", {}))),
 )
@@ -228,8 +229,9 @@ class State:
     wraps: tuple[str | None, ...]
     """How each axis turns: see `gcodejerk.start.Start`; None unknown."""
     limits: Mapping[str, tuple[float, float, float]]
+    along: tuple[float, float, float]
     straight: bool
-    """What each axis may do, and whether all go together: see there."""
+    """What each axis may do, the path of all of them, and whether they go together: see there."""
 
     def __init__(self) -> None:
         for field in FIELDS:

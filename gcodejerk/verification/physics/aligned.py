@@ -29,7 +29,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.physics.own_rapids import conventional_counts, rapid_limits
+from gcodejerk.verification.physics.own_rapids import conventional_counts, limits_of, rapid_limits
 from gcodejerk.verification.physics.points import Array, Index, Paths
 from gcodejerk.verification.physics.residual import leaves_more
 
@@ -214,13 +214,15 @@ def _accelerations(motion: _Motion, machine: Machine, lasts: Array) -> list[tupl
     h = np.where(inner & (lasts > 0.0), lasts, 1.0)
     rise = np.where(inner, (motion.after - motion.before) / h, 0.0)
     step = 2.0 * paths.step[paths.owner, 0] / h**2
+    limits = limits_of(paths.displacement, machine)[:, paths.owner]
     for axis in machine.axes:
         a = AXES.index(axis.name)
         share = np.abs(delta[:, a]) / np.where(motion.length > 0.0, motion.length, 1.0)
         most = options.max_acceleration.get(axis.name, OVER * axis.limit.acceleration)
-        most = min(most, OVER * axis.limit.acceleration)
-        fast = inner & (np.abs(rise) * share > most * (1.0 + RELATIVE) + step)
-        problem = f"{axis.name} passes {most:g} mm/s^2, the least that MAX_ACCELERATION may be"
+        each = np.minimum(most, OVER * limits[1, :, a])
+        fast = inner & (np.abs(rise) * share > each * (1.0 + RELATIVE) + step)
+        least = each[fast].min(initial=most)
+        problem = f"{axis.name} passes {least:g} mm/s^2, the least that MAX_ACCELERATION may be"
         out.append((Kind.ACCELERATION, fast, problem))
     return out
 
@@ -229,6 +231,7 @@ def _judge_played(motion: _Motion, machine: Machine, found: Findings, reported: 
     """Judge what the drives get."""
     paths = motion.paths
     played, moment = _played(motion, machine.interval)
+    limits = limits_of(paths.displacement, machine)
     for axis in machine.axes:
         a = AXES.index(axis.name)
         if not (paths.displacement[:, a] != 0.0).any():
@@ -236,8 +239,10 @@ def _judge_played(motion: _Motion, machine: Machine, found: Findings, reported: 
         speed = np.abs(np.diff(played.position[:, a], prepend=0.0)) / machine.interval
         speed[played.begin] = 0.0
         step = 2.0 * paths.step[played.owner, a] / machine.interval
-        fast = speed > axis.limit.velocity * (1.0 + RELATIVE) + step
-        problem = f"{axis.name} passes its limit of {axis.limit.velocity:g} mm/s"
+        most = limits[0, played.owner, a]
+        fast = speed > most * (1.0 + RELATIVE) + step
+        least = most[fast].min(initial=axis.limit.velocity)
+        problem = f"{axis.name} passes its limit of {least:g} mm/s"
         _complain(found, played, Kind.VELOCITY, fast, problem, of_points=False)
     off = _off_profile(played, moment, machine.interval, reported)
     problem = f"played more than {TOLERANCE:g} mm off the profile that was reported"

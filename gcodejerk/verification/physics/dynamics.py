@@ -191,18 +191,18 @@ _ORDERS = ((1, Kind.VELOCITY, "s"), (2, Kind.ACCELERATION, "s^2"), (3, Kind.JERK
 def _limits(paths: Paths, machine: Machine, t: Array) -> list[tuple[Kind, NDArray[np.bool_], str]]:
     """Compare every moving axis with what designs may use."""
     padded = Padded.of(paths, t)
-    limits = limits_of(machine)
+    limits = limits_of(paths.displacement, machine)
     out = []
     for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
         x = (paths.position[:, a] - paths.start[paths.owner, a])[padded.row]
         for order, kind, unit in _ORDERS:
-            limit = limits[order - 1, a]
             value, error, inside = padded.differences(x, order)
+            limit = limits[order - 1, padded.owner[: len(value)], a]
             step = paths.step[padded.owner[: len(value)], a]
             if order == 1:
                 step = 0.5 * step
             bad = inside & (np.abs(value) > limit * (1.0 + RELATIVE) + error * step)
             if bad.any():
-                problem = f"{AXES[a]} passes its limit of {limit:g} mm/{unit}"
+                problem = f"{AXES[a]} passes its limit of {limit[bad][0]:g} mm/{unit}"
                 out.append((kind, padded.rows_of(order, bad, len(t)), problem))
     return out

@@ -238,8 +238,8 @@ class _Quantities:
             at = self._binding(each)
             picked = each[np.arange(len(each)), at]
             return np.where(np.isfinite(picked), picked, 1.0)
-        if name == "velocity":
-            each = own.limits[0]
+        if name in ("velocity", "acceleration"):
+            each = own.limits[0 if name == "velocity" else 1]
         else:
             with np.errstate(divide="ignore", invalid="ignore"):
                 each = np.where(own.moving, each / own.size, np.inf)

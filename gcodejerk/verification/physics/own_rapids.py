@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.axes import AXES
-from gcodejerk.machine import BELL, LINUXCNC, LONE_SHARE, Machine
+from gcodejerk.machine import BELL, FREE, LINUXCNC, LONE_SHARE, Machine
 from gcodejerk.verification.physics.conventional import rapid_time
 from gcodejerk.verification.physics.laws import OwnRapids, has_law
 from gcodejerk.verification.physics.oscillators import Oscillators
@@ -32,11 +32,25 @@ def rapid_limits(paths: Paths, machine: Machine) -> Array:
         # A rapid that runs at F does so along its path, in which all axes share.
         length = np.sqrt((paths.displacement[:, LINEAR] ** 2).sum(axis=1))
         out[0] = np.fmin(out[0], (paths.speed / length)[:, np.newaxis])
+        halved = np.where(paths.lone & (machine.planner == LINUXCNC), LONE_SHARE, 1.0)
+        way, most = path_way(paths.displacement, machine), machine.path.rapid
+        out[0] = np.minimum(out[0], (most.velocity / way)[:, np.newaxis])
+        out[1] = np.minimum(out[1], (halved * most.acceleration / way)[:, np.newaxis])
     return out
 
 
-def limits_of(machine: Machine) -> Array:
-    """Velocity, acceleration and jerk that a design may use, shape (3, 9); infinite without axis.
+def path_way(displacement: Array, machine: Machine) -> Array:
+    """Way along which the control bounds the path, shape (moves,) [mm]: of the linear axes."""
+    slides = [axis.name for axis in machine.axes if not axis.rotary]
+    squares = sum((displacement[:, AXES.index(name)] ** 2 for name in slides), start=np.zeros(1))
+    way: Array = np.sqrt(np.broadcast_to(squares, len(displacement)))
+    return way
+
+
+def limits_of(displacement: Array, machine: Machine) -> Array:
+    """Velocity, acceleration and jerk that a design may use of each axis, shape (3, moves, 9).
+
+    Infinite without axis. On a straight line an axis has its part of what bounds the path.
 
     An axis without a jerk limit stands any jerk; from one interval to the next its acceleration can
     then go from one limit to the other.
@@ -48,7 +62,16 @@ def limits_of(machine: Machine) -> Array:
             limit.jerk if np.isfinite(limit.jerk) else 2.0 * limit.acceleration / machine.interval
         )
         out[:, AXES.index(axis.name)] = limit.velocity, limit.acceleration, jerk
-    return out
+    each: Array = np.repeat(out[:, np.newaxis, :], len(displacement), axis=1)
+    if machine.path != FREE:
+        most, way = machine.path.limit, path_way(displacement, machine)
+        slides = np.array([a in machine.axis_names and not machine.axis(a).rotary for a in AXES])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = np.abs(displacement) / way[:, np.newaxis]
+        part = np.where((part > 0.0) & slides, part, np.inf)
+        each[0] = np.minimum(each[0], part * most.velocity)
+        each[1] = np.minimum(each[1], part * most.acceleration)
+    return each
 
 
 def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
@@ -103,7 +126,7 @@ def own_times(paths: Paths, machine: Machine) -> tuple[Array, Array]:
 def _own_limits(displacement: Array, machine: Machine) -> Array:
     """Limits of designs over the displacement, shape (3, moves, 9)."""
     with np.errstate(divide="ignore"):
-        V, A, J = limits_of(machine)[:, np.newaxis, :] / np.abs(displacement)
+        V, A, J = limits_of(displacement, machine) / np.abs(displacement)
     # A design's acceleration rises for an interval at least.
     return np.stack([V, A, np.minimum(J, A / machine.interval)])
 

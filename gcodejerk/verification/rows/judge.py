@@ -276,7 +276,7 @@ class _Judge:
     def _check_limits(self) -> None:
         """The extremes of every cubic against the limits."""
         pieces = self.pieces
-        limits = limits_of(self.machine)[:, np.newaxis, :]
+        limits = limits_of(self.displacement, self.machine)[:, pieces.owner]
         u = pieces.turning()
         values = (
             np.maximum(np.abs(pieces.velocity(u)), np.maximum(abs(pieces.v0), abs(pieces.v1))),
@@ -288,7 +288,7 @@ class _Judge:
             excuse = blur if kind is Kind.JERK else np.minimum(blur, MOST_BLUR * limit)
             bad = self.of_piece & (value > limit * (1.0 + WITHIN) + excuse)
             for a in np.flatnonzero(bad.any(axis=0)).tolist():
-                problem = f"{AXES[a]} passes its limit of {limit[0, a]:g} mm, s"
+                problem = f"{AXES[a]} passes its limit of {limit[bad[:, a], a][0]:g} mm, s"
                 self._complain(kind, pieces.owner[bad[:, a]], problem)
 
     def _check_steps(self) -> None:

@@ -343,6 +343,7 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
             start.resume,
             start.spindle,
             start.limits,
+            start.along,
             start.straight,
             (start.rapid_feed.feed, start.rapid_feed.clearance) if start.rapid_feed else None,
         ),

@@ -53,6 +53,7 @@ class Facts:
     resume: str | None = None
     spindle: str | None = None
     limits: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    along: tuple[float, float, float] = (math.inf, math.inf, math.inf)
     straight: bool = True
     rapid_feed: tuple[float, float] | None = None
     """F and least Z of feed moves that count as rapids. [program's units]"""
@@ -410,9 +411,8 @@ class Known:
         return any(on is not False for on in self.frames.values())
 
     def in_plane(self) -> str:
-        """Axes that cutter compensation may displace."""
+        """Axes that cutter compensation may displace; nothing here knows Heidenhain's G20."""
         plane = self.g.get("plane")
-        # Heidenhain's G20 is a plane that nothing here knows.
         return "".join(PLANES[plane][:2]) if plane in PLANES else "XYZUVW"
 
 

@@ -125,6 +125,7 @@ def too_fast(
     moved: Mapping[str, float],
     stated: Mapping[str, tuple[float, float, float]],
     together: bool,
+    along: tuple[float, float, float] = (math.inf, math.inf, math.inf),
 ) -> bool:
     """Whether a straight move may have to be faster than the path is allowed to be.
 
@@ -138,6 +139,8 @@ def too_fast(
         `gcodejerk.start.Start.limits`.
     together : bool
         The axes go in proportion, so that the slowest of them bounds the others.
+    along : tuple of float
+        `gcodejerk.start.Start.along`.
     """
     if not stated:
         return bool(slow)
@@ -149,6 +152,8 @@ def too_fast(
         tops = {axis: stated[axis][WHICH[quantity]] for axis in own}
         if together:
             most = min((tops[axis] * length / abs(way) for axis, way in own.items()), default=0.0)
+            if LINEAR.issuperset(moved):
+                most = min(most, along[WHICH[quantity]])
         else:
             most = math.hypot(*tops.values())
         if limit * (1.0 + 1e-9) < most:

@@ -437,7 +437,8 @@ class Tracker(Circling):
         moved = {axis: self.at[k] - seen.start[k] for k, axis in enumerate(AXES)}
         moved = {a: way for k, (a, way) in enumerate(moved.items()) if seen.axes >> k & 1 and way}
         known = all(way == way for way in moved.values())
-        return known and too_fast(self.slow, moved, self.facts.limits, self.facts.straight)
+        facts = self.facts
+        return known and too_fast(self.slow, moved, facts.limits, facts.straight, facts.along)
 
 
 def _letters(axes: int) -> str:
