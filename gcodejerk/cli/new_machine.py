@@ -70,10 +70,8 @@ def machine_new(
 ) -> None:  # fmt: skip
     """Make a commented machine file from a control's own configuration, or from answers."""
     from gcodejerk.batch.files import new_file
-    from gcodejerk.emit import load_controller
     from gcodejerk.errors import MachineError
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
-    from gcodejerk.nc import AUTO, find_dialect
 
     if output != "-" and os.path.lexists(output) and not force:
         raise MachineError(
@@ -86,10 +84,7 @@ def machine_new(
             "name a control's configuration, or state axes: --axis 'X velocity=36m/min "
             "acceleration=0.4g'; questions are asked at a terminal only"
         )
-    if controller is not None:
-        load_controller(controller)
-    if dialect is not None and dialect != AUTO:
-        find_dialect(dialect)
+    _must_be_known(controller, dialect)
     draft = draft_of(files or (), folder)
     draft.name = name or draft.name
     draft.controller = controller or draft.controller
@@ -110,6 +105,17 @@ def machine_new(
     if as_json:
         print(json.dumps(_record(draft, text, output), indent=1, ensure_ascii=False))
     _say(draft, text, output)
+
+
+def _must_be_known(controller: str | None, dialect: str | None) -> None:
+    """Refuse names of options that nothing bears, before anything is read or asked."""
+    from gcodejerk.emit import load_controller
+    from gcodejerk.nc import AUTO, find_dialect
+
+    if controller is not None:
+        load_controller(controller)
+    if dialect is not None and dialect != AUTO:
+        find_dialect(dialect)
 
 
 def _prove(text: str, name: str, draft: Draft) -> None:

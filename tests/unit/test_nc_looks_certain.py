@@ -540,7 +540,7 @@ def test_a_tolerance_that_holds_in_one_branch_only_makes_the_path_unknown():
     assert read_program(io.BytesIO(data)).rapids.path[-1] == 0
 
 
-CONSTANT = ("ended", "touched", "fixed", "wraps", "limits", "straight", "line", "lost")
+CONSTANT = ("ended", "touched", "fixed", "wraps", "limits", "along", "straight", "line", "lost")
 
 
 def _different(field, k):

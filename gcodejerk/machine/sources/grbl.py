@@ -36,8 +36,14 @@ def is_grbl(text: str) -> bool:
     return {110, 120} <= numbers
 
 
-def read_grbl(text: str, name: str) -> Draft:
-    """What a `$$` dump says; a setting that comes twice counts as it came last."""
+def _settings(text: str, name: str) -> dict[int, tuple[float, str]]:
+    """Every setting's number, with what messages call it.
+
+    Raises
+    ------
+    MachineError
+        A limit of an axis is no number, or none above 0.
+    """
     found: dict[int, tuple[float, str]] = {}
     places: dict[int, Place] = {}
     for match in _SETTING.finditer(text):
@@ -51,6 +57,19 @@ def read_grbl(text: str, name: str) -> Draft:
                 f"write ${match[1]}=5000.000, with a point and without other marks",
                 place,
             )
+    for number, (value, _) in found.items():
+        if 110 <= number < 130 and number in OF_AXES and value <= 0.0:
+            raise MachineError(
+                f"${number} is {value:g}, expected a number above 0",
+                "send $$ again, or mend the dump",
+                places[number],
+            )
+    return found
+
+
+def read_grbl(text: str, name: str) -> Draft:
+    """What a `$$` dump says; a setting that comes twice counts as it came last."""
+    found = _settings(text, name)
     jerks = {k for k in range(len(LETTERS)) if 800 + k in found}
     version = " ".join(m[0] for m in _VERSION.finditer(text)).lower()
     is_hal = "grblhal" in version or bool(jerks) or max(found) >= 300
@@ -62,13 +81,6 @@ def read_grbl(text: str, name: str) -> Draft:
             continue
         axis = draft.axis(letter)
         rate, origin = found[110 + k]
-        for number in (110 + k, 120 + k):
-            if found[number][0] <= 0.0:
-                raise MachineError(
-                    f"${number} is {found[number][0]:g}, expected a number above 0",
-                    "send $$ again, or mend the dump",
-                    places[number],
-                )
         axis.velocity = Fact(rate / SECONDS_PER_MINUTE, f"{origin}, per minute")
         axis.acceleration = Fact(*found[120 + k])
         if 800 + k in found and found[800 + k][0] > 0.0:

@@ -40,14 +40,8 @@ def is_marlin(text: str) -> bool:
     return {"M201", "M203"} <= codes
 
 
-def read_marlin(text: str, name: str) -> Draft:
-    """What a report or a config.g says; what comes twice counts as it came last.
-
-    Raises
-    ------
-    MachineError
-        A word is no number, or the units are inches.
-    """
+def _codes(text: str, name: str) -> tuple[Found, bool]:
+    """Every code with its words and line, and whether they are of RepRapFirmware."""
     found: Found = {}
     for match in _CODE.finditer(text):
         line = text.count("\n", 0, match.start(1)) + 1
@@ -65,6 +59,18 @@ def read_marlin(text: str, name: str) -> Draft:
             "the report is in inches", "send G21, then M503 again",
             Place(name, found["G20"][0][1]),
         )  # fmt: skip
+    return found, rrf
+
+
+def read_marlin(text: str, name: str) -> Draft:
+    """What a report or a config.g says; what comes twice counts as it came last.
+
+    Raises
+    ------
+    MachineError
+        A word is no number, the units are inches, or there are limits for two modes.
+    """
+    found, rrf = _codes(text, name)
     draft = Draft(RRF if rrf else MARLIN, controller="rrf" if rrf else "marlin")
     draft.name = "RepRapFirmware machine" if rrf else "Marlin machine"
     draft.positioning = "linear", "its G0 is a straight line"
@@ -77,13 +83,8 @@ def read_marlin(text: str, name: str) -> Draft:
         speed, own = _last(found, "M203", letter, name), _last(found, "M201", letter, name)
         if speed is None and own is None:
             continue
-        turns = _turns(found, letter) if rrf else None
-        if turns is not None and turns != (letter in ROTARY):
-            draft.notes.append(
-                f"{letter} {'turns' if turns else 'slides'} by M584, and a machine file has "
-                f"{letter} {'in mm' if turns else 'in degrees'}: it is left out, and rapids that "
-                "move it are left alone"
-            )
+        if rrf and (other := _otherwise(found, letter)):
+            draft.notes.append(other)
             continue
         axis = draft.axis(letter)
         if speed is not None:
@@ -138,6 +139,18 @@ def _turns(found: Found, letter: str) -> bool | None:
         if letter in words and words.get("R") in {"0", "1"}:
             return words["R"] == "1"
     return None
+
+
+def _otherwise(found: Found, letter: str) -> str:
+    """A note where M584 makes an axis another kind than its letter says; empty where it does not."""
+    turns = _turns(found, letter)
+    if turns is None or turns == (letter in ROTARY):
+        return ""
+    return (
+        f"{letter} {'turns' if turns else 'slides'} by M584, and a machine file has {letter} "
+        f"{'in mm' if turns else 'in degrees'}: it is left out, and rapids that move it are left "
+        "alone"
+    )
 
 
 def _not_read(draft: Draft, text: str, found: Found, name: str) -> None:
