@@ -142,7 +142,7 @@ def _turns(found: Found, letter: str) -> bool | None:
 
 
 def _otherwise(found: Found, letter: str) -> str:
-    """A note where M584 makes an axis another kind than its letter says; empty where it does not."""
+    """A note where M584 makes an axis of another kind than its letter says; else empty."""
     turns = _turns(found, letter)
     if turns is None or turns == (letter in ROTARY):
         return ""
