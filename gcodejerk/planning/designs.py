@@ -284,7 +284,7 @@ def bounds(task: Task) -> Array:
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     least = np.where(task.objective.weights.any(axis=1), np.nan, 0.0)
     rows = np.nonzero(np.isnan(least))[0]
@@ -324,7 +324,7 @@ def least_residuals(plans: Plans, progress: Progress | None = None, band: float 
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     task = Task.of(plans.machine, plans.modes, plans.share, plans.profile_counts, progress)
     excited = np.zeros((len(plans), len(plans.modes.poles)), dtype=np.int64)

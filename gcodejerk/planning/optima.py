@@ -42,7 +42,7 @@ ARRIVED = 1e-9
 """Error of the end, for the unit length."""
 FEW = 16
 """Fewer problems than this are solved in this process."""
-GENERATION = 2
+GENERATION = 3
 """Counted on whenever the solver answers otherwise: answers of before are not taken."""
 NONE = b"none"
 """In the cache: the problem has no solution."""
@@ -124,7 +124,7 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     require_solver()
     keys = [question.key() for question in questions]

@@ -198,7 +198,7 @@ def test_without_matplotlib_the_remedy_is_named_and_nothing_is_written(run, tmp_
     assert run("-m", "paper", "Z=1", "--json", "c.json")[0] == 0
 
 
-@pytest.mark.parametrize("missing", ["scipy", "clarabel"])
+@pytest.mark.parametrize("missing", ["scipy", "clarabel", "daqp"])
 def test_without_the_solver_the_rest_is_shown_with_the_remedy(run, tmp_path, monkeypatch, missing):
     for name in [n for n in sys.modules if n.split(".")[0] == missing] or [missing]:
         monkeypatch.setitem(sys.modules, name, None)

@@ -101,6 +101,7 @@ FOREIGN = {
     "pyuff": {"identification"},
     "zstandard": {"identification"},
     "clarabel": {"motion"},
+    "daqp": {"motion"},
     "platformdirs": {"planning"},
     "threadpoolctl": {"planning", "motion"},
 }

@@ -33,6 +33,9 @@ WINDOW = 0.15
 FINE, MOST = 0.15, 800
 """Distance of frequencies, times the half of a duration, at which a response is looked at [rad],
 and how many at most: a ramp of a second has more than it can be designed for."""
+GAP, BETWEEN = 1.5, 4
+"""Frequencies farther apart than so many times the usual have something else between them; into how
+many parts the others are cut in search of a narrow."""
 FEWEST = 200
 """Frequencies at which an envelope is looked at, at least."""
 
@@ -100,6 +103,42 @@ def envelope(today: Profiles, omega: Array) -> Array:
     index[:, 1] = np.minimum(index[:, 1] + 1, len(every) - 1)
     largest: Array = np.maximum.reduceat(response, index.ravel())[::2]
     return largest
+
+
+def with_narrows(today: Profiles, omega: Array) -> tuple[Array, Array]:
+    """Frequencies, those between them at which the envelope has a narrow, and the envelope of all.
+
+    Where one of today's peaks leaves the window and the next one enters it, the envelope has a kink
+    that is closer than frequencies are; what is held at both sides of it may exceed it there.
+
+    Parameters
+    ----------
+    today : Profiles
+        One unit profile.
+    omega : ndarray, shape (k,)
+        Ascending. [rad/s]
+
+    Returns
+    -------
+    omega : ndarray, shape (k + n,)
+        [rad/s]
+    envelope : ndarray, shape (k + n,)
+        [1/s]
+    """
+    if len(omega) < 2:
+        return omega, envelope(today, omega)
+    apart = np.diff(omega)
+    close = np.flatnonzero(
+        apart < GAP * np.median(apart)
+    )  # what lies between others is not guarded
+    shares = np.arange(1, BETWEEN) / BETWEEN
+    between = omega[close, np.newaxis] + shares * apart[close, np.newaxis]
+    every = np.union1d(omega, between)
+    bound = envelope(today, every)
+    sides = np.pad(bound, 1, constant_values=np.inf)
+    narrow = (bound < sides[:-2]) & (bound < sides[2:])
+    kept = np.isin(every, omega) | narrow
+    return every[kept], bound[kept]
 
 
 def undamped_response(profile: Profiles, omega: Array) -> Array:

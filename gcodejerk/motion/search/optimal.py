@@ -4,13 +4,12 @@ This module owns the questions that the cone programme of `socp` leaves open for
 
 * *which frequencies*. A mode is known to a relative band only; the residual is a smooth function
   of the frequency, which some points pin down. The programme is solved for a few; where the
-  residual between them is larger, that frequency is added and it is solved again. The same for
-  what `guard` holds down;
-* *which blocks*. Short moves have a jerk of their own in every interval. In long ones most of the
-  optimal jerk is zero, in cruise and at constant acceleration: a first programme with long blocks
-  shows where it is not, and only there are the blocks cut into single intervals. A move with a
-  long cruise is accelerated and braked alike, and only one of the two is designed: what both leave
-  in the worst phase is held down, and frequencies need to be no closer than for one;
+  residual between them is larger, that frequency is added and it is solved again. What `guard`
+  holds down are hundreds of frequencies: there `cutting` adds planes, not cones, and cones are
+  asked only where its solver gives up;
+* *which blocks* (`knots`). A move with a long cruise is accelerated and braked alike, and only one
+  of the two is designed: what both leave in the worst phase is held down, and frequencies need to
+  be no closer than for one;
 * *how good is good enough*. A null of nanometres costs the full jerk; within a residual that does
   not matter the smoothest profile is taken.
 
@@ -26,7 +25,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.motion.search.guard import envelope, guarded_frequencies, split_at_peak
+from gcodejerk.motion.search.cutting import Cutting
+from gcodejerk.motion.search.guard import guarded_frequencies, with_narrows
+from gcodejerk.motion.search.knots import (
+    MOST_REFINED,
+    first_knots,
+    most_blocks,
+    ramp_intervals,
+    ramp_knots,
+    refined_knots,
+)
 from gcodejerk.motion.search.looked_at import Blocks, LookedAt
 from gcodejerk.motion.search.socp import (
     Index,
@@ -41,32 +49,17 @@ Flags = NDArray[np.bool_]
 
 FEWEST_INTERVALS = 3
 """Two cannot begin and end at rest."""
-FULL_INTERVALS = 128
-"""Moves of at most so many intervals have a jerk in each of them."""
-BLOCK = 4
-"""Intervals of a block in the first programme of a longer move, at least."""
-MOST_BLOCKS = 120
-"""Blocks of a half of a move, or of a ramp, in a first programme at most."""
 HALVES = 128
 """Of moves of more intervals, guarded frequencies see acceleration and braking apart."""
-CRUISE_BLOCKS = 16
-"""Blocks of a cruise at most, where acceleration and braking are not taken alike."""
-MOST_REFINED, MOST_GUARDED = 1000, 110
-"""Blocks of a refined programme at most, and of one with guarded frequencies, which are many: those
-of longer moves stay long."""
-RAMP = 2.0
-"""Time that a move with a cruise may take to accelerate, times what it does today."""
-ACTIVE = 0.02
-"""A block counts where its jerk is above this share of the largest."""
-IDLE = 0.5
-"""A frequency below this share of the worst is not asked for again in a finer programme."""
-ROUNDS, COARSE_ROUNDS = 6, 3
-"""Programmes at most, until no frequency between the points is worse than these; and of long blocks
-that are cut afterwards, where there is a guard."""
-WORSE = 1.012
-"""A frequency is added where the residual is this much above that of the points."""
-USED = 0.985
-"""Share of what is allowed that is designed for: between the points it is larger."""
+ROUNDS = 6
+"""Programmes with cones at most, until no frequency between the points is worse than these."""
+MOST_CUTS = 80
+"""Programmes with planes at most."""
+WORSE, BY_PLANES = 1.012, 1.003
+"""A frequency is added where the residual is this much above that of the points; or a plane."""
+USED, USED_BY_PLANES = 0.985, 0.995
+"""Share of what is allowed that is designed for: between the points it is larger; and of planes,
+which are made until that is held everywhere."""
 GUARDED, KEPT = 0.98, 1.005
 """The same of what guarded frequencies may keep; and where these are found to keep it."""
 JERK_COST = 1e-3
@@ -99,7 +92,7 @@ def least_residual(move: Move, reference: float) -> Optimum | None:
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     search = _Search(move, reference)
     return search.optimum(search.null() or search.least(0.0))
@@ -127,7 +120,7 @@ def near_least(move: Move, slack: float, settled: float, reference: float) -> Op
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     search = _Search(move, reference)
     most = settled / search.unit
@@ -158,7 +151,7 @@ def smoothest_within(move: Move, worst: float) -> Optimum | None:
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     search = _Search(move, worst)
     allowed = worst / search.unit
@@ -189,6 +182,7 @@ class _Found:
     active: Flags
     solution: Solution
     left: Array
+    cutting: Cutting | None = None
 
     @property
     def worst(self) -> float:
@@ -225,7 +219,7 @@ class _Search:
         self.total = move.count * move.interval
         # Where one programme had to hold the velocity between its knots, the next will have to.
         self.curved = False
-        self.ramp = self._ramp()
+        self.ramp = ramp_intervals(move)
         self.halves = move.count > HALVES
 
     def null(self) -> _Found | None:
@@ -235,7 +229,7 @@ class _Search:
         if move.band or move.guard or not alone or move.count < FEWEST_INTERVALS:
             return None
         looked_at = self._looked_at(move.count)
-        knots = self._first_knots()
+        knots = first_knots(move.count, self.ramp)
         tried = [self._ramps(looked_at)] if self.ramp else []
         tried.append(self._whole(looked_at, knots))
         if len(knots) <= move.count <= MOST_REFINED:
@@ -259,26 +253,25 @@ class _Search:
             if best is not None and best.meets(allowed):
                 return best
         looked_at = self._looked_at(move.count)
-        knots = self._first_knots()
+        knots = first_knots(move.count, self.ramp)
         finest = len(knots) > move.count
-        rounds = ROUNDS if finest or not move.guard else COARSE_ROUNDS
-        blocks = self._whole(looked_at, knots)
-        first = self._exchanged(looked_at, blocks, allowed, rounds=rounds)
+        first = self._exchanged(looked_at, self._whole(looked_at, knots), allowed)
         best = _better(best, first)
         if finest or (best is not None and best.meets(allowed)):
             return best
         if first is not None:
-            finer = self._whole(looked_at, self._refined(first))
-            found = self._exchanged(looked_at, finer, allowed, _needed(first))
-            return _better(best, found)
-        if move.count > self._most():
+            coarse, jerk = first.blocks, first.solution.jerk
+            cut = refined_knots(coarse.knots, jerk, coarse.mirrored, most_blocks(move))
+            finer = self._whole(looked_at, cut)
+            return _better(best, self._exchanged(looked_at, finer, allowed, first))
+        if move.count > most_blocks(move):
             return best
         every = self._whole(looked_at, np.arange(move.count + 1))
         return _better(best, self._exchanged(looked_at, every, allowed))
 
     def smoother(self, found: _Found, allowed: float) -> _Found:
         """Less jerk on the same blocks, where something is allowed."""
-        other = self._exchanged(found.looked_at, found.blocks, allowed, found.active)
+        other = self._exchanged(found.looked_at, found.blocks, allowed, found)
         return other if other is not None and other.meets(allowed) else found
 
     def optimum(self, found: _Found | None) -> Optimum | None:
@@ -298,7 +291,8 @@ class _Search:
             # Of a whole move its halves are guarded, in which little acts but the ramps.
             duration = min(duration, (self.ramp or 0.5 * move.count) * move.interval)
         omega = guarded_frequencies(self.poles, move.band, move.interval, duration)
-        return looked_at.guarded(omega, move.guard * envelope(move.today, omega))
+        omega, bound = with_narrows(move.today, omega)
+        return looked_at.guarded(omega, move.guard * bound)
 
     def _problem(self, looked_at: LookedAt, blocks: Blocks, active: Flags) -> Problem:
         """The programme for these blocks and groups of frequencies."""
@@ -319,14 +313,20 @@ class _Search:
         )
 
     def _exchanged(
-        self, looked_at: LookedAt, blocks: Blocks, allowed: float, active: Flags | None = None,
-        rounds: int = ROUNDS, enough: bool = False,
+        self, looked_at: LookedAt, blocks: Blocks, allowed: float, start: _Found | None = None,
+        enough: bool = False,
     ) -> _Found | None:  # fmt: skip
         """The least residual for some blocks, frequencies added until none between is worse.
 
-        `enough`: or until it is clear that more than what is allowed is left.
+        `start`: what was found before, of these blocks or of longer ones. `enough`: or until it
+        is clear that more than what is allowed is left.
         """
-        active = looked_at.first if active is None else active
+        if (looked_at.source < 0).any():
+            found = self._cut(looked_at, blocks, allowed, start, enough)
+            if found is not None:
+                return found
+        active = looked_at.first if start is None else start.active
+        rounds = ROUNDS
         cost = JERK_COST if allowed else LEAST_COST
         best: _Found | None = None
         while rounds > 0:
@@ -352,57 +352,58 @@ class _Search:
             active = active | missing
         return best
 
-    def _ramp(self) -> int:
-        """Intervals in which a move with a long cruise accelerates; 0 for others."""
-        move = self.move
-        if move.today is None or move.count <= FULL_INTERVALS:
-            return 0
-        today = float(split_at_peak(move.today)[0].total[0])
-        ramp = int(np.ceil(RAMP * today / move.interval))
-        return ramp if 3 * ramp <= move.count else 0
+    def _cut(
+        self,
+        looked_at: LookedAt,
+        blocks: Blocks,
+        allowed: float,
+        start: _Found | None,
+        enough: bool,
+    ) -> _Found | None:
+        """The same by planes, and then the least jerk for what is allowed, if that is within reach.
+
+        None where the solver gives up. `start` of the same blocks: the jerk is all that is sought.
+        """
+        before = start.cutting if start is not None else None
+        if start is not None and before is not None and start.blocks is blocks:
+            cutting = before
+        else:
+            every = np.ones(len(looked_at.source), dtype=bool)
+            cutting = Cutting(self._problem(looked_at, blocks, every))
+            if before is not None:
+                cutting.begin(before)
+        guarded = looked_at.source < 0
+        owner = blocks.group[np.diff(blocks.cone, prepend=-1) != 0]
+        first = np.flatnonzero(np.diff(owner, prepend=-1))
+        active = looked_at.first.copy()
+        smooth, best = cutting is before, start if cutting is before else None
+        for _ in range(MOST_CUTS):
+            goal = max(USED_BY_PLANES * allowed, best.worst if smooth and best else 0.0)
+            if not cutting.solve(goal, smooth):
+                return best
+            left = np.maximum.reduceat(cutting.left, first)
+            reached = smooth or cutting.bound <= allowed
+            most = allowed if reached else max(BY_PLANES * cutting.bound, NULL)
+            over = left > np.where(guarded, KEPT, most)
+            missing = over & (looked_at.peaks(left) | (guarded & looked_at.sparse))
+            active |= missing
+            if cutting.cut(missing[owner]) and (reached or not enough):
+                continue
+            solution = cutting.solution()
+            best = _Found(looked_at, blocks, active, solution, blocks.left(solution.jerk), cutting)
+            if smooth or (allowed and not reached):
+                break
+            smooth, allowed = True, allowed or (1.0 + LOSS) * max(best.worst, NULL)
+        return best
 
     def _ramps(self, looked_at: LookedAt) -> Blocks:
         """Blocks of the ramps of a move with a long cruise."""
-        block = -(-self.ramp // MOST_BLOCKS)
-        ramp = np.union1d(np.arange(0, self.ramp, block), self.ramp)
-        return Blocks.ramps(looked_at, ramp, self.move.count, self.move.interval)
+        knots = ramp_knots(self.ramp)
+        return Blocks.ramps(looked_at, knots, self.move.count, self.move.interval)
 
     def _whole(self, looked_at: LookedAt, knots: Index) -> Blocks:
         """Blocks of the whole move."""
         return Blocks.whole(looked_at, knots, self.move.interval, self.halves)
-
-    def _first_knots(self) -> Index:
-        """Ends of the blocks of the first programme: all intervals of a short move."""
-        count = self.move.count
-        if count <= FULL_INTERVALS:
-            return np.arange(count + 1)
-        half = self.ramp or count // 2
-        block = max(BLOCK, -(-half // MOST_BLOCKS))
-        first = np.arange(0, half + 1, block)
-        cruise = np.zeros(0, dtype=np.int64)
-        if self.ramp:
-            cruise = np.linspace(half, count // 2, CRUISE_BLOCKS // 2 + 1).astype(np.int64)
-        first = np.union1d(first, cruise)
-        return np.union1d(first, count - first)
-
-    def _most(self) -> int:
-        """Blocks of a refined programme at most."""
-        return MOST_GUARDED if self.move.guard else MOST_REFINED
-
-    def _refined(self, first: _Found) -> Index:
-        """Blocks cut into intervals where the jerk acts, and beside these."""
-        knots, size = first.blocks.knots, np.abs(first.solution.jerk)
-        if first.blocks.mirrored:
-            size = np.maximum(size, size[::-1])
-        beside = np.pad(size, 1)
-        size = np.maximum(size, np.maximum(beside[:-2], beside[2:]))
-        size[[0, -1]] = np.inf
-        # The largest first, as many as there may be.
-        order = np.argsort(-size, kind="stable")
-        order = order[size[order] > ACTIVE * np.abs(first.solution.jerk).max(initial=0.0)]
-        gained = np.cumsum(np.diff(knots)[order] - 1)
-        cut = order[gained + len(size) <= self._most()]
-        return np.unique(np.concatenate([knots, *(np.arange(knots[k], knots[k + 1]) for k in cut)]))
 
 
 def _better(one: _Found | None, other: _Found | None) -> _Found | None:
@@ -410,12 +411,3 @@ def _better(one: _Found | None, other: _Found | None) -> _Found | None:
     if one is None or other is None:
         return one or other
     return other if (other.excess, other.worst) < (one.excess, one.worst) else one
-
-
-def _needed(found: _Found) -> Flags:
-    """The groups that a finer programme begins with: near their limit, and the ends of bands."""
-    source = found.looked_at.source
-    ends = (np.diff(source, prepend=-2) != 0) | (np.diff(source, append=-2) != 0)
-    close = found.left > IDLE * np.where(source < 0, 1.0, found.worst)
-    needed: Flags = found.active & (close | (ends & (source >= 0)))
-    return needed

@@ -81,6 +81,14 @@ class Problem:
     mirrored: bool = False
     cruise: bool = False
 
+    @property
+    def fast(self) -> bool:
+        """Whether the velocity can be in the way.
+
+        Half of the time at full acceleration reaches no more than half of it.
+        """
+        return self.velocity < 0.5 * self.acceleration
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
@@ -105,17 +113,18 @@ class Solution:
 
 
 def require_solver() -> None:
-    """Refuse with the remedy where scipy or clarabel is missing."""
+    """Refuse with the remedy where scipy, clarabel or daqp is missing."""
     try:
         import clarabel
+        import daqp
         import scipy.sparse  # noqa: F401
         import threadpoolctl  # noqa: F401
     except ImportError as error:
         raise PlanError(
-            f"optimal profiles and their bound need scipy and clarabel: {error.name} is missing",
+            f"optimal profiles and their bound need solvers: {error.name} is missing",
             "install them with: pip install 'gcodejerk[science]'",
         ) from None
-    del clarabel
+    del clarabel, daqp
 
 
 def solve(
@@ -143,7 +152,7 @@ def solve(
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     return _solve(problem, allowed, jerk_cost, curved)
 
@@ -164,7 +173,7 @@ def smoothest_null(problem: Problem) -> Solution | None:
     Raises
     ------
     PlanError
-        scipy or clarabel is not installed.
+        scipy, clarabel or daqp is not installed.
     """
     return _solve(problem, None, 1.0, False)
 
@@ -174,7 +183,7 @@ def _solve(
 ) -> Solution | None:
     """Residual and jerk are minimised, or where nothing is allowed the jerk of a null."""
     found = _solve_once(problem, allowed, jerk_cost, curved)
-    if curved or found is None or _Unknowns(problem).keeps_velocity(found.jerk):
+    if curved or found is None or Unknowns(problem).keeps_velocity(found.jerk):
         return found
     return _solve_once(problem, allowed, jerk_cost, True)
 
@@ -187,7 +196,7 @@ def _solve_once(
     import clarabel
     from scipy import sparse
 
-    unknowns = _Unknowns(problem)
+    unknowns = Unknowns(problem)
     response = unknowns.responses()
     rows = _Rows()
     unknowns.motion(rows)
@@ -276,7 +285,7 @@ class _Rows:
         return matrix, np.concatenate(self.bounds)
 
 
-class _Unknowns:
+class Unknowns:
     """Acceleration and velocity at every knot, the peak jerk as a share of its limit, the residual.
 
     Columns of the matrix; -1 stands for what is zero: rest at both ends. Of a mirrored profile
@@ -298,6 +307,8 @@ class _Unknowns:
         zero |= (self.sign == 0) | (image > slopes)
         self.at_a = np.where(zero, -1, self.speeds + image - 1)
         self.a = self.speeds + np.arange(slopes)
+        # The blocks that are not images of others.
+        self.own = slice(0, (blocks + 1) // 2 if self.odd else blocks)
         self.peak = self.speeds + slopes
         self.above = self.peak + 1
 
@@ -321,8 +332,7 @@ class _Unknowns:
 
         `curved`: and between them, where the velocity is a parabola.
         """
-        problem, h, a, sign = self.problem, self.h, self.at_a, self.sign
-        own = slice(0, (len(h) + 1) // 2 if self.odd else len(h))
+        problem, h, a, sign, own = self.problem, self.h, self.at_a, self.sign, self.own
         usable = 1.0 - MARGIN
         for side in (1.0, -1.0):
             share = side / (h[own] * problem.jerk)
@@ -339,8 +349,7 @@ class _Unknowns:
             every.append([(inner, 1.0), (a[1 : self.speeds + 1], behind)])
         for terms in every:
             rows.add([(column, -np.asarray(value)) for column, value in terms], 0.0)
-            # Half of the time at full acceleration reaches no more than this.
-            if problem.velocity < 0.5 * problem.acceleration:
+            if problem.fast:
                 rows.add(terms, problem.velocity * usable)
 
     def keeps_velocity(self, jerk: Array) -> bool:
@@ -362,11 +371,15 @@ class _Unknowns:
             return folded
         return response
 
+    def accelerations(self, x: Array) -> Array:
+        """The acceleration at every knot."""
+        a: Array = self.sign * np.append(x, 0.0)[np.where(self.at_a < 0, len(x), self.at_a)]
+        return a
+
     def solution(self, x: Array, curved: bool, null: bool) -> Solution:
         """The solver's answer, mended to the last digit where it must be exact."""
         problem = self.problem
-        a = self.sign * np.append(x, 0.0)[np.where(self.at_a < 0, len(x), self.at_a)]
-        jerk = np.diff(a) / self.h
+        jerk = np.diff(self.accelerations(x)) / self.h
         # Rest and length: what a jerk does to acceleration, velocity and position at the end.
         ends = np.stack(_moments(self.h))
         correction = self._correction(jerk, np.concatenate([ends, problem.rows]) if null else ends)
