@@ -429,3 +429,40 @@ def test_behind_run_from_line_the_machine_stands_at_the_first_stream(form):
     assert any("does not come next" in message for message in run.messages), run.messages
     assert run.told[2]["position"] == pytest.approx(run.told[3]["position"], abs=1e-9)
     assert run.position[0] == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize("form", [pytest.param(ADAPTIVE, marks=pytest.mark.repeats), POSITION])
+def test_run_from_line_at_the_rapid_of_the_abort_stands_there_too(form):
+    """It was asked for last: it counted as done, and LinuxCNC's own trapezoid ran to its end.
+
+    M152's feeder sees the run some 30 ms after its start, and stops it then.
+    """
+    lines = process(LONG, MACHINE, form=form).output.splitlines()
+    line = lines.index(b"(gcodejerk: G0 X300 Y100 Z-20)") + 1
+    events = [
+        {"do": "abort", **BETWEEN},
+        {"do": "on", "after": 0.4},
+        {"do": "mdi", "text": "G0 X1 Y0 Z0", "after": 0.2},
+        {"do": "run", "line": line, "after": 1.0},
+        {"do": "wait", "after": 1.2},
+        {"do": "abort", "after": 0.0},
+        {"do": "mdi", "text": "G0 X-5", "after": 0.3},
+        {"do": "wait", "after": 0.4},
+    ]
+    _, run = play(LONG, form, events=events)
+    assert_within_limits(run)
+    assert any("does not come next" in message for message in run.messages), run.messages
+    assert run.told[5]["position"] == pytest.approx([1.0, 0.0, 0.0], abs=20.0)
+    assert run.position[0] == pytest.approx(-5.0)
+
+
+def test_samples_are_not_played_from_elsewhere_than_where_they_begin():
+    """The machine file says where programs start; behind a jog the drives went beside the line."""
+    starts = "program: {start: {X: 0, Y: 0, Z: 0}, offsets: {G54: {X: 0, Y: 0, Z: 0}}}\n"
+    machine = Machine.loads(MACHINE_TEXT + starts, "starts.yaml")
+    program = b"G21 G90 G17 G40 G94 G64 G54 G49\nG0 X100 Y50\nG1 X101 F600\nM2\n"
+    _, run = play(program, POSITION, events=operator("G0 X-30"), machine=machine)
+    assert_within_limits(run)
+    assert any("not where the next rapid begins" in message for message in run.messages)
+    assert run.position == pytest.approx((-30.0, 0.0, 0.0))
+    assert positions(run)[:, 1].max() == 0.0
