@@ -298,6 +298,28 @@ def test_a_machine_that_is_switched_off_in_a_stream_stays_where_it_stops(form, o
     assert run.enabled
 
 
+def test_a_machine_that_is_switched_off_as_a_rapid_slows_down_jumps_nowhere():
+    """Braked as the plan brakes, the drives rest as the rapid ends; they jumped back to its start.
+
+    One period decided, so it is switched off again and again.
+    """
+    back = b"G21 G90 G17 G40 G94 G64\nG0 X0 Y0 Z0\nG1 X62 F30000\nG0 X10\nG1 X11\nM2\n"
+    events = []
+    for after in (0.09, 0.095, 0.1, 0.105, 0.11):
+        events += [
+            {"do": "wait", "axis": "X", "beyond": 61.9},
+            {"do": "off", "after": after},
+            {"do": "on", "after": 0.3},
+            {"do": "run", "after": 0.1},
+        ]
+    _, run = play(back, POSITION, events=[*events[:-1], {"do": "wait", "after": 0.3}])
+    assert_within_limits(run)
+    offs = [told["position"][0] for told in run.told if told["do"] == "off"]
+    assert len(offs) == 5
+    assert all(10.1 < x < 60.0 for x in offs), offs
+    assert run.position == pytest.approx(tuple(positions(run)[-1]), abs=1e-6)
+
+
 @pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
 def test_feed_hold_and_override_keep_the_limits_and_the_ends(form):
     events = [
