@@ -488,3 +488,17 @@ def test_samples_are_not_played_from_elsewhere_than_where_they_begin():
     assert any("not where the next rapid begins" in message for message in run.messages)
     assert run.position == pytest.approx((-30.0, 0.0, 0.0))
     assert positions(run)[:, 1].max() == 0.0
+
+
+def test_a_program_that_begins_again_for_ever_relies_on_no_start():
+    """M99 in LinuxCNC's main program; the second pass went back to where the first had begun."""
+    starts = "program: {start: {X: 0, Y: 0, Z: 0}, offsets: {G54: {X: 0, Y: 0, Z: 0}}}\n"
+    machine = Machine.loads(MACHINE_TEXT + starts, "starts.yaml")
+    program = b"G21 G90 G17 G40 G94 G64 G54 G49\nG0 X50\nG1 X51 F6000\nG0 X30\nG1 X31\nM99\n"
+    events = [{"do": "abort", "after": 2.5}, {"do": "wait", "after": 0.3}]
+    result, run = play(program, ADAPTIVE, events=events, machine=machine)
+    assert result.planned == 1
+    q = positions(run)[:, 0]
+    first = int(np.argmax(q > 50.9))
+    assert ((q[first:-1] < 45.0) & (q[first + 1 :] >= 45.0)).sum() >= 2
+    assert q[first:].min() > 29.9
