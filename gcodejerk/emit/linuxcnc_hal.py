@@ -18,9 +18,10 @@ Form `adaptive-feed`: one G1 along the rapid at its peak speed, scaled in every 
 Form `position`: LinuxCNC makes its own G0 unseen, the drives get the samples. ::
 
     G4 P0.005                    the filter behind the planner has come to rest
-    M68 E3 Q[12+1000000*ABS[#[5210+20*#5220]]]
-                                 asks for rapid 12; where the coordinate system is turned (R of
-                                 G10 L2, which the control keeps), for none that there is
+    M68 E3 Q[12+1000000*[ABS[#[5210+20*#5220]]+ABS[#5420-1]]]
+                                 asks for rapid 12; for none that there is where the coordinate
+                                 system is turned (R of G10 L2, which the control keeps), and
+                                 where X is not where the rapid begins
     G0 X10.                      the block's own words
     M66 P3 L3 Q3600              waits until the drives have LinuxCNC's own command again
 
@@ -64,8 +65,11 @@ TINY_FEED = 0.6
 """Their F [mm/min]."""
 REST = 5
 """Periods after which the filter behind the planner is at rest; it has three."""
-UNTURNED = b"1000000*ABS[#[5210+20*#5220]]"
+UNTURNED = b"ABS[#[5210+20*#5220]]"
 """0 where the coordinate system in force is not turned: #5230 is R of G54, #5250 that of G55."""
+WHERE = 5420
+"""Parameter that has X where the program is, in its own unit; Y and Z are the next two."""
+START_DECIMALS = 9
 DECIMALS = 10
 """Of the points in between; LinuxCNC computes in doubles."""
 FEED_DECIMALS = 8
@@ -158,7 +162,8 @@ class LinuxcncHalController(GcodeController):
             notes.append(
                 "run it from its start: behind run-from-line the machine stands still at the first "
                 "stream; feed hold stops at the end of a rapid, abort in it, and then the machine "
-                "has to be switched on again; overrides do nothing to a stream"
+                "has to be switched on again; overrides and the slider of the maximum velocity do "
+                "nothing to a stream"
             )
         return notes
 
@@ -236,13 +241,34 @@ class LinuxcncHalController(GcodeController):
 
 def _position(frame: Frame, batch: Batch) -> list[bytes]:
     """LinuxCNC's own rapid, between asking and waiting."""
+    way = batch.plans.displacement[frame.move]
+    elsewhere = b"+".join([UNTURNED, *_from_start(frame, way)])
     return [
         b"G4 P%g" % (REST * batch.grid.interval),
-        b"M68 E3 Q[%d+%b]" % (frame.move + 1, UNTURNED),
+        b"M68 E3 Q[%d+1000000*[%b]]" % (frame.move + 1, elsewhere),
         frame.last_point({}, b"G0"),
         b"M66 P3 L3 Q3600",
         *frame.after(),
     ]
+
+
+def _from_start(frame: Frame, way: Array) -> list[bytes]:
+    """How far each axis that moves is from where the rapid begins; none in increments.
+
+    The samples are ways from where the drives stand. Where that is not what was relied on (a wrong
+    `program.start`), they would lead along the rapid's line, but beside it.
+    """
+    rapids, move = frame.rapids, frame.move
+    if rapids.incremental[move]:
+        return []
+    unit = MM_PER_INCH if rapids.inch[move] else 1.0
+    out = []
+    for k in np.flatnonzero(way[:3]).tolist():
+        # Where the program has diameters (G7), the parameter has the radius still.
+        start = round(float(rapids.start[move, k]) / unit, START_DECIMALS)
+        less = f"{-Decimal(repr(start)).normalize():+f}" if start else ""
+        out.append(b"ABS[#%d%s]" % (WHERE + k, less.encode()))
+    return out
 
 
 def _number(value: float) -> str:

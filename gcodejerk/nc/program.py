@@ -20,7 +20,14 @@ from gcodejerk.nc.dialects.any_mill import written_for
 from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.elsewhere import Elsewhere, find_elsewhere
-from gcodejerk.nc.flow.outline import find_outline, may_go_back, read_body, refers, seekable
+from gcodejerk.nc.flow.outline import (
+    begins_again,
+    find_outline,
+    may_go_back,
+    read_body,
+    refers,
+    seekable,
+)
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.following_reader import MOST_BYTES, FollowingReader, worth_following
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -187,6 +194,9 @@ def open_reader(
         returns = may_go_back(file, chosen, name)
     if not refers(chosen):
         reader = Reader(name, chosen, start)
+        # What cannot be read twice may say M99 at its end; `process` reads twice, and copies it.
+        if chosen.text.o_word == "flow" and file.seekable() and begins_again(file, name):
+            reader.forget_start(None)
     else:
         file = source = seekable(file)
         origin = source.tell()

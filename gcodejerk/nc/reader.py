@@ -96,9 +96,9 @@ class Reader:
         self.runner.executor.jumps_known = True
         self.runner.call = calls.call
         if outline.repeats:
-            self._forget_start(outline.groups)
+            self.forget_start(outline.groups)
 
-    def _forget_start(self, groups: frozenset[str] | None) -> None:
+    def forget_start(self, groups: frozenset[str] | None) -> None:
         """Forget what the last line may leave to the first one, where the program repeats."""
         state = self.state
         kept = {name: getattr(state, name) for name in MODES}

@@ -298,6 +298,28 @@ def test_a_machine_that_is_switched_off_in_a_stream_stays_where_it_stops(form, o
     assert run.enabled
 
 
+def test_a_machine_that_is_switched_off_as_a_rapid_slows_down_jumps_nowhere():
+    """Braked as the plan brakes, the drives rest as the rapid ends; they jumped back to its start.
+
+    One period decided, so it is switched off again and again.
+    """
+    back = b"G21 G90 G17 G40 G94 G64\nG0 X0 Y0 Z0\nG1 X62 F30000\nG0 X10\nG1 X11\nM2\n"
+    events = []
+    for after in (0.095, 0.1, 0.105):
+        events += [
+            {"do": "wait", "axis": "X", "beyond": 61.9},
+            {"do": "off", "after": after},
+            {"do": "on", "after": 0.3},
+            {"do": "run", "after": 0.1},
+        ]
+    _, run = play(back, POSITION, events=[*events[:-1], {"do": "wait", "after": 0.3}])
+    assert_within_limits(run)
+    offs = [told["position"][0] for told in run.told if told["do"] == "off"]
+    assert len(offs) == 3
+    assert all(10.1 < x < 60.0 for x in offs), offs
+    assert run.position == pytest.approx(tuple(positions(run)[-1]), abs=1e-6)
+
+
 @pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
 def test_feed_hold_and_override_keep_the_limits_and_the_ends(form):
     events = [
@@ -429,3 +451,108 @@ def test_behind_run_from_line_the_machine_stands_at_the_first_stream(form):
     assert any("does not come next" in message for message in run.messages), run.messages
     assert run.told[2]["position"] == pytest.approx(run.told[3]["position"], abs=1e-9)
     assert run.position[0] == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize("form", [pytest.param(ADAPTIVE, marks=pytest.mark.repeats), POSITION])
+def test_run_from_line_at_the_rapid_of_the_abort_stands_there_too(form):
+    """It was asked for last: it counted as done, and LinuxCNC's own trapezoid ran to its end.
+
+    M152's feeder sees the run some 30 ms after its start, and stops it then.
+    """
+    lines = process(LONG, MACHINE, form=form).output.splitlines()
+    line = lines.index(b"(gcodejerk: G0 X300 Y100 Z-20)") + 1
+    events = [
+        {"do": "abort", **BETWEEN},
+        {"do": "on", "after": 0.4},
+        {"do": "mdi", "text": "G0 X1 Y0 Z0", "after": 0.2},
+        {"do": "run", "line": line, "after": 1.0},
+        {"do": "wait", "after": 1.2},
+        {"do": "abort", "after": 0.0},
+        {"do": "mdi", "text": "G0 X-5", "after": 0.3},
+        {"do": "wait", "after": 0.4},
+    ]
+    _, run = play(LONG, form, events=events)
+    assert_within_limits(run)
+    assert any("does not come next" in message for message in run.messages), run.messages
+    assert run.told[5]["position"] == pytest.approx([1.0, 0.0, 0.0], abs=20.0)
+    assert run.position[0] == pytest.approx(-5.0)
+
+
+def test_samples_are_not_played_from_elsewhere_than_where_they_begin():
+    """The machine file says where programs start; behind a jog the drives went beside the line."""
+    starts = "program: {start: {X: 0, Y: 0, Z: 0}, offsets: {G54: {X: 0, Y: 0, Z: 0}}}\n"
+    machine = Machine.loads(MACHINE_TEXT + starts, "starts.yaml")
+    program = b"G21 G90 G17 G40 G94 G64 G54 G49\nG0 X100 Y50\nG1 X101 F600\nM2\n"
+    _, run = play(program, POSITION, events=operator("G0 X-30"), machine=machine)
+    assert_within_limits(run)
+    assert any("not where the next rapid begins" in message for message in run.messages)
+    assert run.position == pytest.approx((-30.0, 0.0, 0.0))
+    assert positions(run)[:, 1].max() == 0.0
+
+
+def test_a_program_that_begins_again_for_ever_relies_on_no_start():
+    """M99 in LinuxCNC's main program; the second pass went back to where the first had begun."""
+    starts = "program: {start: {X: 0, Y: 0, Z: 0}, offsets: {G54: {X: 0, Y: 0, Z: 0}}}\n"
+    machine = Machine.loads(MACHINE_TEXT + starts, "starts.yaml")
+    program = b"G21 G90 G17 G40 G94 G64 G54 G49\nG0 X50\nG1 X51 F6000\nG0 X30\nG1 X31\nM99\n"
+    events = [{"do": "abort", "after": 2.5}, {"do": "wait", "after": 0.3}]
+    result, run = play(program, ADAPTIVE, events=events, machine=machine)
+    assert result.planned == 1
+    q = positions(run)[:, 0]
+    first = int(np.argmax(q > 50.9))
+    assert ((q[first:-1] < 45.0) & (q[first + 1 :] >= 45.0)).sum() >= 2
+    assert q[first:].min() > 29.9
+
+
+@pytest.mark.parametrize(("form", "fastest"), [(ADAPTIVE, 60.0), (POSITION, 500.0)])
+def test_the_slider_of_the_maximum_velocity_acts_as_the_page_says(form, fastest):
+    events = [{"do": "maxvel", "to": 60.0, "after": 0.0}, {"do": "wait", "idle": True}]
+    program = b"G21 G90 G17 G40 G94 G64\nG0 X0 Y0 Z0\nG1 X1 F6000\nG0 X81\nG1 X80\nM2\n"
+    _, run = play(program, form, events=events)
+    assert_within_limits(run)
+    highest = steps(run)[0]
+    assert 0.8 * fastest < highest <= 1.001 * fastest
+    assert run.position == pytest.approx((80.0, 0.0, 0.0))
+
+
+STOPS = b"""G21 G90 G17 G40 G94 G64
+G0 X0 Y0 Z0
+G1 X1 F600
+G0 X30 Y10
+M0
+G0 X0 Y5
+M1
+G0 X20
+M60
+G0 X0 Y0 Z-3
+G1 X1 F600
+M30
+"""
+
+
+@pytest.mark.repeats
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_streams_behind_stops_are_played_as_planned(form):
+    events = [{"do": "optional_stop", "to": 1, "after": 0.0}]
+    events += [{"do": "resume", "after": 0.8}] * 3
+    result, run = play(STOPS, form, events=[*events, {"do": "wait", "idle": True}])
+    assert result.planned == 4
+    assert_within_limits(run)
+    assert all(off <= 2e-3 for off, *_ in judge(result, run))
+
+
+@pytest.mark.repeats
+@pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
+def test_single_step_goes_through_a_stream_as_the_page_says(form):
+    """In the form adaptive-feed nothing is queued behind the rapid: half of the acceleration."""
+    events = [{"do": "pause", "after": 0.0}]
+    events += [{"do": "step", "after": 0.3} for _ in range(6)]
+    events += [{"do": "resume", "after": 0.2}, {"do": "wait", "idle": True}]
+    program = b"G21 G90 G17 G40 G94 G64\nG0 X0 Y0 Z0\nG1 X1 F6000\nG0 X31 Y10\nG1 X30\nM2\n"
+    result, run = play(program, form, events=events)
+    assert_within_limits(run)
+    assert run.position == pytest.approx((30.0, 10.0, 0.0))
+    if form == POSITION:
+        assert all(off <= 1e-9 for off, *_ in judge(result, run))
+    else:
+        assert steps(run)[1] <= 0.5 * ACCELERATION * 1.01

@@ -154,10 +154,25 @@ def test_verify_says_what_became_of_the_file_of_samples(damage, says):
 def test_samples_of_ways_are_asked_for_where_no_coordinate_system_is_turned():
     """R of G54 is kept by the control: the drives would go along the unturned way."""
     output, beside = pair("position")
-    asks = b"M68 E3 Q[3+1000000*ABS[#[5210+20*#5220]]]"
+    asks = b"M68 E3 Q[3+1000000*[ABS[#[5210+20*#5220]]]]"
     assert output.count(asks) == 1
     found = judged(output.replace(asks, b"M68 E3 Q3"), beside).violations
     assert any(f"expected '{asks.decode()}'" in v.problem for v in found), found
+
+
+def test_samples_are_asked_for_where_the_machine_stands_at_their_start():
+    """An absolute rapid says where its axes begin; one in increments begins where it stands."""
+    inches = PROGRAM.replace(b"G0 X100", b"G0 X100\nG20\nG0 X1.5")
+    output, beside = pair("position", inches)
+    asks = [line for line in output.splitlines() if line.startswith(b"M68 E3 Q[")]
+    turned = b"000000*[ABS[#[5210+20*#5220]]"
+    assert asks[0] == b"M68 E3 Q[2+1" + turned + b"+ABS[#5420-1]+ABS[#5422]]]"
+    assert asks[2] == b"M68 E3 Q[4+1" + turned + b"]]"
+    assert asks[4] == b"M68 E3 Q[6+1" + turned + b"+ABS[#5420-3.937007874]]]"
+    assert judged(output, beside, inches).ok
+    for wrong in (b"", b"+ABS[#5420-2]", b"+ABS[#5421-1]", b"+ABS[#5420-1]]*[0"):
+        found = judged(output.replace(b"+ABS[#5420-1]", wrong), beside, inches).violations
+        assert any("expected 'M68 E3 Q[2" in v.problem for v in found), (wrong, found)
 
 
 BOTH = (

@@ -218,6 +218,7 @@ def test_a_configuration_that_does_not_fit_is_refused_and_left_alone(config, nam
         ("sim.ini", "BASE_PERIOD = 0", "BASE_PERIOD = 30000", "no multiple of BASE_PERIOD"),
         ("sim.ini", "[JOINT_1]", "[JOINT_1]\nBACKLASH = 0.02", "JOINT_1. BACKLASH is 0.02"),
         ("sim.ini", "[JOINT_2]", "[JOINT_2]\nCOMP_FILE = z.comp", "COMP_FILE is z.comp"),
+        ("sim.ini", "[AXIS_X]", "[AXIS_X]\nOFFSET_AV_RATIO = 0.1", "OFFSET_AV_RATIO is 0.1"),
     ],
 )
 def test_the_form_position_needs_more(config, name, old, new, says):

@@ -238,3 +238,24 @@ def test_the_keys_are_written_back():
     machine = Machine.loads(MACHINE)
     assert Machine.loads(machine_yaml(machine)).program == machine.program
     assert machine.program.m_after == ("M5", "M9")
+
+
+# --- programs that begin again ---
+
+
+@pytest.mark.parametrize(
+    ("end", "first"),
+    [
+        (b"M2", None),
+        (b"M99", UNKNOWN),
+        (b"m0 99 (again)", UNKNOWN),
+        (b"M2 (M99)", None),
+        (b"M2 ; M99", None),
+        (b"M990", None),
+    ],
+)
+def test_a_program_of_linuxcnc_that_begins_again_begins_nowhere_known(end, first):
+    text = b"G21 G90 G17 G40 G94 G54 G49\nG0 X5\nG1 X6 F100\nG0 X9\n" + end + b"\n"
+    known = {"positions": HOME, "offsets": OFFSETS}
+    why, _ = read(text, "linuxcnc", **known)
+    assert why == [first, None]

@@ -62,8 +62,8 @@ net gcodejerk-same-{n} gcodejerk-same-{n}.out => gcodejerk-equal.in-{k}
 net gcodejerk-there-{n} gcodejerk-there-{n}.out => gcodejerk-arrived.in-{k}
 """
 _ORDER = """
-next done depth full type on runs start play advance streamer.0 blocked finished idle left late
-stopped brake hold @start-N @goal-N @there-N arrived way speed clear share rest
+next done depth full type on waits runs start play advance streamer.0 blocked finished idle left
+late stopped brake hold @start-N @goal-N @there-N arrived way speed clear share rest
 @part-N @played-N @same-N equal release fault lost good @drive-N @off-N @seen-N @honest-N
 """
 

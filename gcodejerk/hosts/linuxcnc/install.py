@@ -37,6 +37,7 @@ MEASURED = "2.9"
 """The version of LinuxCNC in which all this was played."""
 _OWN = re.compile(rb"# gcodejerk install ([a-z-]+) sum:([0-9a-f]{16})\n")
 _LEAST_IO = 4
+_ZERO = re.compile(r"[-+]?(?:0*\.?0*|0+\.?0*[eE].*)")
 """Inputs and outputs that motmod has unless told otherwise; number 3 is used."""
 
 
@@ -361,6 +362,7 @@ def _joints(ini: Ini, hal: Hal) -> tuple[int, list[hal_files.Joint]]:
             continue
         joint = letters.index(letter)
         _check_uncompensated(ini, joint)
+        _check_no_offset(ini, letter)
         signals = []
         for pin in (f"joint.{joint}.motor-pos-cmd", f"joint.{joint}.motor-pos-fb"):
             if pin not in hal.signal:
@@ -380,12 +382,25 @@ def _check_uncompensated(ini: Ini, joint: int) -> None:
     """Refuse a joint whose motor LinuxCNC itself leads elsewhere than its axis says."""
     for key in ("BACKLASH", "COMP_FILE"):
         for entry in ini.all(f"JOINT_{joint}", key):
-            if re.fullmatch(r"[-+]?(?:0*\.?0*|0+\.?0*[eE].*)", entry.value.split("#")[0].strip()):
+            if _ZERO.fullmatch(entry.value.split("#")[0].strip()):
                 continue
             raise EmitError(
                 f"[JOINT_{joint}] {key} is {entry.value}: what LinuxCNC adds to the motor's "
                 "position is not in the samples, and the machine would switch off behind a rapid",
                 "use --form adaptive-feed, in which LinuxCNC compensates as ever",
+                ini.place(entry.line),
+            )
+
+
+def _check_no_offset(ini: Ini, letter: str) -> None:
+    """Refuse an axis that something else may move while a rapid is played."""
+    for entry in ini.all(f"AXIS_{letter}", "OFFSET_AV_RATIO"):
+        if not _ZERO.fullmatch(entry.value.split("#")[0].strip()):
+            raise EmitError(
+                f"[AXIS_{letter}] OFFSET_AV_RATIO is {entry.value}: an external offset that "
+                "changes while a rapid is played is not in the samples, and the machine would "
+                "switch off behind it",
+                "use --form adaptive-feed, in which LinuxCNC adds it as ever",
                 ini.place(entry.line),
             )
 

@@ -30,6 +30,7 @@ _REFERS = re.compile(rb"GOTO|REPEAT|CASE|M[ \t]*0*9[69]")
 _FLOW = re.compile(
     rb"(?<![A-Z0-9_])(?:GOTO|IF|WHILE|REPEAT|RPT|LOOP|FOR|CASE|UNTIL|GOSUB|CALL)(?![A-Z_])", re.I
 )
+_M99 = re.compile(rb"M[ \t0]*9[ \t]*9(?![0-9.])", re.IGNORECASE)
 _REMARK = re.compile(rb";[^\n]*")
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 _G_CODE = re.compile(rb"[gG][ \t]*([0-9]+(?:\.[0-9]*)?)")
@@ -102,6 +103,20 @@ def may_go_back(file: BinaryIO, dialect: Dialect, name: str) -> bool:
         data = data if text.parentheses == "code" else _COMMENT.sub(b" ", data)
         if found := _FLOW.search(data) is not None:
             break
+    file.seek(begin)
+    return found
+
+
+def begins_again(file: BinaryIO, name: str) -> bool:
+    """Whether a program with O-words may go back to its beginning: LinuxCNC's M99 does, for ever.
+
+    In a subprogram it only returns; which of both it is, is not asked.
+    """
+    begin = file.tell()
+    found = any(
+        _M99.search(chunk.data) and _M99.search(_COMMENT.sub(b" ", chunk.data))
+        for chunk in read_chunks(file, name)
+    )
     file.seek(begin)
     return found
 

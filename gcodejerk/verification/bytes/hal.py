@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import BinaryIO
 
+from gcodejerk.axes import AXES
+from gcodejerk.units import MM_PER_INCH
 from gcodejerk.verification.bytes.alignment import Alignment
 from gcodejerk.verification.bytes.form import Stream, StreamReader
 from gcodejerk.verification.bytes.modes import read_words
@@ -27,6 +29,7 @@ PIECE = 1 << 20
 REST = 5
 """Periods for which LinuxCNC's filter is given to come to rest."""
 _HEAD = re.compile(rb"gcodejerk streams 1 ([a-z-]{1,20}) ([0-9.e-]{1,25})\n")
+_PLACES = re.compile(rb"\+ABS\[#(542[0-2])([+-][0-9]{1,9}(?:\.[0-9]{1,9})?)?\]")
 _TINY = (0, 1, None, 0, 1, 0)
 """Motion codes of the lines of the form `adaptive-feed`; None: the line that asks."""
 
@@ -184,13 +187,40 @@ class HalReader(StreamReader):
         self.modes.motion, self.modes.feed = 0, None
         return points if self._tail() else None
 
+    def _asks(self) -> bool:
+        """Pass the request for the samples, which are ways of X, Y and Z from where they begin.
+
+        It has to miss the rapid's number where a turned coordinate system would turn them (R of the
+        nine: #5230, #5250 to #5390), and where the machine stands elsewhere by half of 1e-6.
+        """
+        line, rapids, i = self.peek(), self.rapids, self.i
+        begin = b"M68 E3 Q[%d+1000000*[ABS[#[5210+20*#5220]]" % (i + 1)
+        unit = MM_PER_INCH if rapids.inch[i] else 1.0
+        axes = [] if rapids.incremental[i] else sorted(self.allowed.axes & {*"XYZ"})
+        places = _PLACES.findall(line[len(begin) :])
+        starts = {letter: float(rapids.start[i, AXES.index(letter)]) / unit for letter in axes}
+        wanted = [(b"%d" % (5420 + "XYZ".index(letter)), at) for letter, at in starts.items()]
+        good = (
+            line == begin + b"".join(b"+ABS[#%b%b]" % place for place in places) + b"]]"
+            and [axis for axis, _ in places] == [axis for axis, _ in wanted]
+            and all(
+                abs(float(less or b"0") + at) <= 1e-9 + 1e-12 * abs(at)
+                for (_, less), (_, at) in zip(places, wanted, strict=True)
+            )
+        )
+        if not good:
+            signed = [(axis.decode(), f"{-at:+.10g}" if at else "") for axis, at in wanted]
+            where = "".join(f"+ABS[#{axis}{less}]" for axis, less in signed)
+            shown = line[:120].decode("latin-1")
+            self.complain(Kind.FORM, f"expected '{begin.decode()}{where}]]', found '{shown}'")
+            return False
+        self.last(more=True)
+        return True
+
     def _position(self) -> list[dict[str, Decimal]] | None:
         """LinuxCNC's own rapid, between asking and waiting."""
         rest = b"G4 P%g" % (REST * self.interval)
-        # The samples are ways of X, Y and Z, which a turned coordinate system would turn: the
-        # request has to miss the rapid's number there. R of the nine: #5230, #5250 to #5390.
-        asks = b"M68 E3 Q[%d+1000000*ABS[#[5210+20*#5220]]]" % (self.i + 1)
-        if not self.exactly(rest) or not self.exactly(asks):
+        if not self.exactly(rest) or not self._asks():
             return None
         numbers = self._motion(0)
         if numbers is None:
