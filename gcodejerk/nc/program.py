@@ -194,9 +194,10 @@ def open_reader(
         returns = may_go_back(file, chosen, name)
     if not refers(chosen):
         reader = Reader(name, chosen, start)
-        # What cannot be read twice may say M99 at its end; `process` reads twice, and copies it.
-        if chosen.text.o_word == "flow" and file.seekable() and begins_again(file, name):
-            reader.forget_start(None)
+        if chosen.text.o_word == "flow" and (start.positions or start.startup):
+            file = seekable(file)
+            if begins_again(file, name):
+                reader.forget_start(None)
     else:
         file = source = seekable(file)
         origin = source.tell()

@@ -4,6 +4,7 @@ The second reading has to confirm every rapid that is certain.
 """
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -257,5 +258,10 @@ def test_the_keys_are_written_back():
 def test_a_program_of_linuxcnc_that_begins_again_begins_nowhere_known(end, first):
     text = b"G21 G90 G17 G40 G94 G54 G49\nG0 X5\nG1 X6 F100\nG0 X9\n" + end + b"\n"
     known = {"positions": HOME, "offsets": OFFSETS}
-    why, _ = read(text, "linuxcnc", **known)
+    why, rapids = read(text, "linuxcnc", **known)
     assert why == [first, None]
+    # The second reading says so by itself.
+    start = Start(startup=STARTUP, spindle="mill", **known)
+    believed = replace(rapids, reason=rapids.reason * 0 + CERTAIN)
+    found = Findings(9)
+    assert confirm(io.BytesIO(text), "linuxcnc", start, believed, [0], found) == (first is None)

@@ -27,7 +27,8 @@ from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.elsewhere import lines_behind
 from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
-from gcodejerk.verification.second_reading.reading import Line, Text, jumps_back, pieces
+from gcodejerk.verification.second_reading.looking import begins_again, jumps_back
+from gcodejerk.verification.second_reading.reading import Line, Text, pieces
 from gcodejerk.verification.second_reading.routes import LostError, calls, flows
 from gcodejerk.verification.second_reading.straight import Column, PlainLines, Straight, follow
 from gcodejerk.verification.second_reading.tracking import Tracker
@@ -228,8 +229,7 @@ def observations(
     """
     dialect = dialect.set_up(start)
     begin = original.tell()
-    doubt = jumps_back(original, dialect)
-    original.seek(begin)
+    doubt, again = jumps_back(original, dialect), begins_again(original, dialect)
     decimals = dialect.whole_numbers == "machine" and start.decimal_point != "calculator"
     stepper = Stepper(Text(dialect, decimals), dialect)
     seen = _as_it_flows(original, dialect, start, stepper)
@@ -238,6 +238,8 @@ def observations(
         return
     tracker = _begin(stepper.text, dialect, start)
     tracker.doubt = doubt
+    if again:
+        tracker.forget()
     if dialect.dark_rapids and start.spindle == "mill" and lines:
         tracker.dark = _behaves_like_a_laser(original, dialect, start)
         original.seek(begin)

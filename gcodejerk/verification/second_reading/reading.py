@@ -50,14 +50,6 @@ _FILE_NAME = re.compile(rb"(?:\$[\w-]*|[A-Z_][\w-]*)\.[A-Z]{1,5}%?")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*$")
 _NAME = re.compile(rb"([A-Z_][A-Z_][A-Z0-9_]*)([ \t]*\((?:[^()\"]|\"[^\"]*\")*\))?")
 _PARAMETER = re.compile(rb"R[0-9]+[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;]*")
-_JUMPS = re.compile(rb"(?:GOTO|DO)[ \t]*[0-9#\[]|WHILE[ \t]*\[", re.IGNORECASE)
-_NAMED_JUMPS = re.compile(rb"\b(?:GOTO[FBCS]?|WHILE|REPEATB?|UNTIL|LOOP|FOR|CASE)\b", re.IGNORECASE)
-"""What may lead back to a line that was read before."""
-_TEXTS = re.compile(rb"\([ \t]*(?![ \t]*(?:GOTO|IF|CALL|RPT)\b)[^()\n]*\)|;.*", re.IGNORECASE)
-_FLOW = re.compile(
-    rb"\b(?:GOTO|IF|WHILE|REPEAT|RPT|LOOP|FOR|CASE|UNTIL|GOSUB|CALL)(?![A-Z_])", re.IGNORECASE
-)
-"""The same where the words of flow are not known, behind which comments are left out."""
 _PADDED = re.compile(rb"(?<![A-Z_])[GM](?:[ \t]|0[0-9])", re.IGNORECASE)
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
@@ -425,14 +417,3 @@ def pieces(file: BinaryIO) -> Iterator[bytes]:
             rest += piece
     if rest:
         yield rest
-
-
-def jumps_back(file: BinaryIO, dialect: Dialect) -> bool:
-    """Whether a program may come to a line twice, by a jump rather than by an O word."""
-    named = dialect.text.names and dialect.text.variables == "R"
-    if dialect.unknown_lasts and dialect.text.names and not dialect.one_command:
-        return any(_FLOW.search(_TEXTS.sub(b"", piece)) for piece in pieces(file))
-    if not dialect.text.keywords and not named:
-        return False
-    jumps = _NAMED_JUMPS if named else _JUMPS
-    return any(jumps.search(piece) for piece in pieces(file))
