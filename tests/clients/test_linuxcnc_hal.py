@@ -434,6 +434,20 @@ def test_a_feeder_that_dies_stops_the_machine_in_front_of_the_next_rapid(form):
     assert run.position == pytest.approx((280.0, 100.0, -20.0), abs=1e-4)
 
 
+def stopped_in_front(form, events):
+    """A run that stops in front of a rapid with its message; behind an abort MDI moves all else."""
+    leaves = [
+        {"do": "abort", "after": 0.0},
+        {"do": "mdi", "text": "G0 X-5", "after": 0.3},
+        {"do": "wait", "after": 0.4},
+    ]
+    _, run = play(LONG, form, events=[*events, *leaves])
+    assert_within_limits(run)
+    assert any("does not come next" in message for message in run.messages), run.messages
+    assert run.position[0] == pytest.approx(-5.0)
+    return run
+
+
 @pytest.mark.parametrize("form", [ADAPTIVE, POSITION])
 def test_behind_run_from_line_the_machine_stands_at_the_first_stream(form):
     lines = process(LONG, MACHINE, form=form).output.splitlines()
@@ -442,15 +456,9 @@ def test_behind_run_from_line_the_machine_stands_at_the_first_stream(form):
         {"do": "abort", "after": 0.0},
         {"do": "run", "line": line, "after": 0.4},
         {"do": "wait", "after": 1.5},
-        {"do": "abort", "after": 0.0},
-        {"do": "mdi", "text": "G0 X-5", "after": 0.3},
-        {"do": "wait", "after": 0.4},
     ]
-    _, run = play(LONG, form, events=events)
-    assert_within_limits(run)
-    assert any("does not come next" in message for message in run.messages), run.messages
+    run = stopped_in_front(form, events)
     assert run.told[2]["position"] == pytest.approx(run.told[3]["position"], abs=1e-9)
-    assert run.position[0] == pytest.approx(-5.0)
 
 
 @pytest.mark.parametrize("form", [pytest.param(ADAPTIVE, marks=pytest.mark.repeats), POSITION])
@@ -467,15 +475,9 @@ def test_run_from_line_at_the_rapid_of_the_abort_stands_there_too(form):
         {"do": "mdi", "text": "G0 X1 Y0 Z0", "after": 0.2},
         {"do": "run", "line": line, "after": 1.0},
         {"do": "wait", "after": 1.2},
-        {"do": "abort", "after": 0.0},
-        {"do": "mdi", "text": "G0 X-5", "after": 0.3},
-        {"do": "wait", "after": 0.4},
     ]
-    _, run = play(LONG, form, events=events)
-    assert_within_limits(run)
-    assert any("does not come next" in message for message in run.messages), run.messages
+    run = stopped_in_front(form, events)
     assert run.told[5]["position"] == pytest.approx([1.0, 0.0, 0.0], abs=20.0)
-    assert run.position[0] == pytest.approx(-5.0)
 
 
 def test_samples_are_not_played_from_elsewhere_than_where_they_begin():

@@ -214,12 +214,12 @@ def _accelerations(motion: _Motion, machine: Machine, lasts: Array) -> list[tupl
     h = np.where(inner & (lasts > 0.0), lasts, 1.0)
     rise = np.where(inner, (motion.after - motion.before) / h, 0.0)
     step = 2.0 * paths.step[paths.owner, 0] / h**2
-    limits = limits_of(paths.displacement, machine)[:, paths.owner]
+    limits = limits_of(paths.displacement, machine)
     for axis in machine.axes:
         a = AXES.index(axis.name)
         share = np.abs(delta[:, a]) / np.where(motion.length > 0.0, motion.length, 1.0)
         most = options.max_acceleration.get(axis.name, OVER * axis.limit.acceleration)
-        each = np.minimum(most, OVER * limits[1, :, a])
+        each = np.minimum(most, OVER * limits[1, paths.owner, a])
         fast = inner & (np.abs(rise) * share > each * (1.0 + RELATIVE) + step)
         least = each[fast].min(initial=most)
         problem = f"{axis.name} passes {least:g} mm/s^2, the least that MAX_ACCELERATION may be"

@@ -229,7 +229,8 @@ def observations(
     """
     dialect = dialect.set_up(start)
     begin = original.tell()
-    doubt, again = jumps_back(original, dialect), begins_again(original, dialect)
+    doubt = jumps_back(original, dialect)
+    again = bool(start.positions or start.startup) and begins_again(original, dialect)
     decimals = dialect.whole_numbers == "machine" and start.decimal_point != "calculator"
     stepper = Stepper(Text(dialect, decimals), dialect)
     seen = _as_it_flows(original, dialect, start, stepper)
