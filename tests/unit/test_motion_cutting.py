@@ -11,7 +11,7 @@ from gcodejerk.motion.search.looked_at import Blocks, LookedAt
 from gcodejerk.motion.search.optimal import least_residual, near_least
 from gcodejerk.motion.search.socp import Problem, residuals, solve
 
-ENOUGH, CLOSE = 60, 1e-3
+ENOUGH, CLOSE, NOTHING, KEPT, EXPECTED = 80, 3e-3, 1e-4, 3e-4, 0.015
 
 
 def problem_of(move, knots=None, cap=None, velocity=None):
@@ -34,8 +34,10 @@ def by_planes(problem, allowed, smooth, cutting=None):
     cutting = cutting or Cutting(problem)
     for _ in range(ENOUGH):
         assert cutting.solve(allowed, smooth)
-        most = np.where(np.isnan(problem.cap), max(allowed, cutting.bound), problem.cap)
-        if not cutting.cut(cutting.left > most * (1.0 + CLOSE)):
+        most = max(allowed, cutting.expected)
+        most += max(CLOSE * most, NOTHING)
+        most = np.where(np.isnan(problem.cap), most, (1.0 + KEPT) * problem.cap)
+        if not cutting.cut(cutting.left > most) and cutting.settled:
             return cutting
     raise AssertionError("planes without an end")
 
@@ -62,8 +64,8 @@ def test_the_least_by_planes_is_that_of_the_cones():
         cones = solve(problem, 0.0, 1e-9)
         cutting = by_planes(problem, 0.0, False)
         solution = cutting.solution()
-        assert cutting.bound == pytest.approx(cones.worst, rel=2 * CLOSE, abs=1e-6)
-        assert solution.worst == pytest.approx(cones.worst, rel=2 * CLOSE, abs=1e-6)
+        assert cutting.expected == pytest.approx(cones.worst, rel=EXPECTED, abs=2 * NOTHING)
+        assert solution.worst == pytest.approx(cones.worst, rel=2 * CLOSE, abs=2 * NOTHING)
         assert solution.worst == pytest.approx(residuals(problem, solution.jerk).max())
         assert keeps_limits(problem, solution.jerk)
 
@@ -93,8 +95,8 @@ def test_what_has_a_cap_keeps_it():
         cutting = by_planes(problem, 0.0, False)
         left = residuals(problem, cutting.solution().jerk)
         has = ~np.isnan(problem.cap)
-        assert np.all(left[has] <= problem.cap[has] * (1.0 + 2 * CLOSE))
-        assert left[~has].max() == pytest.approx(cones.worst, rel=2 * CLOSE, abs=1e-6)
+        assert np.all(left[has] <= problem.cap[has] * (1.0 + 2 * KEPT))
+        assert left[~has].max() == pytest.approx(cones.worst, rel=2 * CLOSE, abs=2 * NOTHING)
         capped += 1
     assert capped > 3
 
@@ -111,7 +113,7 @@ def test_a_speed_that_is_in_the_way_is_held_between_the_knots_too():
             continue
         solution = by_planes(problem, 0.0, False).solution()
         assert keeps_limits(problem, solution.jerk)
-        assert solution.worst == pytest.approx(cones.worst, rel=2 * CLOSE, abs=1e-6)
+        assert solution.worst == pytest.approx(cones.worst, rel=2 * CLOSE, abs=2 * NOTHING)
         held += problem.velocity < fastest
     assert held > 4
 
@@ -124,10 +126,9 @@ def test_where_it_begins_does_not_matter():
             longer = np.arange(move.count + 1)
         begun = Cutting(problem)
         begun.begin(by_planes(problem_of(move, longer), 0.0, False))
-        cold = by_planes(problem, 0.0, False).bound
-        assert by_planes(problem, 0.0, False, begun).bound == pytest.approx(
-            cold, rel=2 * CLOSE, abs=1e-6
-        )
+        cold = by_planes(problem, 0.0, False).solution().worst
+        warm = by_planes(problem, 0.0, False, begun).solution().worst
+        assert warm == pytest.approx(cold, rel=2 * CLOSE, abs=2 * NOTHING)
 
 
 def test_where_the_solver_gives_up_cones_are_asked(monkeypatch):
@@ -144,9 +145,10 @@ def test_where_the_solver_gives_up_cones_are_asked(monkeypatch):
 def test_where_it_gives_up_on_less_jerk_what_leaves_the_least_is_kept(monkeypatch):
     real = daqp.solve
 
-    def no_smoothing(square, cost, *rest, **more):
-        x, least, status, info = real(square, cost, *rest, **more)
-        return x, least, -2 if cost[-2] else status, info
+    def no_smoothing(square, cost, rows, *rest, **more):
+        x, least, status, info = real(square, cost, rows, *rest, **more)
+        # Behind one row or two for the ends, the peak jerk that is sought holds that of a block.
+        return x, least, -2 if rows[2, -1] else status, info
 
     move = next(drawn(1, seed=9))
     least = least_residual(move, today_of(move))
@@ -169,6 +171,5 @@ def test_modes_that_count_together_are_cut_together():
     )  # fmt: skip
     assert len(np.unique(np.bincount(problem.group)[np.unique(problem.group)])) > 1
     cones = solve(problem, 0.0, 1e-9)
-    assert by_planes(problem, 0.0, False).bound == pytest.approx(
-        cones.worst, rel=2 * CLOSE, abs=1e-6
-    )
+    left = by_planes(problem, 0.0, False).solution().worst
+    assert left == pytest.approx(cones.worst, rel=2 * CLOSE, abs=2 * NOTHING)

@@ -1,17 +1,19 @@
 r"""The cone programme of `socp` by planes: many frequencies, few blocks.
 
 A guarded optimum has hundreds of cones, of which some tens matter, and it is not known which. This
-module owns a linear programme in which each cone that was found to be exceeded is cut by the plane
-that touches it where it was: one more row for each, the solution before it being where the next one
-begins. Neither frequencies nor phases that do not matter cost anything, while an interior-point
-solver begins anew whenever one is added.
+module owns a programme in which each cone that was found to be exceeded is cut by the plane that
+touches it where it was: one more row for each. Neither frequencies nor phases that do not matter
+cost anything, while an interior-point solver begins anew whenever one is added.
 
-The solver is daqp, whose dual active set takes rows that are added to a solved programme as its
-next steps. It works on dense matrices, so this is for few blocks: some hundred take about 30
-microseconds a step.
+The least of a linear programme jumps from corner to corner of the planes that there are. So every
+step costs its square, too (a proximal bundle method: Kiwiel, Mathematical Programming 46, 1990):
+nearer steps need fewer planes and far fewer changes of what is held. Once the planes say well what
+a step leaves, or nothing is exceeded, longer steps are let.
 
-Rule 1: the least of the programme with planes is a lower bound of that with cones; how good a
-profile is says what it leaves, not the programme (`optimal` measures it).
+The solver is daqp, whose dual active set begins with the rows that were held before. It works on
+dense matrices, so this is for few blocks: some hundred take about 10 microseconds a change.
+
+Rule 1: how good a profile is says what it leaves, not the programme (`optimal` measures it).
 Rule 2: whatever the solver does not call solved is no solution, and says nothing else: who asked
 goes to the solver for cones.
 """
@@ -27,14 +29,25 @@ from gcodejerk.motion.search.socp import MARGIN, Problem, Solution, Unknowns, re
 Flags = NDArray[np.bool_]
 
 UNIT = 0.2
-"""Of accelerations as the solver sees them: how many steps it takes depends on it, by a third."""
+"""Of accelerations as the solver sees them: what a step costs is its square in this unit."""
+FIRST, LAST = 1e-4, 1e-6
+"""What a step costs at first, over half of its square; and at least."""
+GOOD, LONGER = 1.1, 0.3
+"""Where cones are left with no more than this times what planes say, steps cost so much less."""
+LONG = 0.1
+"""And so much less where nothing is exceeded, but steps still gain."""
+SETTLED = 3e-3
+"""A step that costs no more than this share of what is made least does not gain any more."""
+REACH = 0.1
+"""How far away the least is thought to be at most, as a share of the accelerations."""
 NEAR = 0.1
 """Planes that are neither held nor within this share of what they allow are left out again."""
-EXACT = 1e-9
+EXACT = 1e-7
 """Rows that are not held are kept to this much of their length."""
-DAMPINGS = (-1e-6, -1e-5)
-"""Weight of squares that the solver takes for a linear programme: its own, and where it goes round
-in circles, a larger one. Negative: only where it finds that it needs one."""
+DAMPINGS = (1.0, 10.0, 100.0)
+"""Of what steps cost: where the solver goes round in circles, shorter ones are asked for."""
+SMALLEST, STILL = 1e-3, 0.1
+"""Peak jerk below which steps cost no less; residual below which their least cost does not fall."""
 FREE = 1e30
 """What the solver takes for no bound."""
 EQUALITY = 5
@@ -47,8 +60,11 @@ class Cutting:
 
     Attributes
     ----------
-    bound : float
-        What the cones without a cap are left with at least, by the last that was sought. [-]
+    expected : float
+        What the cones without a cap are thought to be left with at least: with the planes that
+        there are, and if steps go on gaining as the last one did. [-]
+    settled : bool
+        Another step would hardly gain anything, with the planes that there are.
     left : ndarray, shape (g,)
         What each cone is left with by the last solution. [-]
     """
@@ -57,60 +73,60 @@ class Cutting:
         require_solver()
         self.problem = problem
         self.unknowns = unknowns = Unknowns(problem)
-        self.bound = 0.0
-        h, own = unknowns.h, unknowns.own
-        slopes = len(unknowns.a)
-        self.peak, self.above, self.width = slopes, slopes + 1, slopes + 2
+        self.expected, self.settled = 0.0, False
+        h, count = unknowns.h, len(unknowns.a)
         # Acceleration and velocity at the knots, jerk of the blocks, for each unknown.
         at = unknowns.at_a
-        a = np.zeros((len(h) + 1, self.width))
+        a = np.zeros((len(h) + 1, count))
         used = np.flatnonzero(at >= 0)
         a[used, at[used] - unknowns.speeds] = UNIT * unknowns.sign[used]
         before, behind, step = a[:-1], a[1:], h[:, np.newaxis]
         v = np.insert(np.cumsum(0.5 * step * (before + behind), axis=0), 0, 0.0, axis=0)
         length = (step * v[:-1] + step**2 / 6.0 * (2.0 * before + behind)).sum(axis=0)
-        jerk = (behind - before) / step
-        self._response = problem.rows @ jerk
+        self._ends = np.stack([length] if unknowns.odd else [length, v[-1]])
+        self._shares = ((behind - before) / step)[unknowns.own] / problem.jerk
+        self._usable = 1.0 - MARGIN
+        # v and the control points of its parabolas; they and accelerations are held where they
+        # have to be.
+        control = v[:-1] + 0.5 * step * before
+        inner = slice(1, unknowns.speeds + 1)
+        speeds = np.concatenate([v[inner], control[inner]])
+        strengths = UNIT * np.eye(count)
+        self._limits = np.concatenate([-speeds, speeds, -strengths, strengths])
+        fastest = problem.velocity * self._usable if problem.fast else FREE
+        strongest = min(problem.acceleration * self._usable, FREE)
+        self._most = np.repeat(
+            [0.0, fastest, strongest, strongest], [len(speeds), len(speeds), count, count]
+        )
+        self._response = unknowns.responses(UNIT)
         self._starts = np.flatnonzero(np.diff(problem.group, prepend=-1))
         self._sizes = np.diff(np.append(self._starts, len(problem.group)))
-        share = jerk[own] / problem.jerk
-        share, most = np.concatenate([share, -share]), np.zeros(self.width)
-        most[self.peak] = 1.0
-        ends = [length] if unknowns.odd else [length, v[-1]]
-        self._rows = np.concatenate([ends, share - most])
-        self._exact = len(ends)
-        usable = 1.0 - MARGIN
-        limit = min(problem.acceleration * usable / UNIT, FREE)
-        self._most = np.append(np.full(slopes, limit), [usable, FREE])
-        self._least = np.append(np.full(slopes, -limit), [0.0, 0.0])
-        # v and the control points of its parabolas, which are held where they have to be.
-        control = v[:-1] + 0.5 * step * before
-        self._speeds = np.concatenate(
-            [v[1 : unknowns.speeds + 1], control[1 : unknowns.speeds + 1]]
-        )
-        self._fastest = problem.velocity * usable if problem.fast else FREE
         self._held = np.zeros(0, dtype=np.int64)
         self._cone = np.zeros(0, dtype=np.int64)
         self._direction = np.zeros((0, self._sizes.max(initial=1)))
+        self._planes = np.zeros((0, count))
         self.left = self._caps = self._responded = np.zeros(0)
-        self._x: Array | None = None
-        self._multipliers = np.zeros(0)
+        # The accelerations, and the residual above what is allowed or the peak jerk.
+        self._x, self._last = np.zeros(count), 0.0
+        self._smooth, self._cost = False, FIRST
+        # Which of the rows of `_shares`, of the limits and of the planes are held, and how much.
+        self._of_shares = np.zeros(len(self._shares))
+        self._of_limits = self._of_planes = np.zeros(0)
 
     def begin(self, other: Cutting) -> None:
         """Begin where another programme has ended, and with its planes; blocks may differ."""
-        if other._x is None:
-            return
         ends = np.insert(np.cumsum(other.unknowns.h), 0, 0.0)
         there = other.unknowns.accelerations(other._full())
         here = np.interp(np.insert(np.cumsum(self.unknowns.h), 0, 0.0), ends, there)
         used = np.flatnonzero((self.unknowns.at_a >= 0) & (self.unknowns.sign > 0))
-        self._x = np.append(np.zeros(self.peak), other._x[other.peak :])
         self._x[self.unknowns.at_a[used] - self.unknowns.speeds] = here[used] / UNIT
         if np.array_equal(self.problem.group, other.problem.group):
             self._cone, self._direction = other._cone, other._direction
+            self._of_planes = other._of_planes
+            self._planes = self._rows_of(self._cone, self._direction)
 
     def solve(self, allowed: float, smooth: bool) -> bool:
-        """Find the least residual, or what leaves no more than is allowed with the least peak jerk.
+        """A step to the least residual, or to the least peak jerk that leaves what is allowed.
 
         Parameters
         ----------
@@ -126,42 +142,43 @@ class Cutting:
         """
         import daqp
 
-        planes, caps = self._planes(allowed)
-        speeds = self._speeds[self._held]
-        rows = np.concatenate([self._rows, speeds, planes])
-        first = np.zeros(len(self._rows))
-        first[0] = 1.0
-        least = np.where(np.arange(len(first)) < self._exact, first, -FREE)
-        fastest, none = np.full(len(speeds), self._fastest), np.full(len(caps), -FREE)
-        upper = np.concatenate([self._most, first, fastest, caps])
-        lower = np.concatenate([self._least, least, np.zeros(len(speeds)), none])
-        kind = np.zeros(len(upper), dtype=np.int32)
-        kind[self.width : self.width + self._exact] = EQUALITY
-        cost = np.zeros(self.width)
-        cost[self.peak if smooth else self.above] = 1.0
-        upper[self.above] = 0.0 if smooth else FREE
-        start = {}
-        if self._x is not None:
-            start["primal_start"] = self._x.copy()
-            if len(self._multipliers) == len(upper):
-                start["dual_start"] = self._multipliers
-        square = np.zeros((self.width, self.width))
+        if smooth != self._smooth:
+            self._smooth, self._cost = smooth, FIRST
+            self._last = float(np.abs(self._shares @ self._x).max())
+        caps = self.problem.cap[self._cone]
+        free = np.isnan(caps)
+        caps = np.where(free, allowed, caps)
+        matrix, lower, upper, kind, multipliers = self._programme(caps, free)
+        start = np.append(self._x, self._last)
+        one = np.eye(len(start))
         for damping in DAMPINGS:
+            cost = self._cost * damping * (max(self._last, SMALLEST) if smooth else 1.0)
+            linear = -start
+            linear[-1] += 1.0 / cost
             x, _, status, info = daqp.solve(
-                square, cost, rows, upper, lower, kind,
-                primal_tol=EXACT, eps_prox=damping, **start,
+                one, linear, matrix, upper, lower, kind,
+                primal_tol=EXACT, dual_start=multipliers,
             )  # fmt: skip
             if status == SOLVED:
                 break
         if status != SOLVED:
             return False
-        self._x, self._multipliers = np.array(x), np.array(info["lam"])
-        most = allowed + float(self._x[self.above])
-        self.bound = self.bound if smooth else most
+        x = np.array(x)
+        # The planes allow no more than this to who goes so far.
+        gain = REACH * cost * float(np.linalg.norm(x - start) * np.linalg.norm(x))
+        self._x, self._last = x[:-1], float(x[-1])
+        self._keep(np.array(info["lam"]))
+        most = allowed if smooth else allowed + self._last
+        self.expected = self.expected if smooth else max(most - gain, 0.0)
         self._responded = self._response @ self._x
         self.left = np.sqrt(np.add.reduceat(self._responded**2, self._starts))
         self._caps = np.where(np.isnan(self.problem.cap), most, self.problem.cap)
-        self._prune(caps - planes @ self._x)
+        self.settled = (
+            gain <= SETTLED * (self._last if smooth else most) or self._cost <= self._lowest
+        )
+        if np.all(self.left <= GOOD * self._caps):
+            self._cost = max(LONGER * self._cost, self._lowest)
+        self._prune(np.where(free, most, caps) - self._planes @ self._x)
         return True
 
     def cut(self, cones: Flags) -> bool:
@@ -175,52 +192,101 @@ class Cutting:
         Returns
         -------
         bool
-            Whether anything was cut, or a speed is held that was not.
+            Whether anything was cut, or a limit is held that was not.
         """
         cut = np.flatnonzero(cones & (self.left > self._caps))
         rows = self._starts[cut, np.newaxis] + np.arange(self._direction.shape[1])
         own = rows < self._starts[cut, np.newaxis] + self._sizes[cut, np.newaxis]
         direction = np.where(own, self._responded[np.where(own, rows, 0)], 0.0)
-        speed = self._speeds @ self._x
-        small = 0.5 * MARGIN * np.abs(speed).max(initial=0.0)
-        beyond = (speed < -small) | (speed > self._fastest + small)
+        direction /= self.left[cut, np.newaxis]
+        reached = self._limits @ self._x
+        fastest = np.abs(reached[: len(reached) - 2 * len(self._x)]).max(initial=0.0)
+        beyond = reached > self._most + 0.5 * MARGIN * np.where(
+            np.arange(len(reached)) < len(reached) - 2 * len(self._x), fastest, self._most
+        )
         beyond[self._held] = False
         held = np.flatnonzero(beyond)
-        at = self.width + len(self._rows) + len(self._held)
-        before, behind = np.split(self._multipliers, [at])
-        self._multipliers = np.concatenate(
-            [before, np.zeros(len(held)), behind, np.zeros(len(cut))]
-        )
         self._held = np.append(self._held, held)
+        self._of_limits = np.append(self._of_limits, np.zeros(len(held)))
         self._cone = np.append(self._cone, cut)
-        self._direction = np.concatenate([self._direction, direction / self.left[cut, np.newaxis]])
-        return bool(len(cut) or len(held))
+        self._direction = np.concatenate([self._direction, direction])
+        self._planes = np.concatenate([self._planes, self._rows_of(cut, direction)])
+        self._of_planes = np.append(self._of_planes, np.zeros(len(cut)))
+        if len(cut) or len(held):
+            return True
+        self._cost = max(LONG * self._cost, self._lowest)
+        return False
 
     def solution(self) -> Solution:
         """The last solution, mended where it must be exact."""
         return self.unknowns.solution(self._full(), curved=True, null=False)
 
+    @property
+    def _lowest(self) -> float:
+        """What steps cost at least."""
+        return LAST if self._smooth else LAST * max(self._last, STILL)
+
     def _full(self) -> Array:
-        """The last solution in the columns of `Unknowns`, which has speeds in front."""
-        assert self._x is not None
-        x = np.concatenate([np.zeros(self.unknowns.speeds), self._x])
-        x[self.unknowns.a] *= UNIT
+        """The last solution in the columns of `Unknowns`."""
+        x = np.zeros(self.unknowns.above + 1)
+        x[self.unknowns.a] = UNIT * self._x
+        x[self.unknowns.peak] = np.abs(self._shares @ self._x).max()
         return x
 
-    def _planes(self, allowed: float) -> tuple[Array, Array]:
-        """The rows of the planes, and what each may be at most."""
-        planes = np.zeros((len(self._cone), self.width))
-        for k, direction in enumerate(self._direction.T):
-            row = np.minimum(self._starts[self._cone] + k, len(self._response) - 1)
-            planes += direction[:, np.newaxis] * self._response[row]
-        caps = self.problem.cap[self._cone]
-        free = np.isnan(caps)
-        planes[free, self.above] -= 1.0
-        return planes, np.where(free, allowed, caps)
+    def _programme(
+        self, caps: Array, free: Flags
+    ) -> tuple[Array, Array, Array, NDArray[np.int32], Array]:
+        """Rows, their bounds and kinds, and the multipliers, with those of the unknowns in front.
+
+        For the least peak jerk, jerks are held by it: two rows each.
+        """
+        count, ends = len(self._x), len(self._ends)
+        limits, first, none = self._limits[self._held], np.eye(ends)[0], np.full(count, FREE)
+        if self._smooth:
+            shares = [self._shares, -self._shares]
+            least, most = np.full(2 * len(self._shares), -FREE), np.zeros(2 * len(self._shares))
+            of_shares = np.maximum([self._of_shares, -self._of_shares], 0.0).ravel()
+        else:
+            shares = [self._shares]
+            most = np.full(len(self._shares), self._usable)
+            least, of_shares = -most, self._of_shares
+        matrix = np.zeros((ends + len(most) + len(limits) + len(caps), count + 1))
+        np.concatenate([self._ends, *shares, limits, self._planes], out=matrix[:, :-1])
+        if self._smooth:
+            matrix[ends : ends + len(most), -1] = -1.0
+        else:
+            matrix[len(matrix) - len(caps) :, -1] = np.where(free, -1.0, 0.0)
+        highest = self._usable if self._smooth else FREE
+        upper = np.concatenate([none, [highest], first, most, self._most[self._held], caps])
+        open_ = np.full(len(limits) + len(caps), -FREE)
+        lower = np.concatenate([-none, [0.0], first, least, open_])
+        kind = np.zeros(len(upper), dtype=np.int32)
+        kind[count + 1 : count + 1 + ends] = EQUALITY
+        unheld = np.zeros(count + 1 + ends)
+        multipliers = np.concatenate([unheld, of_shares, self._of_limits, self._of_planes])
+        return matrix, lower, upper, kind, multipliers
+
+    def _keep(self, multipliers: Array) -> None:
+        """What the next programme begins with, of the multipliers of the last one."""
+        jerks = len(self._shares) * (1 + self._smooth)
+        at = np.cumsum([len(self._x) + 1 + len(self._ends), jerks, len(self._held)])
+        _, of_shares, self._of_limits, self._of_planes = np.split(multipliers, at)
+        if self._smooth:
+            up, down = np.split(of_shares, 2)
+            of_shares = up - down
+        self._of_shares = of_shares
+
+    def _rows_of(self, cone: NDArray[np.int64], direction: Array) -> Array:
+        """Rows of the planes that touch cones in these directions."""
+        planes = np.zeros((len(cone), len(self._x)))
+        for k, part in enumerate(direction.T):
+            row = np.minimum(self._starts[cone] + k, len(self._response) - 1)
+            planes += part[:, np.newaxis] * self._response[row]
+        return planes
 
     def _prune(self, slack: Array) -> None:
         """Leave out the planes that are far away, each by its slack."""
-        held, multipliers = np.split(self._multipliers, [len(self._multipliers) - len(slack)])
-        kept = (multipliers != 0.0) | (slack < NEAR * self._caps[self._cone])
-        self._cone, self._direction = self._cone[kept], self._direction[kept]
-        self._multipliers = np.concatenate([held, multipliers[kept]])
+        kept = (self._of_planes != 0.0) | (slack < NEAR * self._caps[self._cone])
+        if not kept.all():
+            self._cone, self._direction = self._cone[kept], self._direction[kept]
+            self._planes, self._of_planes = self._planes[kept], self._of_planes[kept]

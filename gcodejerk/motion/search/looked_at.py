@@ -35,6 +35,8 @@ DENSE, FEWEST = 0.1, 8
 at [rad], and how many on each side of its own at least."""
 SPACING = 1.0
 """Distance of frequencies, times the half of a duration, at which a design begins. [rad]"""
+AT_ONCE = 64
+"""Poles whose responses are computed together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,18 +168,18 @@ class Blocks:
         undamped = not looked_at.poles.real.any()
         mirrored = undamped and bool(np.all(knots + knots[::-1] == count))
         split = (looked_at.source < 0) & halves
-        together = looked_at.where(~split)
-        if mirrored:
-            rows = _displacements(together, T, 0.5 - knots / count).imag
-            group = together.group
-        else:
-            rows = _parts(_displacements(together, T, 1.0 - knots / count))
-            group = np.repeat(together.group, 2)
-        cone = 2 * group
-        if split.any():
-            middle = int(np.searchsorted(knots, 0.5 * count))
-            apart, owner = _halves(looked_at.where(split), knots, T, middle, middle, mirrored)
-            rows, cone = np.concatenate([rows, apart]), np.concatenate([cone, owner])
+        together, apart = looked_at.where(~split), looked_at.where(split)
+        parts = 1 if mirrored else 2
+        cone = np.repeat(2 * together.group, parts)
+        at = np.arange(len(cone)).reshape(-1, parts)
+        early, late, cone_apart = _both_halves(apart, mirrored, len(cone))
+        cone = np.concatenate([cone, cone_apart])
+        rows = np.zeros((len(cone), len(knots) - 1))
+        # Of an odd acceleration, seen from the middle, the imaginary part is all.
+        end = 0.5 if mirrored else 1.0
+        _write(rows, at, 0, together.poles * T, together.weights, end - knots / count)
+        middle = int(np.searchsorted(knots, 0.5 * count))
+        _write_halves(rows, early, late, apart, knots, T, middle, middle)
         return cls(knots, rows, cone, cone // 2, mirrored, False)
 
     @classmethod
@@ -186,7 +188,9 @@ class Blocks:
         knots = np.concatenate([ramp, count - ramp[::-1]])
         undamped = not looked_at.poles.real.any()
         last = len(ramp) - 1
-        rows, cone = _halves(looked_at, knots, count * interval, last, last + 1, undamped)
+        early, late, cone = _both_halves(looked_at, undamped, 0)
+        rows = np.zeros((len(cone), len(knots) - 1))
+        _write_halves(rows, early, late, looked_at, knots, count * interval, last, last + 1)
         return cls(knots, rows, cone, cone // 2, True, True)
 
     def left(self, jerk: Array) -> Array:
@@ -197,38 +201,57 @@ class Blocks:
         return left
 
 
-def _halves(
-    looked_at: LookedAt, knots: Index, T: float, end: int, begin: int, alike: bool
-) -> tuple[Array, Index]:
-    """Rows of the blocks up to a knot and of those from a knot on, two cones for each group.
+def _both_halves(looked_at: LookedAt, alike: bool, first: int) -> tuple[Index, Index, Index]:
+    """Rows for both halves of a move, two cones for each group, from row `first` on.
 
-    Both are times what makes them the sum of both, if they leave the same. `alike`: they do, and
-    one of them is enough.
+    `alike`: both leave the same, and one of them is enough.
+
+    Returns
+    -------
+    early, late : ndarray of int, shape (q, 2)
+        Rows of the real and the imaginary part of every pole; of `early` none where one is enough.
+    cone : ndarray of int, shape (r,)
+        Of these rows.
     """
-    count, blocks = knots[-1], len(knots) - 1
     group = np.repeat(looked_at.group, 2)
-    both = 1.0 + np.exp(looked_at.poles.real * T * (1.0 - knots[end] / count))[:, np.newaxis]
-    late = _parts(_displacements(looked_at, T, 1.0 - knots[begin:] / count) * both)
-    late = np.pad(late, ((0, 0), (begin, 0)))
-    if alike:
-        return late, 2 * group
-    early = _parts(_displacements(looked_at, T, (knots[end] - knots[: end + 1]) / count) * both)
-    early = np.pad(early, ((0, 0), (0, blocks - end)))
-    cone = np.concatenate([2 * group, 2 * group + 1])
+    cone = 2 * group if alike else np.concatenate([2 * group, 2 * group + 1])
     order = np.argsort(cone, kind="stable")
-    return np.concatenate([early, late])[order], cone[order]
+    at = np.empty_like(order)
+    at[order] = first + np.arange(len(order))
+    at = at.reshape(-1, 2)
+    early = len(at) - len(looked_at.poles)
+    return at[:early], at[early:], cone[order]
 
 
-def _displacements(looked_at: LookedAt, T: float, left: Array) -> Complex:
-    """What a unit jerk in each block leaves, the times until then as shares of T, (q, k)."""
-    pole = looked_at.poles[:, np.newaxis] * T
-    ringing = np.exp(pole * left)
-    gain = looked_at.weights[:, np.newaxis] / (pole**2 * pole.imag)
-    rows: Complex = (ringing[:, :-1] - ringing[:, 1:]) * gain
-    return rows
+def _write_halves(
+    rows: Array, early: Index, late: Index, looked_at: LookedAt, knots: Index, T: float,
+    end: int, begin: int,
+) -> None:  # fmt: skip
+    """Write what blocks up to a knot leave then, and at the end those from a knot on.
+
+    Both are times what makes them the sum of both, if they leave the same.
+    """
+    count, poles = knots[-1], looked_at.poles * T
+    weights = looked_at.weights * (1.0 + np.exp(poles.real * (1.0 - knots[end] / count)))
+    _write(rows, late, begin, poles, weights, 1.0 - knots[begin:] / count)
+    if len(early):
+        _write(rows, early, 0, poles, weights, (knots[end] - knots[: end + 1]) / count)
 
 
-def _parts(rows: Complex) -> Array:
-    """Complex rows as twice as many real ones: real part, imaginary part."""
-    parts: Array = np.stack([rows.real, rows.imag], axis=1).reshape(-1, rows.shape[-1])
-    return parts
+def _write(rows: Array, at: Index, begin: int, poles: Complex, weights: Array, left: Array) -> None:
+    """Write what a unit jerk in each block leaves, from column `begin` on.
+
+    `at`, shape (q, 1) or (q, 2): the rows of each pole, for the imaginary part or for both. `left`:
+    times from the ends of blocks until then. Poles and times are in units of the move's duration.
+    """
+    columns = slice(begin, begin + len(left) - 1)
+    # A few poles at a time: they stay in the processor's cache.
+    for first in range(0, len(poles), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        pole = poles[some, np.newaxis]
+        ringing = np.exp(pole * left)
+        gain = weights[some, np.newaxis] / (pole**2 * pole.imag)
+        left_over = (ringing[:, :-1] - ringing[:, 1:]) * gain
+        rows[at[some, -1], columns] = left_over.imag
+        if at.shape[1] > 1:
+            rows[at[some, 0], columns] = left_over.real

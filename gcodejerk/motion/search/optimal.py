@@ -55,8 +55,12 @@ ROUNDS = 6
 """Programmes with cones at most, until no frequency between the points is worse than these."""
 MOST_CUTS = 80
 """Programmes with planes at most."""
-WORSE, BY_PLANES = 1.012, 1.003
-"""A frequency is added where the residual is this much above that of the points; or a plane."""
+WORSE = 1.012
+"""A frequency is added where the residual is this much above that of the points."""
+LITTLE, NOTHING = 3e-3, 1e-4
+"""A plane is added where the residual is this share of the expected one above it, and so much."""
+ROUGH = 0.1
+"""Blocks that are refined need the least of theirs to this share only."""
 USED, USED_BY_PLANES = 0.985, 0.995
 """Share of what is allowed that is designed for: between the points it is larger; and of planes,
 which are made until that is held everywhere."""
@@ -249,13 +253,14 @@ class _Search:
         if self.ramp and allowed:
             # The phases of a short cruise can be made use of: what is found counts if it is enough.
             looked_at = self._looked_at(self.ramp)
-            best = self._exchanged(looked_at, self._ramps(looked_at), allowed, enough=True)
+            best = self._exchanged(looked_at, self._ramps(looked_at), allowed, rough=np.inf)
             if best is not None and best.meets(allowed):
                 return best
         looked_at = self._looked_at(move.count)
         knots = first_knots(move.count, self.ramp)
         finest = len(knots) > move.count
-        first = self._exchanged(looked_at, self._whole(looked_at, knots), allowed)
+        rough = 0.0 if finest else ROUGH
+        first = self._exchanged(looked_at, self._whole(looked_at, knots), allowed, rough=rough)
         best = _better(best, first)
         if finest or (best is not None and best.meets(allowed)):
             return best
@@ -297,7 +302,8 @@ class _Search:
     def _problem(self, looked_at: LookedAt, blocks: Blocks, active: Flags) -> Problem:
         """The programme for these blocks and groups of frequencies."""
         move, T = self.move, self.total
-        used = active[blocks.group]
+        # All of them as they are: the rows are millions.
+        used = slice(None) if active.all() else active[blocks.group]
         cone, group = blocks.cone[used], blocks.group[used]
         own = group[np.diff(cone, prepend=-1) != 0]
         return Problem(
@@ -314,15 +320,15 @@ class _Search:
 
     def _exchanged(
         self, looked_at: LookedAt, blocks: Blocks, allowed: float, start: _Found | None = None,
-        enough: bool = False,
+        rough: float = 0.0,
     ) -> _Found | None:  # fmt: skip
         """The least residual for some blocks, frequencies added until none between is worse.
 
-        `start`: what was found before, of these blocks or of longer ones. `enough`: or until it
-        is clear that more than what is allowed is left.
+        `start`: what was found before, of these blocks or of longer ones. `rough`: or until more
+        than what is allowed is left, and how much is known to this share.
         """
         if (looked_at.source < 0).any():
-            found = self._cut(looked_at, blocks, allowed, start, enough)
+            found = self._cut(looked_at, blocks, allowed, start, rough)
             if found is not None:
                 return found
         active = looked_at.first if start is None else start.active
@@ -334,7 +340,7 @@ class _Search:
             problem = self._problem(looked_at, blocks, active)
             solution = solve(problem, USED * allowed, cost, self.curved)
             self.curved |= solution is not None and solution.curved
-            if solution is None or (enough and solution.worst > allowed):
+            if solution is None or (np.isinf(rough) and solution.worst > allowed):
                 return best
             # Little jerk has cost at most this; where that is too much, it is made cheaper.
             paid = cost * (1.0 - solution.peak)
@@ -358,7 +364,7 @@ class _Search:
         blocks: Blocks,
         allowed: float,
         start: _Found | None,
-        enough: bool,
+        rough: float,
     ) -> _Found | None:
         """The same by planes, and then the least jerk for what is allowed, if that is within reach.
 
@@ -382,16 +388,18 @@ class _Search:
             if not cutting.solve(goal, smooth):
                 return best
             left = np.maximum.reduceat(cutting.left, first)
-            reached = smooth or cutting.bound <= allowed
-            most = allowed if reached else max(BY_PLANES * cutting.bound, NULL)
-            over = left > np.where(guarded, KEPT, most)
+            reached = smooth or cutting.expected <= allowed
+            most = cutting.expected + max(LITTLE * cutting.expected, NOTHING)
+            over = left > np.where(guarded, KEPT, allowed if reached else most)
             missing = over & (looked_at.peaks(left) | (guarded & looked_at.sparse))
             active |= missing
-            if cutting.cut(missing[owner]) and (reached or not enough):
+            going = cutting.cut(missing[owner]) or (not cutting.settled and (smooth or not reached))
+            known = left[~guarded].max() <= (1.0 + rough) * cutting.expected
+            if going and not (rough and known and not reached):
                 continue
             solution = cutting.solution()
             best = _Found(looked_at, blocks, active, solution, blocks.left(solution.jerk), cutting)
-            if smooth or (allowed and not reached):
+            if smooth or (not reached and (rough or allowed)):
                 break
             smooth, allowed = True, allowed or (1.0 + LOSS) * max(best.worst, NULL)
         return best

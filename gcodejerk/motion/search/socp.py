@@ -44,6 +44,8 @@ MANY = 24
 """More rows of one cone than this are condensed."""
 CONDENSED = 1e-5
 """Relative size of what is left out of them."""
+AT_ONCE = 128
+"""Rows that are computed together."""
 MARGIN = 2e-6
 """Share of each limit that is left unused, so that the solver's rounding stays within it."""
 
@@ -361,11 +363,15 @@ class Unknowns:
         small = MARGIN * np.abs(v).max(initial=0.0)
         return bool(control.min() >= -small and control.max() <= self.problem.velocity + small)
 
-    def responses(self) -> Array:
-        """The rows of the problem for each unknown acceleration, shape (r, len(a))."""
+    def responses(self, unit: float = 1.0) -> Array:
+        """The rows of the problem for each unknown acceleration of that size, (r, len(a))."""
         # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
-        per_time = self.problem.rows / self.h
-        response: Array = per_time[:, :-1] - per_time[:, 1:]
+        per_time = unit / self.h
+        response: Array = self.problem.rows[:, :-1] * per_time[:-1]
+        # Some rows at a time: all of them are new memory once more, which costs more than the sum.
+        for first in range(0, len(response), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            response[some] -= self.problem.rows[some, 1:] * per_time[1:]
         if self.odd:
             folded: Array = (response - response[:, ::-1])[:, : len(self.a)]
             return folded
