@@ -63,6 +63,8 @@ class Cutting:
     expected : float
         What the cones without a cap are thought to be left with at least: with the planes that
         there are, and if steps go on gaining as the last one did. [-]
+    told : float
+        What they are left with according to the planes that there are. [-]
     settled : bool
         Another step would hardly gain anything, with the planes that there are.
     left : ndarray, shape (g,)
@@ -73,7 +75,7 @@ class Cutting:
         require_solver()
         self.problem = problem
         self.unknowns = unknowns = Unknowns(problem)
-        self.expected, self.settled = 0.0, False
+        self.expected, self.told, self.settled = 0.0, 0.0, False
         h, count = unknowns.h, len(unknowns.a)
         # Acceleration and velocity at the knots, jerk of the blocks, for each unknown.
         at = unknowns.at_a
@@ -108,7 +110,8 @@ class Cutting:
         self.left = self._caps = self._responded = np.zeros(0)
         # The accelerations, and the residual above what is allowed or the peak jerk.
         self._x, self._last = np.zeros(count), 0.0
-        self._smooth, self._cost = False, FIRST
+        # What steps cost, and at least: where the solver has given up, no less.
+        self._smooth, self._cost, self._least = False, FIRST, 0.0
         # Which of the rows of `_shares`, of the limits and of the planes are held, and how much.
         self._of_shares = np.zeros(len(self._shares))
         self._of_limits = self._of_planes = np.zeros(0)
@@ -143,7 +146,7 @@ class Cutting:
         import daqp
 
         if smooth != self._smooth:
-            self._smooth, self._cost = smooth, FIRST
+            self._smooth, self._cost, self._least = smooth, FIRST, 0.0
             self._last = float(np.abs(self._shares @ self._x).max())
         caps = self.problem.cap[self._cone]
         free = np.isnan(caps)
@@ -163,12 +166,16 @@ class Cutting:
                 break
         if status != SOLVED:
             return False
+        if damping > 1.0:
+            # Where it went round in circles once, it would again.
+            self._cost *= damping
+            self._least = LONGER * self._cost
         x = np.array(x)
         # The planes allow no more than this to who goes so far.
         gain = REACH * cost * float(np.linalg.norm(x - start) * np.linalg.norm(x))
         self._x, self._last = x[:-1], float(x[-1])
         self._keep(np.array(info["lam"]))
-        most = allowed if smooth else allowed + self._last
+        self.told = most = allowed if smooth else allowed + self._last
         self.expected = self.expected if smooth else max(most - gain, 0.0)
         self._responded = self._response @ self._x
         self.left = np.sqrt(np.add.reduceat(self._responded**2, self._starts))
@@ -200,10 +207,10 @@ class Cutting:
         direction = np.where(own, self._responded[np.where(own, rows, 0)], 0.0)
         direction /= self.left[cut, np.newaxis]
         reached = self._limits @ self._x
-        fastest = np.abs(reached[: len(reached) - 2 * len(self._x)]).max(initial=0.0)
-        beyond = reached > self._most + 0.5 * MARGIN * np.where(
-            np.arange(len(reached)) < len(reached) - 2 * len(self._x), fastest, self._most
-        )
+        speeds = len(reached) - 2 * len(self._x)
+        allowance = 0.5 * MARGIN * self._most
+        allowance[:speeds] = 0.5 * MARGIN * np.abs(reached[:speeds]).max(initial=0.0)
+        beyond = reached > self._most + allowance
         beyond[self._held] = False
         held = np.flatnonzero(beyond)
         self._held = np.append(self._held, held)
@@ -224,7 +231,7 @@ class Cutting:
     @property
     def _lowest(self) -> float:
         """What steps cost at least."""
-        return LAST if self._smooth else LAST * max(self._last, STILL)
+        return max(self._least, LAST if self._smooth else LAST * max(self._last, STILL))
 
     def _full(self) -> Array:
         """The last solution in the columns of `Unknowns`."""

@@ -176,8 +176,8 @@ class Blocks:
         cone = np.concatenate([cone, cone_apart])
         rows = np.zeros((len(cone), len(knots) - 1))
         # Of an odd acceleration, seen from the middle, the imaginary part is all.
-        end = 0.5 if mirrored else 1.0
-        _write(rows, at, 0, together.poles * T, together.weights, end - knots / count)
+        seen = 0.5 * count if mirrored else count
+        _write(rows, at, 0, together.poles * T, together.weights, knots, seen, count)
         middle = int(np.searchsorted(knots, 0.5 * count))
         _write_halves(rows, early, late, apart, knots, T, middle, middle)
         return cls(knots, rows, cone, cone // 2, mirrored, False)
@@ -233,25 +233,34 @@ def _write_halves(
     """
     count, poles = knots[-1], looked_at.poles * T
     weights = looked_at.weights * (1.0 + np.exp(poles.real * (1.0 - knots[end] / count)))
-    _write(rows, late, begin, poles, weights, 1.0 - knots[begin:] / count)
+    _write(rows, late, begin, poles, weights, knots[begin:], count, count)
     if len(early):
-        _write(rows, early, 0, poles, weights, (knots[end] - knots[: end + 1]) / count)
+        _write(rows, early, 0, poles, weights, knots[: end + 1], knots[end], count)
 
 
-def _write(rows: Array, at: Index, begin: int, poles: Complex, weights: Array, left: Array) -> None:
+def _write(
+    rows: Array, at: Index, begin: int, poles: Complex, weights: Array, knots: Index,
+    seen: float, count: int,
+) -> None:  # fmt: skip
     """Write what a unit jerk in each block leaves, from column `begin` on.
 
-    `at`, shape (q, 1) or (q, 2): the rows of each pole, for the imaginary part or for both. `left`:
-    times from the ends of blocks until then. Poles and times are in units of the move's duration.
+    `at`, shape (q, 1) or (q, 2): the rows of each pole, for the imaginary part or for both. `knots`
+    are the ends of these blocks, and `seen` when it is looked at, of `count` intervals. Poles are
+    in units of the move's duration.
     """
-    columns = slice(begin, begin + len(left) - 1)
+    columns = slice(begin, begin + len(knots) - 1)
+    sizes, block = np.unique(np.diff(knots), return_inverse=True)
     # A few poles at a time: they stay in the processor's cache.
     for first in range(0, len(poles), AT_ONCE):
         some = slice(first, first + AT_ONCE)
         pole = poles[some, np.newaxis]
-        ringing = np.exp(pole * left)
+        # Blocks have few sizes: what rings from a knot is what does from the next one, and a block.
+        ringing = np.empty((len(pole), len(knots)), dtype=np.complex128)
+        ringing[:, :1] = np.exp(pole * ((seen - knots[-1]) / count))
+        ringing[:, 1:] = np.exp(pole * (sizes / count))[:, block[::-1]]
+        np.cumprod(ringing, axis=1, out=ringing)
         gain = weights[some, np.newaxis] / (pole**2 * pole.imag)
-        left_over = (ringing[:, :-1] - ringing[:, 1:]) * gain
-        rows[at[some, -1], columns] = left_over.imag
+        left = np.diff(ringing, axis=1)[:, ::-1] * gain
+        rows[at[some, -1], columns] = left.imag
         if at.shape[1] > 1:
-            rows[at[some, 0], columns] = left_over.real
+            rows[at[some, 0], columns] = left.real

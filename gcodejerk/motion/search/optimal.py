@@ -58,7 +58,7 @@ MOST_CUTS = 80
 WORSE = 1.012
 """A frequency is added where the residual is this much above that of the points."""
 LITTLE, NOTHING = 3e-3, 1e-4
-"""A plane is added where the residual is this share of the expected one above it, and so much."""
+"""A plane is added where the residual is so much above what planes say: of that, and at least."""
 ROUGH = 0.1
 """Blocks that are refined need the least of theirs to this share only."""
 USED, USED_BY_PLANES = 0.985, 0.995
@@ -389,7 +389,7 @@ class _Search:
                 return best
             left = np.maximum.reduceat(cutting.left, first)
             reached = smooth or cutting.expected <= allowed
-            most = cutting.expected + max(LITTLE * cutting.expected, NOTHING)
+            most = cutting.told + max(LITTLE * cutting.told, NOTHING)
             over = left > np.where(guarded, KEPT, allowed if reached else most)
             missing = over & (looked_at.peaks(left) | (guarded & looked_at.sparse))
             active |= missing
