@@ -30,8 +30,8 @@ Flags = NDArray[np.bool_]
 
 UNIT = 0.2
 """Of accelerations as the solver sees them: what a step costs is its square in this unit."""
-FIRST, LAST = 1e-4, 1e-6
-"""What a step costs at first, over half of its square; and at least."""
+FIRST, THEN, LAST = 1e-4, 3e-5, 1e-6
+"""What a step costs at first, over half of its square; where the jerk is sought then; at least."""
 GOOD, LONGER = 1.1, 0.3
 """Where cones are left with no more than this times what planes say, steps cost so much less."""
 LONG = 0.1
@@ -146,7 +146,7 @@ class Cutting:
         import daqp
 
         if smooth != self._smooth:
-            self._smooth, self._cost, self._least = smooth, FIRST, 0.0
+            self._smooth, self._cost, self._least = smooth, THEN if smooth else FIRST, 0.0
             self._last = float(np.abs(self._shares @ self._x).max())
         caps = self.problem.cap[self._cone]
         free = np.isnan(caps)
