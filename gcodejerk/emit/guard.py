@@ -41,9 +41,13 @@ ANSWER = (
     (re.compile(rb"#[^0-9<]"), "a parameter is used whose number is computed, #5399 perhaps"),
     (re.compile(rb"M0*66(?![0-9])"), "M66 is used, whose answer is #5399"),
     (re.compile(rb"M[\[#]"), "an M code is computed, M66 perhaps"),
-    (re.compile(rb"M0*9[789](?![0-9])"), "subprograms are called by M98, and may use #5399"),
+    (re.compile(rb"M0*97(?![0-9])"), "M97 calls a subprogram, which may use #5399"),
+    (re.compile(rb"M0*98(?![0-9])"), "M98 calls a subprogram, which may use #5399"),
+    (re.compile(rb"M0*99(?![0-9])"), "M99 leads back to a caller, which may use #5399"),
 )
 """Where a program uses #5399, or may: M66 of ours overwrites it."""
+INSTEAD = {ANSWER[-1]: "end the program with M2 or M30 if no other one calls it, or "}
+"""What else helps, in front of the usual remedy."""
 
 
 def guarded(line: int, stream: Sequence[bytes], own: bytes) -> list[bytes]:
@@ -143,7 +147,7 @@ def _structures(source: BinaryIO, name: str) -> Iterator[tuple[int, float]]:
         plain = NAME.sub(b"<>", code)
         for pattern, problem in ANSWER:
             if pattern.search(plain):
-                raise _refused(problem, name, number)
+                raise _refused(problem, name, number, INSTEAD.get((pattern, problem), ""))
     for label, number in calls.items():
         if last[label] <= number and first[label] >= number:
             raise _refused("a subprogram of another file is called", name, number)
@@ -157,9 +161,9 @@ def _active(comment: re.Match[bytes]) -> bytes:
     return b" " + text if _ACTIVE.match(text) else b""
 
 
-def _refused(problem: str, name: str, line: int) -> EmitError:
+def _refused(problem: str, name: str, line: int, instead: str = "") -> EmitError:
     return EmitError(
         f"{problem}: no override guard can stand in this program",
-        "process it with a machine file without controller_options.override_guard",
+        f"{instead}process it with a machine file without controller_options.override_guard",
         Place(name, line),
     )

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from typing import BinaryIO
 
-from gcodejerk.emit.guard import ANSWER, NAME, lines_of_code
+from gcodejerk.emit.guard import ANSWER, INSTEAD, NAME, lines_of_code
 from gcodejerk.errors import EmitError, Place
 
 ADAPTIVE, POSITION = "adaptive-feed", "position"
@@ -59,6 +59,6 @@ def check_words(source: BinaryIO, name: str, form: str) -> None:
                 taken = (pattern, problem) in _BOTH
                 raise EmitError(
                     f"{problem}: no stream of linuxcnc-hal can stand in this program",
-                    _HELP[ADAPTIVE if taken else form],
+                    INSTEAD.get((pattern, problem), "") + _HELP[ADAPTIVE if taken else form],
                     Place(name, number),
                 )

@@ -19,15 +19,9 @@ from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
 from gcodejerk.nc.dialects.any_mill import written_for
 from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.flow.again import begins_again
 from gcodejerk.nc.flow.elsewhere import Elsewhere, find_elsewhere
-from gcodejerk.nc.flow.outline import (
-    begins_again,
-    find_outline,
-    may_go_back,
-    read_body,
-    refers,
-    seekable,
-)
+from gcodejerk.nc.flow.outline import find_outline, may_go_back, read_body, refers, seekable
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.following_reader import MOST_BYTES, FollowingReader, worth_following
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -196,7 +190,7 @@ def open_reader(
         reader = Reader(name, chosen, start)
         if chosen.text.o_word == "flow" and (start.positions or start.startup):
             file = seekable(file)
-            if begins_again(file, name):
+            if begins_again(file, name, chosen):
                 reader.forget_start(None)
     else:
         file = source = seekable(file)

@@ -4,7 +4,7 @@
 
 For each control and each way to set it: the residual of its law as today's rapids are set, of the
 best setting in no more time, and below them what streams leave and what no profile can go below.
-The README's table is made by this.
+The tables in docs/settings.md and in the README are made by this, and a test holds them to it.
 """
 
 import sys
@@ -26,6 +26,10 @@ ROOT = Path(__file__).parents[2]
 UM = 1e3
 NULL = 1e-6
 """What is nothing [um]."""
+HEAD = (
+    "| control (settings) | law | set as today [s] | [um] | best [s] | [um] |",
+    "|---|---|---|---|---|---|",
+)
 
 
 def moves_of(path, machine, dialect):
@@ -45,6 +49,43 @@ def stream_row(name, profile, moves, machine):
     return f"| {name} | | | | {total:.2f} | {value:.3g} |", plans
 
 
+def control_rows(control, moves, machine):
+    """One control's rows, one for each way to set it; none where it has nothing to set."""
+    emitter = load_controller(control)
+    if not isinstance(emitter, Sheets):
+        return []
+    try:
+        schemes = emitter.schemes(machine)
+    except GcodejerkError:
+        return [
+            f"| `{control}` | sets a share of today's jerk, and this machine has none | | | | |"
+        ]
+    rows = []
+    for way, scheme in schemes.items():
+        found = tune(scheme, moves, machine, curve=False)
+        best = f"{found.chosen.total:.2f} | {UM * found.chosen.value:.3g}"
+        rows.append(
+            f"| `{control}` ({way}) | {scheme.family.title} | {found.as_set.total:.2f} | "
+            f"{UM * found.as_set.value:.3g} | {best if found.gains else '- | no gain'} |"
+        )
+    return rows
+
+
+def last_rows(moves, machine):
+    """Today's rapids, what streams leave, and what no profile can go below."""
+    today = tune(load_controller("grbl").scheme(machine), moves, machine, curve=False).today
+    rows = [f"| **today** | {machine.planner} | {today.total:.2f} | {UM * today.value:.3g} | | |"]
+    for profile in ("condition3", "optimal"):
+        row, plans = stream_row(f"**stream**, {profile}", profile, moves, machine)
+        rows.append(row)
+    limits = known_limits(plans, None)
+    if limits is not None and np.isfinite(limits).any():
+        least = UM * np.nanmax(limits)
+        least = least if least > NULL else 0.0
+        rows.append(f"| **limit** of any profile, exact frequencies | | | | | {least:.2g} |")
+    return rows
+
+
 def main():
     """Print the table."""
     program, name, dialect = (
@@ -53,38 +94,11 @@ def main():
     machine = Machine.load(find_machine(name))
     moves = moves_of(ROOT / program, machine, dialect)
     print(f"{program} on {name}: {moves.count.sum():.0f} rapids, {len(moves)} distinct\n")
-    today = None
-    print("| control (settings) | law | set as today [s] | [um] | best [s] | [um] |")
-    print("|---|---|---|---|---|---|")
+    print(*HEAD, sep="\n")
     for control in sorted(controllers()):
-        emitter = load_controller(control)
-        if not isinstance(emitter, Sheets):
-            continue
-        try:
-            schemes = emitter.schemes(machine)
-        except GcodejerkError:
-            print(
-                f"| `{control}` | sets a share of today's jerk, and this machine has none | | | | |"
-            )
-            continue
-        for way, scheme in schemes.items():
-            found = tune(scheme, moves, machine, curve=False)
-            today = found.today
-            best = f"{found.chosen.total:.2f} | {UM * found.chosen.value:.3g}"
-            print(
-                f"| `{control}` ({way}) | {scheme.family.title} | {found.as_set.total:.2f} | "
-                f"{UM * found.as_set.value:.3g} | {best if found.gains else '- | no gain'} |",
-                flush=True,
-            )
-    print(f"| **today** | {machine.planner} | {today.total:.2f} | {UM * today.value:.3g} | | |")
-    for profile in ("condition3", "optimal"):
-        row, plans = stream_row(f"**stream**, {profile}", profile, moves, machine)
-        print(row)
-    limits = known_limits(plans, None)
-    if limits is not None and np.isfinite(limits).any():
-        least = UM * np.nanmax(limits)
-        least = least if least > NULL else 0.0
-        print(f"| **limit** of any profile, exact frequencies | | | | | {least:.2g} |")
+        for row in control_rows(control, moves, machine):
+            print(row, flush=True)
+    print(*last_rows(moves, machine), sep="\n")
 
 
 if __name__ == "__main__":

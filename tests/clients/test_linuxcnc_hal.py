@@ -434,14 +434,14 @@ def test_a_feeder_that_dies_stops_the_machine_in_front_of_the_next_rapid(form):
     assert run.position == pytest.approx((280.0, 100.0, -20.0), abs=1e-4)
 
 
-def stopped_in_front(form, events):
+def stopped_in_front(form, events, program=LONG):
     """A run that stops in front of a rapid with its message; behind an abort MDI moves all else."""
     leaves = [
         {"do": "abort", "after": 0.0},
         {"do": "mdi", "text": "G0 X-5", "after": 0.3},
         {"do": "wait", "after": 0.4},
     ]
-    _, run = play(LONG, form, events=[*events, *leaves])
+    _, run = play(program, form, events=[*events, *leaves])
     assert_within_limits(run)
     assert any("does not come next" in message for message in run.messages), run.messages
     assert run.position[0] == pytest.approx(-5.0)
@@ -461,13 +461,25 @@ def test_behind_run_from_line_the_machine_stands_at_the_first_stream(form):
     assert run.told[2]["position"] == pytest.approx(run.told[3]["position"], abs=1e-9)
 
 
-@pytest.mark.parametrize("form", [pytest.param(ADAPTIVE, marks=pytest.mark.repeats), POSITION])
-def test_run_from_line_at_the_rapid_of_the_abort_stands_there_too(form):
+FAR_DOWN = b"(%b)\n" % (b"-" * 240) * 300 + b"O1\n"
+"""A head behind which the words that ask for rapids stand more than 64 kB from the beginning."""
+
+
+@pytest.mark.parametrize(
+    ("form", "head"),
+    [
+        pytest.param(ADAPTIVE, b"", marks=pytest.mark.repeats),
+        (POSITION, b""),
+        pytest.param(POSITION, FAR_DOWN, marks=pytest.mark.repeats),
+    ],
+)
+def test_run_from_line_at_the_rapid_of_the_abort_stands_there_too(form, head):
     """It was asked for last: it counted as done, and LinuxCNC's own trapezoid ran to its end.
 
     M152's feeder sees the run some 30 ms after its start, and stops it then.
     """
-    lines = process(LONG, MACHINE, form=form).output.splitlines()
+    program = head + LONG
+    lines = process(program, MACHINE, form=form).output.splitlines()
     line = lines.index(b"(gcodejerk: G0 X300 Y100 Z-20)") + 1
     events = [
         {"do": "abort", **BETWEEN},
@@ -476,7 +488,7 @@ def test_run_from_line_at_the_rapid_of_the_abort_stands_there_too(form):
         {"do": "run", "line": line, "after": 1.0},
         {"do": "wait", "after": 1.2},
     ]
-    run = stopped_in_front(form, events)
+    run = stopped_in_front(form, events, program)
     assert run.told[5]["position"] == pytest.approx([1.0, 0.0, 0.0], abs=20.0)
 
 

@@ -1,5 +1,8 @@
 """Configurations as they are found in public: what their own firmware makes of them."""
 
+import re
+
+import numpy as np
 import pytest
 
 from gcodejerk.errors import MachineError
@@ -188,11 +191,43 @@ def test_fluidncs_other_kinematics_are_said(tmp_path):
     ("line", "said"),
     [("", "0.5 (Klipper's own): short rapids take up to 6 %"),
      ("minimum_cruise_ratio: 0.8\n", "0.8: short rapids take up to 34 %"),
-     ("minimum_cruise_ratio: 0\n", None)],
+     ("minimum_cruise_ratio: 0\n", None),
+     ("max_accel_to_decel: 600\n", "max_accel_to_decel is 600: short rapids take up to 34 %"),
+     ("max_accel_to_decel: 600\nminimum_cruise_ratio: 0.5\n", "ratio is 0.5: short rapids"),
+     ("max_accel_to_decel: 3000\n", None),
+     ("max_accel_to_decel: 9000\n", None)],
 )  # fmt: skip
 def test_klippers_cruise_ratio_is_said(tmp_path, line, said):
     _, notes = made(tmp_path, PRINTER + line, "printer.cfg")
-    assert (said in notes) if said else ("minimum_cruise_ratio" not in notes)
+    assert (said in notes) if said else ("short rapids" not in notes)
+    if said and "to_decel is" in said:
+        assert "set it to max_accel (SET_VELOCITY_LIMIT ACCEL_TO_DECEL=3000)" in notes
+
+
+def alone(length, speed, acceleration, ratio):
+    """Time of one move of Klipper's from rest to rest, by the squares of speeds that it plans with.
+
+    Both passes of its look-ahead over a single move: what it may gain and lose is 2 d a, and of a
+    second budget, 2 d a (1 - r), the half bounds the peak.
+    """
+    gain, slower = 2.0 * length * acceleration, 2.0 * length * acceleration * (1.0 - ratio)
+    peak = min(speed**2, (0.0 + gain) / 2.0, (0.0 + slower) / 2.0)
+    ramps = peak / (2.0 * acceleration)
+    assert length - 2.0 * ramps >= (ratio - 1e-12) * length
+    return 2.0 * ramps / (peak**0.5 / 2.0) + (length - 2.0 * ramps) / peak**0.5
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.37, 0.5, 0.8, 0.95])
+def test_what_klippers_cruise_ratio_costs_is_what_its_look_ahead_makes_of_a_move(tmp_path, ratio):
+    _, notes = made(tmp_path, f"{PRINTER}minimum_cruise_ratio: {ratio}\n", "printer.cfg")
+    said = float(re.search(r"up to (\d+) % longer", notes)[1])
+    longer = [
+        alone(length, 300.0, 3000.0, ratio) / alone(length, 300.0, 3000.0, 0.0) - 1.0
+        for length in np.geomspace(0.01, 3000.0, 400)
+    ]
+    assert 100.0 * max(longer) == pytest.approx(said, abs=0.5)
+    assert longer[0] == pytest.approx(max(longer))
+    assert longer[-1] == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("number", ["1e3", "5,000", "5000,0", "nan", ""])

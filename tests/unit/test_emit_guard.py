@@ -110,6 +110,15 @@ def test_programs_that_may_use_what_the_guard_does_are_refused(line):
 
 
 @pytest.mark.parametrize(
+    ("code", "says"), [("M97", "calls"), ("M98", "calls"), ("M99", "leads back")]
+)
+def test_the_refusal_names_the_code_that_stands_there(code, says):
+    with pytest.raises(EmitError, match=f"{code} {says}") as caught:
+        process(HEAD + b"G0 X5\n%b P100\nG0 X0\nM2\n" % code.encode(), MACHINE)
+    assert ("end the program with M2 or M30" in str(caught.value)) == (code == "M99")
+
+
+@pytest.mark.parametrize(
     "line",
     [b"(#### [roughing] ####)", b"; see ##2, M66", b"#1 = 5399", b"#<_m66> = 2", b"#53991=1"],
 )

@@ -207,6 +207,21 @@ def test_programs_that_say_what_the_form_says_are_refused(form, line):
     assert [v.original_line for v in found.violations if "no stream may stand" in v.problem] == [9]
 
 
+@pytest.mark.parametrize("end", [b"M99", b"m 099 (again)", b"/M99"])
+def test_a_program_that_leads_back_to_a_caller_is_told_what_helps(end):
+    program = PROGRAM.replace(b"M2\n", end + b"\nM2\n")
+    assert process(program, MACHINE, form="adaptive-feed").planned
+    with pytest.raises(EmitError) as caught:
+        process(program, MACHINE, form="position")
+    problem, _, remedy = str(caught.value).partition(": no stream")
+    assert problem.endswith("M99 leads back to a caller, which may use #5399")
+    assert "M98" not in str(caught.value)
+    assert (
+        "end the program with M2 or M30 if no other one calls it, or process with --as adapt"
+        in (remedy)
+    )
+
+
 OWN = (b"M67 E2 Q3", b"M68 E30 Q1", b"(M67 E3 Q2)", b"; M52 P0", b"M62 P3", b"#<m67> = 5")
 
 

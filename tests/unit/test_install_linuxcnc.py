@@ -1,10 +1,14 @@
 """`install linuxcnc`: in, out again byte for byte, and refused where it cannot be."""
 
+import runpy
 import shutil
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+from gcodejerk import Machine, process
 from gcodejerk.cli import main
 from gcodejerk.errors import EmitError
 from gcodejerk.hosts.linuxcnc import hal_files
@@ -302,3 +306,41 @@ def test_exit_status(config, arguments, code, capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert bool(err) == (code > 0)
     assert bool(out) == (code == 0)
+
+
+# --- M152 knows the programs that ask for rapids ---
+
+
+@pytest.fixture
+def asks(monkeypatch, tmp_path):
+    """What M152 says of a program; LinuxCNC's own module is not needed for it."""
+    monkeypatch.setitem(sys.modules, "hal", ModuleType("hal"))
+    script = Path(hal_files.__file__).parent / hal_files.SCRIPT
+    of_path = runpy.run_path(str(script))["asks"]
+
+    def of_text(data):
+        (tmp_path / "part.ngc").write_bytes(data)
+        return of_path(str(tmp_path / "part.ngc"))
+
+    return of_text
+
+
+@pytest.mark.parametrize(
+    ("head", "end"),
+    [(b"", b""), (b"\n" * 70_000 + b"%\n", b"%\n"), (b"(A long story)\n" * 6_000 + b"O100\n", b"")],
+)
+@pytest.mark.parametrize("form", FORMS)
+def test_a_program_that_asks_for_rapids_is_known_whatever_stands_in_front(asks, form, head, end):
+    golden = Path(__file__).parents[1] / "golden" / "hal_position" / "machine.yaml"
+    program = head + b"G21 G90 G17 G40 G94 G64\nG0 X0\nG0 X50\nM2\n" + end
+    output = process(program, Machine.load(golden), form=form).output
+    assert (output.index(b"\nM152 P") > 65_536) == bool(head)
+    assert asks(output)
+    assert not asks(program)
+
+
+def test_m152_is_found_wherever_a_look_at_a_part_of_the_file_may_end(asks):
+    for before in range((1 << 20) - 9, (1 << 20) + 2):
+        assert asks(b"(" * before + b"\nM152 P1 Q2\n"), before
+    assert not asks(b"")
+    assert not asks(b"(see\tM152 P1)\nM1520 P1\n")

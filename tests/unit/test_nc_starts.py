@@ -244,18 +244,79 @@ def test_the_keys_are_written_back():
 # --- programs that begin again ---
 
 
-@pytest.mark.parametrize(
-    ("end", "first"),
-    [
-        (b"M2", None),
-        (b"M99", UNKNOWN),
-        (b"m0 99 (again)", UNKNOWN),
-        (b"M2 (M99)", None),
-        (b"M2 ; M99", None),
-        (b"M990", None),
-    ],
-)
-def test_a_program_of_linuxcnc_that_begins_again_begins_nowhere_known(end, first):
+SUB = b"O100\nG1 X1 F50\nM99\n"
+CALLED = b"M98 P100\nM2\n" + SUB
+AGAIN = {
+    "an end": (b"M2", None),
+    "M99 for an end": (b"M99", UNKNOWN),
+    "blanks and zeros": (b"m0 99 (again)", UNKNOWN),
+    "a comment": (b"M2 (M99)", None),
+    "a comment to the end of the line": (b"M2 ; M99", None),
+    "another number": (b"M990", None),
+    "a carriage return within": (b"M\r99", UNKNOWN),
+    "a decimal point": (b"M99.0", UNKNOWN),
+    "a sign": (b"M+99", UNKNOWN),
+    "what is rounded": (b"M98.99995", UNKNOWN),
+    "what is computed": (b"M[90+9]", UNKNOWN),
+    "a variable": (b"#1=99\nM#1", UNKNOWN),
+    "a function": (b"M ABS[-99]", UNKNOWN),
+    "a sign in front of what is computed": (b"M-[-99]", UNKNOWN),
+    "names with an M": (b"#<_move>=[5 MOD 2] (M)\nM2", None),
+    "a subprogram": (CALLED, None),
+    "a pallet": (CALLED.replace(b"M2", b"N5 m 0 30 (end)"), None),
+    "line ends of Windows": (CALLED.replace(b"\n", b"\r\n"), None),
+    "nothing in front of the subprogram": (b"M98 P100\n" + SUB, UNKNOWN),
+    "an end behind the subprogram": (b"M98 P100\n" + SUB + b"M2\n", UNKNOWN),
+    "a subprogram that calls": (
+        b"M98 P100 L3\nM30\nO100\nM98 P200\nM99\nO200\nG1 X2 F9\nM99\n",
+        None,
+    ),
+    "an end in the subprogram": (b"M98 P100\nO100\nM2\nM99\n", None),
+    "M99 P behind the end": (CALLED.replace(b"M99", b"M99 P10"), None),
+    "M99 P": (b"N10 M99 P10", UNKNOWN),
+    "an end that may be passed over": (CALLED.replace(b"M2", b"/M2"), UNKNOWN),
+    "an end and M99": (b"M2 M99", UNKNOWN),
+    "an end within a condition": (
+        b"o1 if [#1]\n" + CALLED.replace(SUB, b"o1 endif\n" + SUB),
+        UNKNOWN,
+    ),
+    "an end within a loop": (b"o1 while [0]\nM2\no1 endwhile\nM99\n", UNKNOWN),
+    "an end within another subprogram": (b"o1 sub\nM2\no1 endsub\nM99\n", UNKNOWN),
+    "an end of another label": (b"o1 if [0]\no2 endif\nM2\no1 endif\nM99\n", UNKNOWN),
+    "the same label, written twice": (b"o1 if [0]\no<1> endif\nM2\no1 endif\nM99\n", UNKNOWN),
+    "crossed structures": (
+        b"o1 if [0]\no2 while [0]\no1 endif\no2 endwhile\n" + CALLED,
+        UNKNOWN,
+    ),
+    "a computed label": (b"o[#1] if [0]\nM2\nM99\n", UNKNOWN),
+    "two computed labels": (
+        b"o[#1] if [0]\no[#2] endif\nM2\no[#1] endif\nM99\n",
+        UNKNOWN,
+    ),
+    "a label with a point": (b"o1.0 if [0]\nM2\no1 endif\nM99\n", UNKNOWN),
+    "a beginning that may be passed over": (
+        b"o1 if [1]\n/o1 endif\nM2\no1 endif\nM99\n",
+        UNKNOWN,
+    ),
+    "a way out of what has ended": (
+        b"o1 while [0]\no1 endwhile\no1 break\nM2\no1 endwhile\nM99\n",
+        UNKNOWN,
+    ),
+    "structures that have ended": (
+        b"o1 sub\no2 if [0]\no1 return\no2 endif\no1 endsub\no3 do\no4 repeat [2]\no3 continue\n"
+        b"o4 endrepeat\no3 while [0]\no<a> if [1]\no<A> else\no<a> endif\no1 call\n" + CALLED,
+        None,
+    ),
+    "a label that comes twice": (
+        b"o1 if [0]\no1 endif\no1 if [0]\no1 endif\n" + CALLED,
+        UNKNOWN,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", AGAIN)
+def test_a_program_of_linuxcnc_that_begins_again_begins_nowhere_known(case):
+    end, first = AGAIN[case]
     text = b"G21 G90 G17 G40 G94 G54 G49\nG0 X5\nG1 X6 F100\nG0 X9\n" + end + b"\n"
     known = {"positions": HOME, "offsets": OFFSETS}
     why, rapids = read(text, "linuxcnc", **known)

@@ -125,21 +125,28 @@ def _shapers(draft: Draft, values: _Config) -> None:
 
 
 def _cruise(draft: Draft, values: _Config) -> None:
-    """The part of every move without acceleration, which slows short rapids down."""
+    """The part of every move without acceleration, which slows short rapids down.
+
+    Until August 2025 (3ef760c) it could be stated as an acceleration, of which the ratio to
+    max_accel counts (0105aa3); before, that acceleration itself did, with the same peak speed.
+    """
     ratio = values.number("printer", "minimum_cruise_ratio")
-    if ratio is None:
-        ratio, said = DEFAULT_CRUISE, " (Klipper's own)"
-        if values.text("printer", "max_accel_to_decel") is not None:
-            return
+    slower = values.number("printer", "max_accel_to_decel")
+    most = values.number("printer", "max_accel")
+    remedy = "0"
+    if ratio is not None:
+        said = f"minimum_cruise_ratio is {ratio:g}"
+    elif slower is not None and most:
+        ratio, said = 1.0 - min(1.0, slower / most), f"max_accel_to_decel is {slower:g}"
+        remedy = f"max_accel (SET_VELOCITY_LIMIT ACCEL_TO_DECEL={most:g})"
     else:
-        said = ""
+        ratio, said = DEFAULT_CRUISE, f"minimum_cruise_ratio is {DEFAULT_CRUISE:g} (Klipper's own)"
     if 0.0 < ratio < 1.0:
         # A move that never reaches its speed peaks at sqrt((1 - r) d a), not at sqrt(d a).
         longer = 50.0 * (2.0 - ratio) / (1.0 - ratio) ** 0.5 - 100.0
         draft.notes.append(
-            f"minimum_cruise_ratio is {ratio:g}{said}: short rapids take up to {longer:.0f} % "
-            "longer today than this file says, and streams are played slower: set it to 0 while "
-            "they run"
+            f"{said}: short rapids take up to {longer:.0f} % longer today than this file says, and "
+            f"streams are played slower: set it to {remedy} while they run"
         )
 
 

@@ -30,8 +30,6 @@ _REFERS = re.compile(rb"GOTO|REPEAT|CASE|M[ \t]*0*9[69]")
 _FLOW = re.compile(
     rb"(?<![A-Z0-9_])(?:GOTO|IF|WHILE|REPEAT|RPT|LOOP|FOR|CASE|UNTIL|GOSUB|CALL)(?![A-Z_])", re.I
 )
-_M99 = re.compile(rb"M[ \t0]*9[ \t]*9(?![0-9.])", re.IGNORECASE)
-_NINES = re.compile(rb"9[ \t]*9(?![0-9.])")
 _REMARK = re.compile(rb";[^\n]*")
 _COMMENT = re.compile(rb"\([^)\n]*(?:\)|$)|;[^\n]*", re.MULTILINE)
 _G_CODE = re.compile(rb"[gG][ \t]*([0-9]+(?:\.[0-9]*)?)")
@@ -106,31 +104,6 @@ def may_go_back(file: BinaryIO, dialect: Dialect, name: str) -> bool:
             break
     file.seek(begin)
     return found
-
-
-def begins_again(file: BinaryIO, name: str) -> bool:
-    """Whether a program with O-words may go back to its beginning: LinuxCNC's M99 does, for ever.
-
-    In a subprogram it only returns; which of both it is, is not asked.
-    """
-    begin = file.tell()
-    found = any(_says_m99(chunk.data) for chunk in read_chunks(file, name))
-    file.seek(begin)
-    return found
-
-
-def _says_m99(data: bytes) -> bool:
-    """Whether M99 stands in whole lines, outside of comments."""
-    # Its last digits are looked for first: that is quick, and few numbers end so.
-    for nines in _NINES.finditer(data):
-        at = nines.start() - 1
-        while at >= 0 and data[at] in b" \t0":
-            at -= 1
-        if at >= 0 and data[at] in b"Mm":
-            line = data[data.rfind(b"\n", 0, at) + 1 : data.find(b"\n", at) % (len(data) + 1)]
-            if _M99.search(_COMMENT.sub(b" ", line)):
-                return True
-    return False
 
 
 def find_outline(file: BinaryIO, dialect: Dialect, name: str) -> Outline:
