@@ -32,7 +32,7 @@ UNIT = 0.2
 """Of accelerations as the solver sees them: what a step costs is its square in this unit."""
 FIRST, THEN, LAST = 1e-4, 3e-5, 1e-6
 """What a step costs at first, over half of its square; where the jerk is sought then; at least."""
-GOOD, LONGER = 1.1, 0.3
+GOOD, LONGER = 1.5, 0.3
 """Where cones are left with no more than this times what planes say, steps cost so much less."""
 LONG = 0.1
 """And so much less where nothing is exceeded, but steps still gain."""
@@ -40,7 +40,7 @@ SETTLED = 3e-3
 """A step that costs no more than this share of what is made least does not gain any more."""
 REACH = 0.1
 """How far away the least is thought to be at most, as a share of the accelerations."""
-NEAR = 0.1
+NEAR = 0.2
 """Planes that are neither held nor within this share of what they allow are left out again."""
 EXACT = 1e-7
 """Rows that are not held are kept to this much of their length."""
