@@ -12,6 +12,7 @@ comes from the solver or from the disk.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import multiprocessing
 import os
 import signal
@@ -46,7 +47,7 @@ GENERATION = 4
 """Counted on whenever the solver answers otherwise: answers of before are not taken."""
 NONE = b"none"
 """In the cache: the problem has no solution."""
-BATCH = 64
+BATCH = 16
 """Solutions are written to the disk so many at a time: a run that is cut keeps what it has."""
 
 
@@ -140,11 +141,10 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     missing = [key for key in distinct if key not in found]
     done = len(found)
     with _workers(len(missing)) as solve_all:
-        for begin in range(0, len(missing), BATCH):
-            part = missing[begin : begin + BATCH]
-            solved = dict(zip(part, solve_all([distinct[k] for k in part]), strict=True))
-            write_solutions({key: _encoded(x) for key, x in solved.items()}, file)
-            found.update(solved)
+        solved = zip(missing, solve_all([distinct[key] for key in missing]), strict=True)
+        while part := dict(itertools.islice(solved, BATCH)):
+            write_solutions({key: _encoded(x) for key, x in part.items()}, file)
+            found.update(part)
             done += len(part)
             if progress is not None:
                 progress(done, len(distinct))
@@ -156,8 +156,8 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
 
 
 @contextmanager
-def _workers(problems: int) -> Iterator[Callable[[list[Question]], list[Optimum | None]]]:
-    """What solves a list of problems: all cores where that pays, this process otherwise.
+def _workers(problems: int) -> Iterator[Callable[[list[Question]], Iterator[Optimum | None]]]:
+    """What solves problems one by one: all cores where that pays, this process otherwise.
 
     The solver keeps Python's lock, so threads would not help. Processes are forked: other ways of
     starting them would run the user's own script again. Where this process is itself one of several
@@ -165,13 +165,15 @@ def _workers(problems: int) -> Iterator[Callable[[list[Question]], list[Optimum 
     """
     cores = 1 if multiprocessing.parent_process() else os.cpu_count() or 1
     if problems < FEW or cores == 1 or "fork" not in multiprocessing.get_all_start_methods():
-        yield lambda questions: [_answer(question) for question in questions]
+        yield lambda questions: map(_answer, questions)
         return
     context = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(
-        min(cores, problems), mp_context=context, initializer=_follow_master
-    ) as pool:
-        yield lambda questions: list(pool.map(_answer, questions))
+    pool = ProcessPoolExecutor(min(cores, problems), mp_context=context, initializer=_follow_master)
+    try:
+        yield lambda questions: pool.map(_answer, questions)
+    finally:
+        # Who stops waits for no more than what is being solved.
+        pool.shutdown(cancel_futures=True)
 
 
 def _follow_master() -> None:
