@@ -184,11 +184,9 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     """
     profiles, worst = task.conventional, np.full(len(task), np.inf)
     rows = np.nonzero(task.objective.weights.any(axis=1))[0]
-    reference = task.objective.of(task.conventional)
-    slack = np.maximum(
-        NEXT_TO_NOTHING * worst_in_band(task, task.conventional), SETTLED * task.tolerance
-    )
-    questions = [_question(task, k, float(reference[k]), slack=float(slack[k])) for k in rows]
+    today = worst_in_band(task, task.conventional)
+    slack = np.maximum(NEXT_TO_NOTHING * today, SETTLED * task.tolerance)
+    questions = [_question(task, k, float(today[k]), slack=float(slack[k])) for k in rows]
     profiles, worst = _answered(task, rows, answers(questions, task.progress), profiles, worst)
     found = np.isfinite(worst)
     worst[found] = worst_in_band(task.take(found), profiles.take(found))

@@ -229,6 +229,11 @@ class Cutting:
         return self.unknowns.solution(self._full(), curved=True, null=False)
 
     @property
+    def cones(self) -> NDArray[np.int64]:
+        """Those that there are planes of, one for each."""
+        return self._cone
+
+    @property
     def _lowest(self) -> float:
         """What steps cost at least."""
         return max(self._least, LAST if self._smooth else LAST * max(self._last, STILL))

@@ -114,12 +114,17 @@ class LookedAt:
             self.poles[own], self.weights[own], self.group[own], self.source, self.first
         )
 
-    @property
-    def sparse(self) -> NDArray[np.bool_]:
-        """Some of the groups: guarded frequencies side by side say nearly the same, shape (g,)."""
-        stride = max(8, int(np.count_nonzero(self.source < 0)) // 48)
-        sparse: NDArray[np.bool_] = np.arange(len(self.source)) % stride == 0
-        return sparse
+    def exceeded(self, left: Array, most: Array) -> NDArray[np.bool_]:
+        """Groups that are left with too much: peaks, and some of those that are guarded, (g,).
+
+        `left`, `most`, shape (g,): what each is left with, and what it may be.
+        """
+        guarded = self.source < 0
+        # Guarded frequencies side by side say nearly the same.
+        stride = max(8, int(np.count_nonzero(guarded)) // 48)
+        sparse = guarded & (np.arange(len(guarded)) % stride == 0)
+        exceeded: NDArray[np.bool_] = (left > most) & (self.peaks(left) | sparse)
+        return exceeded
 
     def peaks(self, left: Array) -> NDArray[np.bool_]:
         """Groups that are left with no less than their neighbours of the same source, (g,)."""
@@ -193,12 +198,20 @@ class Blocks:
         _write_halves(rows, early, late, looked_at, knots, count * interval, last, last + 1)
         return cls(knots, rows, cone, cone // 2, True, True)
 
+    @property
+    def owner(self) -> Index:
+        """The group of each cone."""
+        owner: Index = self.group[np.diff(self.cone, prepend=-1) != 0]
+        return owner
+
+    def largest(self, left: Array) -> Array:
+        """Of what each cone is left with, what each group is, shape (g,)."""
+        largest: Array = np.maximum.reduceat(left, np.flatnonzero(np.diff(self.owner, prepend=-1)))
+        return largest
+
     def left(self, jerk: Array) -> Array:
         """What each group is left with by a jerk in each block, shape (g,)."""
-        cones = grouped(np.abs(self.rows @ jerk), self.cone)
-        own = self.group[np.diff(self.cone, prepend=-1) != 0]
-        left: Array = np.maximum.reduceat(cones, np.flatnonzero(np.diff(own, prepend=-1)))
-        return left
+        return self.largest(grouped(np.abs(self.rows @ jerk), self.cone))
 
 
 def _both_halves(looked_at: LookedAt, alike: bool, first: int) -> tuple[Index, Index, Index]:

@@ -66,6 +66,8 @@ USED, USED_BY_PLANES = 0.985, 0.995
 which are made until that is held everywhere."""
 GUARDED, KEPT = 0.98, 1.005
 """The same of what guarded frequencies may keep; and where these are found to keep it."""
+GIVEN = 0.2
+"""Of what a profile leaves less than the controller's own, what may be given for less jerk."""
 JERK_COST = 1e-3
 """What the full jerk costs beside a residual that matters: so much of that may be lost by it."""
 LEAST_COST = 2e-5
@@ -114,7 +116,7 @@ def near_least(move: Move, slack: float, settled: float, reference: float) -> Op
     settled : float
         Where the least is no more than this, what is found leaves no more either. [mm]
     reference : float
-        As in `least_residual`. [mm]
+        As in `least_residual`; of what is gained on it, only a part is given for less jerk. [mm]
 
     Returns
     -------
@@ -131,7 +133,8 @@ def near_least(move: Move, slack: float, settled: float, reference: float) -> Op
     allowed = min(slack / search.unit, 0.5 * most)
     found = search.least(allowed)
     if found is not None and found.guards and found.worst > allowed:
-        allowed = found.worst + slack / search.unit
+        gained = max(reference / search.unit - found.worst, 0.0)
+        allowed = found.worst + min(slack / search.unit, GIVEN * gained)
         allowed = min(allowed, most) if found.worst <= USED * most else allowed
         found = search.smoother(found, allowed)
     return search.optimum(found)
@@ -179,6 +182,8 @@ class _Found:
         The jerk.
     left : ndarray, shape (g,)
         What each group is left with, over the measure. [-]
+    cutting : Cutting, optional
+        The programme by planes that it was found by.
     """
 
     looked_at: LookedAt
@@ -187,6 +192,14 @@ class _Found:
     solution: Solution
     left: Array
     cutting: Cutting | None = None
+
+    @classmethod
+    def by_planes(cls, looked_at: LookedAt, blocks: Blocks, cutting: Cutting) -> _Found:
+        """The last solution of a programme by planes."""
+        active = looked_at.first.copy()
+        active[blocks.owner[cutting.cones]] = True
+        solution = cutting.solution()
+        return cls(looked_at, blocks, active, solution, blocks.left(solution.jerk), cutting)
 
     @property
     def worst(self) -> float:
@@ -350,59 +363,32 @@ class _Search:
             found = _Found(looked_at, blocks, active, solution, blocks.left(solution.jerk))
             best = _better(best, found)
             most = max(WORSE * solution.worst, allowed, NULL)
-            guarded = looked_at.source < 0
-            over = found.left > np.where(guarded, KEPT, most)
-            missing = over & ~active & (looked_at.peaks(found.left) | (guarded & looked_at.sparse))
+            most_each = np.where(looked_at.source < 0, KEPT, most)
+            missing = looked_at.exceeded(found.left, most_each) & ~active
             if not missing.any():
                 break
             active = active | missing
         return best
 
     def _cut(
-        self,
-        looked_at: LookedAt,
-        blocks: Blocks,
-        allowed: float,
-        start: _Found | None,
+        self, looked_at: LookedAt, blocks: Blocks, allowed: float, start: _Found | None,
         rough: float,
-    ) -> _Found | None:
+    ) -> _Found | None:  # fmt: skip
         """The same by planes, and then the least jerk for what is allowed, if that is within reach.
 
         None where the solver gives up. `start` of the same blocks: the jerk is all that is sought.
         """
         before = start.cutting if start is not None else None
         if start is not None and before is not None and start.blocks is blocks:
-            cutting = before
-        else:
-            every = np.ones(len(looked_at.source), dtype=bool)
-            cutting = Cutting(self._problem(looked_at, blocks, every))
-            if before is not None:
-                cutting.begin(before)
-        guarded = looked_at.source < 0
-        owner = blocks.group[np.diff(blocks.cone, prepend=-1) != 0]
-        first = np.flatnonzero(np.diff(owner, prepend=-1))
-        active = looked_at.first.copy()
-        smooth, best = cutting is before, start if cutting is before else None
-        for _ in range(MOST_CUTS):
-            goal = max(USED_BY_PLANES * allowed, best.worst if smooth and best else 0.0)
-            if not cutting.solve(goal, smooth):
-                return best
-            left = np.maximum.reduceat(cutting.left, first)
-            reached = smooth or cutting.expected <= allowed
-            most = cutting.told + max(LITTLE * cutting.told, NOTHING)
-            over = left > np.where(guarded, KEPT, allowed if reached else most)
-            missing = over & (looked_at.peaks(left) | (guarded & looked_at.sparse))
-            active |= missing
-            going = cutting.cut(missing[owner]) or (not cutting.settled and (smooth or not reached))
-            known = left[~guarded].max() <= (1.0 + rough) * cutting.expected
-            if going and not (rough and known and not reached):
-                continue
-            solution = cutting.solution()
-            best = _Found(looked_at, blocks, active, solution, blocks.left(solution.jerk), cutting)
-            if smooth or (not reached and (rough or allowed)):
-                break
-            smooth, allowed = True, allowed or (1.0 + LOSS) * max(best.worst, NULL)
-        return best
+            return _smoothed(start, before, allowed)
+        every = np.ones(len(looked_at.source), dtype=bool)
+        cutting = Cutting(self._problem(looked_at, blocks, every))
+        if before is not None:
+            cutting.begin(before)
+        found = _least_by_planes(looked_at, blocks, cutting, allowed, rough)
+        if found is None or (cutting.expected > allowed and (rough or allowed)):
+            return found
+        return _smoothed(found, cutting, allowed or (1.0 + LOSS) * max(found.worst, NULL))
 
     def _ramps(self, looked_at: LookedAt) -> Blocks:
         """Blocks of the ramps of a move with a long cruise."""
@@ -412,6 +398,42 @@ class _Search:
     def _whole(self, looked_at: LookedAt, knots: Index) -> Blocks:
         """Blocks of the whole move."""
         return Blocks.whole(looked_at, knots, self.move.interval, self.halves)
+
+
+def _least_by_planes(
+    looked_at: LookedAt, blocks: Blocks, cutting: Cutting, allowed: float, rough: float
+) -> _Found | None:
+    """The least residual above what is allowed; None where the solver gives up."""
+    modes = looked_at.source >= 0
+    for _ in range(MOST_CUTS):
+        if not cutting.solve(USED_BY_PLANES * allowed, smooth=False):
+            return None
+        left, reached = blocks.largest(cutting.left), cutting.expected <= allowed
+        most = allowed if reached else cutting.told + max(LITTLE * cutting.told, NOTHING)
+        going = _cut_where(looked_at, blocks, cutting, most) or not (cutting.settled or reached)
+        known = not reached and left[modes].max() <= (1.0 + rough) * cutting.expected
+        if not going or (rough and known):
+            return _Found.by_planes(looked_at, blocks, cutting)
+    return None
+
+
+def _smoothed(found: _Found, cutting: Cutting, allowed: float) -> _Found:
+    """The least jerk for what is allowed, on the same blocks; what was found where none is."""
+    goal = max(USED_BY_PLANES * allowed, found.worst)
+    for _ in range(MOST_CUTS):
+        if not cutting.solve(goal, smooth=True):
+            break
+        going = _cut_where(found.looked_at, found.blocks, cutting, allowed)
+        if not going and cutting.settled:
+            return _Found.by_planes(found.looked_at, found.blocks, cutting)
+    return found
+
+
+def _cut_where(looked_at: LookedAt, blocks: Blocks, cutting: Cutting, most: float) -> bool:
+    """Cut what is left with more than this, or guarded with more than it may; whether any was."""
+    guarded = looked_at.source < 0
+    missing = looked_at.exceeded(blocks.largest(cutting.left), np.where(guarded, KEPT, most))
+    return cutting.cut(missing[blocks.owner])
 
 
 def _better(one: _Found | None, other: _Found | None) -> _Found | None:
