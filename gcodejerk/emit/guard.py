@@ -35,15 +35,16 @@ _COMMENT = re.compile(rb"\(([^)]*)\)|;(.*)")
 _ACTIVE = re.compile(rb"(?:ABORT|DEBUG|PRINT|LOG|PY)", re.IGNORECASE)
 """Comments that compute, or may."""
 _O_WORD = re.compile(rb"(?:/[0-9]?)?(?:N[0-9.]+)?O(<[^>]*>|[0-9]+|)(.*)")
-NAME = re.compile(rb"<[^>]*>")
+_NAME = re.compile(rb"<[^>]*>")
+_NUMBER = re.compile(rb"([MEP#])\+?([0-9]+\.?[0-9]*|\.[0-9]+)")
 ANSWER = (
-    (re.compile(rb"#0*5399(?![0-9])"), "#5399 is used"),
+    (re.compile(rb"#5399(?![0-9])"), "#5399 is used"),
     (re.compile(rb"#[^0-9<]"), "a parameter is used whose number is computed, #5399 perhaps"),
-    (re.compile(rb"M0*66(?![0-9])"), "M66 is used, whose answer is #5399"),
+    (re.compile(rb"M66(?![0-9])"), "M66 is used, whose answer is #5399"),
     (re.compile(rb"M[\[#]"), "an M code is computed, M66 perhaps"),
-    (re.compile(rb"M0*97(?![0-9])"), "M97 calls a subprogram, which may use #5399"),
-    (re.compile(rb"M0*98(?![0-9])"), "M98 calls a subprogram, which may use #5399"),
-    (re.compile(rb"M0*99(?![0-9])"), "M99 leads back to a caller, which may use #5399"),
+    (re.compile(rb"M97(?![0-9])"), "M97 calls a subprogram, which may use #5399"),
+    (re.compile(rb"M98(?![0-9])"), "M98 calls a subprogram, which may use #5399"),
+    (re.compile(rb"M99(?![0-9])"), "M99 leads back to a caller, which may use #5399"),
 )
 """Where a program uses #5399, or may: M66 of ours overwrites it."""
 INSTEAD = {ANSWER[-1]: "end the program with M2 or M30 if no other one calls it, or "}
@@ -125,6 +126,14 @@ def lines_of_code(source: BinaryIO) -> Iterator[tuple[int, bytes]]:
         yield number, b"".join(_COMMENT.sub(_active, text).split()).upper()
 
 
+def plain_numbers(code: bytes) -> bytes:
+    """Codes and numbers of outputs, inputs and parameters as LinuxCNC takes them; names left out.
+
+    All are rounded to the nearest integer: ``M67.00001 E2.6`` is M67 E3.
+    """
+    return _NUMBER.sub(lambda n: n[1] + b"%d" % int(float(n[2]) + 0.5), _NAME.sub(b"<>", code))
+
+
 def _structures(source: BinaryIO, name: str) -> Iterator[tuple[int, float]]:
     """First and last line of each label's structures."""
     first: dict[bytes, int] = {}
@@ -144,7 +153,7 @@ def _structures(source: BinaryIO, name: str) -> Iterator[tuple[int, float]]:
             # What stands alone has no end that we know.
             last[label] = number if label in first else np.inf
             first.setdefault(label, number)
-        plain = NAME.sub(b"<>", code)
+        plain = plain_numbers(code)
         for pattern, problem in ANSWER:
             if pattern.search(plain):
                 raise _refused(problem, name, number, INSTEAD.get((pattern, problem), ""))

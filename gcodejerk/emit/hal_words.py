@@ -12,21 +12,21 @@ from __future__ import annotations
 import re
 from typing import BinaryIO
 
-from gcodejerk.emit.guard import ANSWER, INSTEAD, NAME, lines_of_code
+from gcodejerk.emit.guard import ANSWER, INSTEAD, lines_of_code, plain_numbers
 from gcodejerk.errors import EmitError, Place
 
 ADAPTIVE, POSITION = "adaptive-feed", "position"
-_THREE = rb"(?:\+?0*3(?:\.0*)?(?![0-9.])|[^0-9+.])"
+_THREE = rb"(?:3(?![0-9])|[^0-9])"
 """The number 3, or what is computed."""
 _BOTH = (
-    (re.compile(rb"M0*6[78](?![0-9.]).*E" + _THREE + rb"|E" + _THREE + rb".*M0*6[78](?![0-9.])"),
+    (re.compile(rb"M6[78](?![0-9]).*E" + _THREE + rb"|E" + _THREE + rb".*M6[78](?![0-9])"),
      "M67 or M68 E3 asks for a rapid"),
-    (re.compile(rb"M0*66(?![0-9.]).*P" + _THREE + rb"|P" + _THREE + rb".*M0*66(?![0-9.])"),
+    (re.compile(rb"M66(?![0-9]).*P" + _THREE + rb"|P" + _THREE + rb".*M66(?![0-9])"),
      "M66 P3 reads whether a rapid was played"),
     (re.compile(rb"M[\[#]"), "an M code is computed, M67 or M68 perhaps"),
 )  # fmt: skip
 _TAKEN = {
-    ADAPTIVE: (*_BOTH, (re.compile(rb"M0*52(?![0-9.])"), "M52 acts on every stream of this form")),
+    ADAPTIVE: (*_BOTH, (re.compile(rb"M52(?![0-9])"), "M52 acts on every stream of this form")),
     POSITION: (*_BOTH, *ANSWER),
 }
 _HELP = {
@@ -53,7 +53,7 @@ def check_words(source: BinaryIO, name: str, form: str) -> None:
         At the first such line.
     """
     for number, code in lines_of_code(source):
-        plain = NAME.sub(b"<>", code)
+        plain = plain_numbers(code)
         for pattern, problem in _TAKEN[form]:
             if pattern.search(plain):
                 taken = (pattern, problem) in _BOTH

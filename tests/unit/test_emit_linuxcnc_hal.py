@@ -182,6 +182,10 @@ BOTH = (
     b"M68 E[1+2] Q2",
     b"M66 P3 L3 Q1",
     b"M[60+7] E3 Q2",
+    b"M67 E2.6 Q2",
+    b"M+68. E3 Q2",
+    b"M66.99999 E3 Q2",
+    b"m066.0 P+2.5 L3 Q1",
 )
 TAKEN = [
     *((form, line) for form in FORMS for line in BOTH),
@@ -192,6 +196,10 @@ TAKEN = [
     ("position", b"(debug, came #5399)"),
     ("position", b"#1 = ##2"),
     ("position", b"M98 P100"),
+    ("position", b"M97.99999 P100"),
+    ("position", b"#1 = #+5399"),
+    ("position", b"#1 = #5398.99999"),
+    ("adaptive-feed", b"M52.00001 P0"),
 ]
 
 
@@ -222,7 +230,15 @@ def test_a_program_that_leads_back_to_a_caller_is_told_what_helps(end):
     )
 
 
-OWN = (b"M67 E2 Q3", b"M68 E30 Q1", b"(M67 E3 Q2)", b"; M52 P0", b"M62 P3", b"#<m67> = 5")
+OWN = (
+    b"M67 E2.4 Q3",
+    b"M67 E2 Q3",
+    b"M68 E30 Q1",
+    b"(M67 E3 Q2)",
+    b"; M52 P0",
+    b"M62 P3",
+    b"#<m67> = 5",
+)
 
 
 @pytest.mark.parametrize(
