@@ -57,6 +57,7 @@ def verify(
     from gcodejerk.verification.proof import beside_of
     from gcodejerk.verification.reported import read_reported
     from gcodejerk.verification.rows.files import rows_format
+    from gcodejerk.verification.table import is_table
 
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
@@ -73,7 +74,8 @@ def verify(
     with ExitStack() as files:
         one, other = (files.enter_context(open_input(name)) for name in (original, processed))
         names = (original, processed)
-        table = processed.lower().endswith(".csv") or rows_format(other) is not None
+        named = processed.lower().endswith(".csv")
+        table = named or is_table(other) or rows_format(other) is not None
         if table and front:
             raise typer.BadParameter(in_table)
         described, dialect, front = _said(

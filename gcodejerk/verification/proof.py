@@ -39,7 +39,7 @@ from gcodejerk.verification.second_reading.agreement import confirm
 from gcodejerk.verification.sections import judge_sections
 from gcodejerk.verification.settings import check_settings, settings_note
 from gcodejerk.verification.streams import BATCH_BYTES, batches, checked, judge_streams, moves
-from gcodejerk.verification.table import TableReader
+from gcodejerk.verification.table import TableReader, is_table
 
 MOST = 100
 """Violations that are collected, unless asked otherwise."""
@@ -114,7 +114,7 @@ def verify(
         if machine.controller == CONTROLLER:
             beside = beside_of(processed) if beside is None else beside
             samples = None if beside is None else stack.enter_context(_opened(beside))
-        table = rows_format(other) is not None
+        table = is_table(other) or rows_format(other) is not None
         return verify_files(
             one, other, machine, names=names, dialect=dialect, most=most, beside=samples,
             table=table,

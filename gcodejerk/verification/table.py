@@ -19,12 +19,30 @@ from gcodejerk.nc import CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.physics.points import STANDSTILL, Array, Paths, resolutions
 
+HEAD = 64
+"""Bytes that hold the head of a table."""
 PIECE = 1 << 20
 ROWS = 512
 """Rows in one match: a repeat remembers every turn that it could still take back."""
 EXACT = 1e-11
 """A position in mm written in full. [mm]"""
 _NUMBER = rb"-?(?:[0-9]{1,9}(?:\.[0-9]{0,250})?|\.[0-9]{1,250})"
+_HEADER = re.compile(rb"block,t(?:,[A-Z])+\r?\n")
+
+
+def is_table(file: BinaryIO) -> bool:
+    r"""Whether a file begins as a table of points does. The file is left where it was.
+
+    Examples
+    --------
+    >>> import io
+    >>> is_table(io.BytesIO(b"block,t,X,Z\n")), is_table(io.BytesIO(b"G0 X1\n"))
+    (True, False)
+    """
+    at = file.tell()
+    head = file.read(HEAD)
+    file.seek(at)
+    return _HEADER.match(head) is not None
 
 
 class TableReader:

@@ -85,3 +85,10 @@ def test_streams_are_held_to_the_profiles_of_a_report(run, processed, tmp_path):
         (tmp_path / "r.json").write_text(text)
         code, out = run(*check)
         assert (code, "is no report of process" in out) == (1, True)
+
+
+def test_a_table_is_verified_under_any_name(run, tmp_path):
+    assert run("process", "-q", "plate.ngc", "-m", "centre", "-o", "plate.csv")[0] == 0
+    (tmp_path / "plate.csv").rename(tmp_path / "plate.points")
+    code, out = run("verify", "plate.ngc", "plate.points", "-m", "centre")
+    assert (code, "re-timed and nothing else changed" in out) == (0, True), out

@@ -5,7 +5,7 @@ import io
 
 import pytest
 
-from gcodejerk import Machine, plan_move, process
+from gcodejerk import Machine, plan_move, process, verify
 
 MACHINE = Machine.loads(
     """
@@ -107,3 +107,15 @@ def test_a_diameter_is_written_as_a_radius():
     )
     _, blocks, _ = table(b"G21 G90 G94 G7\nG1 X10 F9\nG0 X30\n", lathe)
     assert [float(blocks[3][k][1]) for k in (0, -1)] == [5.0, 15.0]
+
+
+def test_the_library_verifies_what_it_wrote_from_bytes_and_from_a_file_of_any_name(tmp_path):
+    program = b"G21 G90 G94\nG1 X0 Z0 A0 F9\nG0 X3\nG0 Z5\nM2\n"
+    output = process(program, MACHINE, controller="csv").output
+    found = verify(program, output, MACHINE, controller="csv")
+    assert (found.ok, found.rewritten, found.confirmed) == (True, 2, 2)
+    (tmp_path / "table.txt").write_bytes(output)
+    assert verify(program, tmp_path / "table.txt", MACHINE).rewritten == 2
+    rows = output.splitlines(keepends=True)
+    damaged = verify(program, b"".join(rows[:20] + rows[21:]), MACHINE)
+    assert [str(one.kind) for one in damaged.violations] == ["duration"]

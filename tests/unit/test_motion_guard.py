@@ -157,6 +157,28 @@ def test_no_guarded_frequency_keeps_more_than_todays_envelope():
     assert gained > 2
 
 
+@pytest.mark.parametrize(("length", "band"), [(60.0, 0.0), (150.0, 0.0), (51.0, 0.0), (20.0, 0.1)])
+def test_a_long_move_without_damping_keeps_its_guard_whatever_lies_around_its_middle(length, band):
+    # Its halves are guarded, of which one is looked at: a block around the middle is in both.
+    today = conventional_profiles([600 / length], [5000 / length], [5e5 / length])
+    n = int(np.ceil(today.total[0] / MS - 1e-6))
+    move = Move(
+        n, 600 / length, 5000 / length, 5e6 / length, mode_poles([30.0], [0.0]), np.array([length]),
+        np.arange(1), band, MS, today.general(), 1.0,
+    )  # fmt: skip
+    reference = today_of(move)
+    optimum = near_least(move, max(0.01 * reference, 1e-4), 1e-3, reference)
+    profile = optimum_profiles([optimum], MS)
+    t, a = acceleration(profile, 1e4)
+    omega = 2 * np.pi * np.linspace(39.0, 150.0, 400)
+    kept = np.abs((a * np.exp(-1j * np.outer(omega, t))).sum(axis=1)) / 1e4
+    halves = split_at_peak(move.today)
+    for w, value in zip(omega, kept, strict=True):
+        near = np.linspace(0.85 * w, 1.15 * w, 201)
+        allowed = sum(undamped_response(half, near) for half in halves).max()
+        assert value <= 1.02 * allowed + 1e-6, w / (2 * np.pi)
+
+
 def test_hardly_more_than_the_least_is_left_and_no_profile_does_that_with_less_jerk():
     for move in drawn(6, seed=11):
         free = Move(*(getattr(move, name) for name in Move.__slots__[:-1]), 0.0)

@@ -1,5 +1,7 @@
 """The optimum, against a linear programme of its own that HiGHS solves, and against tables."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -252,3 +254,18 @@ def test_a_group_is_judged_by_the_root_of_its_squares():
     other = np.abs(profiles_response(optimum_profiles([apart], MS), poles))[0] / poles.imag * w
     assert np.sqrt((other**2).sum()) >= together.worst * (1 - 1e-3)
     assert D.max() >= apart.worst * (1 - 1e-3)
+
+
+def test_a_long_cruise_may_slow_down_for_a_low_mode():
+    # What is reported as the least that any profile can leave: long blocks left a sixth more.
+    L, count = 5.0, 143
+    V, A, J = 40 / L, 5000 / L, 5e6 / L
+    move = replace(
+        move_of(count, V, A, J, [25.0, 60.0], 0.02, [L, 0.5 * L]),
+        today=conventional_profiles([V], [A], [0.1 * J]).general(),
+    )
+    found = least_residual(move, 0.3)
+    least = by_linear_programme(
+        count, V, A, J, rows_of(count, [25.0, 60.0], [0.02, 0.02], [L, 0.5 * L])
+    )
+    assert found.worst == pytest.approx(least, rel=0.015)

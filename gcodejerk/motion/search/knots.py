@@ -24,6 +24,8 @@ CRUISE_BLOCKS = 16
 MOST_REFINED, MOST_GUARDED = 1000, 110
 """Blocks of a refined programme at most, and of one with guarded frequencies, which are many: those
 of longer moves stay long."""
+MOST_FINE = 500
+"""Moves with a cruise of at most so many intervals have a jerk in each, without a guard."""
 RAMP = 2.0
 """Time that a move with a cruise may take to accelerate, times what it does today."""
 ACTIVE = 0.02
@@ -45,9 +47,13 @@ def ramp_knots(ramp: int) -> Index:
     return np.union1d(np.arange(0, ramp, block), ramp)
 
 
-def first_knots(count: int, ramp: int) -> Index:
-    """Ends of the blocks of the first programme, of a move of `count` intervals."""
-    if count <= FULL_INTERVALS:
+def first_knots(count: int, ramp: int, guarded: bool) -> Index:
+    """Ends of the blocks of the first programme, of a move of `count` intervals.
+
+    In long blocks a cruise does nothing, though it may have to slow down for a low mode: what they
+    leave is then no bound of what a profile can leave.
+    """
+    if count <= (MOST_FINE if ramp and not guarded else FULL_INTERVALS):
         return np.arange(count + 1)
     half = ramp or count // 2
     block = max(BLOCK, -(-half // MOST_BLOCKS))

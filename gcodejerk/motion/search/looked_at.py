@@ -183,8 +183,12 @@ class Blocks:
         # Of an odd acceleration, seen from the middle, the imaginary part is all.
         seen = 0.5 * count if mirrored else count
         _write(rows, at, 0, together.poles * T, together.weights, knots, seen, count)
-        middle = int(np.searchsorted(knots, 0.5 * count))
-        _write_halves(rows, early, late, apart, knots, T, middle, middle)
+        middle, ends = int(np.searchsorted(knots, 0.5 * count)), knots
+        if mirrored and knots[middle] > 0.5 * count:
+            # Of a block around the middle each half has its part, and one half is all that is seen.
+            middle -= 1
+            ends = np.where(np.arange(len(knots)) == middle, 0.5 * count, knots)
+        _write_halves(rows, early, late, apart, ends, T, middle, middle)
         return cls(knots, rows, cone, cone // 2, mirrored, False)
 
     @classmethod

@@ -246,7 +246,7 @@ class _Search:
         if move.band or move.guard or not alone or move.count < FEWEST_INTERVALS:
             return None
         looked_at = self._looked_at(move.count)
-        knots = first_knots(move.count, self.ramp)
+        knots = first_knots(move.count, self.ramp, move.guard > 0.0)
         tried = [self._ramps(looked_at)] if self.ramp else []
         tried.append(self._whole(looked_at, knots))
         if len(knots) <= move.count <= MOST_REFINED:
@@ -270,7 +270,7 @@ class _Search:
             if best is not None and best.meets(allowed):
                 return best
         looked_at = self._looked_at(move.count)
-        knots = first_knots(move.count, self.ramp)
+        knots = first_knots(move.count, self.ramp, move.guard > 0.0)
         finest = len(knots) > move.count
         rough = 0.0 if finest else ROUGH
         first = self._exchanged(looked_at, self._whole(looked_at, knots), allowed, rough=rough)
