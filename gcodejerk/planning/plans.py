@@ -325,8 +325,9 @@ def path_length(displacement: Array, machine: Machine) -> Array:
         [mm] or [deg]
     """
     rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
-    linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
-    turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
+    with np.errstate(over="ignore"):  # what is too long for a square is for a stream
+        linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
+        turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
     length: Array = np.where(linear > STANDSTILL, linear, turning)
     return length
 

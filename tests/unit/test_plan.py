@@ -448,6 +448,8 @@ def test_a_rapid_that_would_fill_the_memory_is_left_alone(positioning):
     plans = plan_rapids(rapids_of(text, machine), machine, "conventional")
     assert reasons(plans) == [None, Reason.TOO_LONG, Reason.TOO_LONG, None]
     assert plans.counts.max() < 1.01 * MOST_INTERVALS
+    endless = plan_moves(moves({"X": 1e300, "Z": 1e300}), machine, "conventional")
+    assert reasons(endless) == [Reason.TOO_LONG]
     with pytest.raises(PlanError, match="more than 100000 intervals"):
         plan_moves(moves({"Z": 1.0}), machine, time=101.0)
 
