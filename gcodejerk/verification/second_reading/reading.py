@@ -33,11 +33,13 @@ _INDEX = rb"(?:[ \t]*[0-9]+|[ \t]*<[^<>]*>)"
 _VARIABLE = re.compile(rb"#(?:[ \t]*#)*" + _INDEX)
 _INNERMOST = re.compile(rb"\[[^\[\]]*\]")
 _SETTINGS = re.compile(rb"#[ \t]*([0-9]+)[ \t]*=[ \t]*([0-9]+\.?(?![0-9])(?=[ \t]*(?:$|[#\0])))?")
-_CALL = re.compile(rb"[A-Z]{2,6}[ \t]*#(?:[ \t]*/[ \t]*#)?")
+_CALL = re.compile(rb"[A-Z]{2,6}[ \t]*#0?(?:[ \t]*/[ \t]*#0?)?")
 _ASSIGNMENTS = re.compile(
     rb"[ \t]*(?:N[ \t]*[0-9]+)?(?:[ \t]*(#[0-9]+|#[ \t]*<[^<>]*>)[ \t]*=[^=#;()]*)"
 )
 _TARGET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
+_SETTING = re.compile(rb"#+(?:[0-9]+|<[^<>]*>)=[-+]*(?:#+(?:[0-9]+|<[^<>]*>)|" + _NUMBER + rb")")
+"""An assignment of one operand, behind which words may follow; without blanks."""
 _COMPUTED = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+)?[ \t]*#[ \t]*[#\[].*=")
 _PERCENT = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?%")
 _LEADER = re.compile(rb"%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t\0]*")
@@ -354,6 +356,10 @@ class Text:
             text, calls = _CALL.subn(b"#0", text) if b"[" not in text else (text, 0)
             if not count + calls:
                 break
+        if b"=" in text and not self.dialect.text.open_expressions and not line.offsets:
+            text = _SETTING.sub(b"\0", text.translate(None, _BLANKS))
+            line.understood = b"=" not in text
+            return _VARIABLE.sub(b"#", text) if line.understood else b""
         if b"=" in text:
             # Values of a line are read before any is set: what follows an = belongs to it.
             line.understood = bool(_ASSIGNMENTS.match(text)) and text.count(b"=") == len(targets)
