@@ -152,7 +152,7 @@ class Executor(Phases):
             state.forget_positions()
         if block.problem is not None and self.dialect.feed_on_rapids:
             state.put("feed", NAN)  # what is not read may hold an F, which rapids run at
-        if block.problem is not None and any(byte in b"GMOgmo#[" for byte in block.rest):
+        if block.problem is not None and any(byte in b"GMOgmo#[\r" for byte in block.rest):
             state.forget(Reason.NOT_UNDERSTOOD)
         if block.problem is not None:
             step.limits |= set_by_setting(state, block.rest, self.dialect, self.limits)

@@ -87,6 +87,8 @@ class Cursor:
             shown = digits.decode("latin-1")
             what = f"'{shown}' is not a number" if shown else "a number is missing"
             raise SyntaxProblem(what, begin)
+        if pattern is CLOSED_NUMBER and not match[0].startswith(digits):
+            raise SyntaxProblem("a blank behind the sign", begin)
         value = float(digits)
         if not abs(value) <= LARGEST:
             raise SyntaxProblem(f"'{digits.decode()}' is beyond any machine", begin)
