@@ -190,3 +190,17 @@ def test_many_digits_are_seen_in_a_run_of_plain_lines_too():
             ).all()
         ((_, seen),) = observations(io.BytesIO(data), find_dialect("grbl"), start, [line])
         assert not (seen.sure and seen.start[0] == seen.start[0])
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "okuma", "any-mill"])
+@pytest.mark.parametrize("odd", [b"G9 1", b"G9 .1", b"X1. M9 8"])
+def test_a_code_that_may_go_on_behind_a_blank_may_be_another(odd, dialect):
+    """Blanks count nowhere on many controls: G9 1 is G91 there."""
+    if find_dialect(dialect).text.blanks == "between":
+        data = HEAD + odd + b"\nG0 X5. Y5. Z5.\nG0 X6.\nM2"
+        assert last_rapid(data, dialect, "")[0] is None
+
+
+def test_a_feed_that_may_go_on_behind_a_blank_is_not_known():
+    data = HEAD + b"G1 X1. F100.\nG0 X2.\nF1 00.\nG0 X5. Y5. Z5.\nG0 X6.\nG1 X7."
+    assert last_rapid(data, "fanuc", "")[0] is None

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from gcodejerk.nc.dialects.spelling import Text
+from gcodejerk.nc.text.block import Word
 
 LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
@@ -64,6 +65,12 @@ class Cursor:
         """Pass over blanks; the next byte, empty at the end."""
         self.at = BLANKS.match(self.text, self.at).end()  # type: ignore[union-attr]
         return self.text[self.at : self.at + 1]
+
+    def unread(self, words: list[Word], mark: int) -> bytes:
+        """What is not understood; the last word, too, where its number may go on behind a blank."""
+        if words and self.text[mark : mark + 1].strip(b"0123456789.") != self.text[mark : mark + 1]:
+            mark = words.pop().begin
+        return self.text[mark:]
 
     def number(self) -> float | None:
         """Read the number that begins here; None for an expression."""

@@ -432,7 +432,7 @@ def _parse_carefully(text: bytes, dialect: Dialect) -> Block:
         if line.words or line.names:
             check_comments(dialect.text, text, line.comments)
     except SyntaxProblem as found:
-        problem, column, rest = found.problem, found.at + 1, text[mark:]
+        problem, column, rest = found.problem, found.at + 1, line.unread(line.words, mark)
     return Block(
         tuple(line.words),
         tuple(line.comments),
