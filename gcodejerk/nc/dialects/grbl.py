@@ -30,8 +30,10 @@ GRBL = Dialect(
         percent="error",
         variables="none",
         blanks="anywhere",
-        # 80 characters count, comments and blanks not among them
+        # Plain grbl refuses longer lines than LINE_BUFFER_SIZE - 1 (protocol.c).
         line_limit=256,
+        characters=79,
+        digits=8,  # MAX_INT_DIGITS: 00000012.5 is 12, and 0000000012 is 0 (nuts_bolts.c)
     ),
     groups=grouped(
         {

@@ -29,6 +29,7 @@ LINUXCNC = Dialect(
         percent="lone",
         variables="#",
         blanks="anywhere",
+        returns=True,
         line_limit=254,
     ),
     groups=grouped(

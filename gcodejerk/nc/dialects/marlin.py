@@ -6,9 +6,11 @@ for all moves: G0 runs at it like G1.
 
 What a build has to switch on, and many do not (src/gcode/parser.cpp, src/gcode/gcode.h; config/
 extras.h): comments in parentheses, without which ``G0 X5 (Z9)`` goes to Z9; small letters, without
-which ``G0 x5`` names no axis; G20, without which lengths stay mm. M501 and M502 load settings, the
-home offsets among them; M23, M24 and M26 go on in another file, or elsewhere in this one; M220
-scales F until it is set to 100.
+which ``G0 x5`` names no axis; G20, without which lengths stay mm. A tab is no blank: a line that
+begins with one is no command, and ``X<tab>5`` has no number. ``N 10 G0`` is a command N, ``G+0``
+none. Of a longer line the first MAX_CMD_SIZE - 1 = 95 characters are read (src/gcode/queue.cpp).
+M501 and M502 load settings, the home offsets among them; M23, M24 and M26 go on in another file, or
+elsewhere in this one; M220 scales F until it is set to 100.
 """
 
 from __future__ import annotations
@@ -47,6 +49,7 @@ MARLIN = Dialect(
         messages=True,  # src/gcode/parser.cpp: string_arg
         parentheses="lone comment",
         capitals=True,
+        tight=True,
         semicolon="comment",
         delete="none",
         o_word="error",
@@ -55,7 +58,7 @@ MARLIN = Dialect(
         blanks="between",
         checksum=True,
         hexadecimal=True,
-        line_limit=96,
+        line_limit=95,
     ),
     groups=grouped(
         {

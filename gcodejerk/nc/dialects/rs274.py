@@ -35,6 +35,8 @@ RS274 = Dialect(
         variables="none",
         blanks="anywhere",
         line_limit=min(member.text.line_limit for member in MEMBERS),
+        characters=GRBL.text.characters,
+        digits=GRBL.text.digits,
     ),
     groups=grouped(
         {

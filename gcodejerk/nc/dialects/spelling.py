@@ -23,6 +23,11 @@ class Text:
     none beside words, since what it holds may be read as words; no comment."""
     capitals: bool = False
     """Small letters outside of comments may be read as nothing."""
+    tight: bool = False
+    """A tab, a blank behind N or a sign, a sign in front of a code or a point in N makes another
+    word of it, or none."""
+    returns: bool = False
+    """A carriage return within a line counts nowhere; otherwise it may end the line."""
     padded: bool = True
     """``G01`` is G1; otherwise it is a code that nobody has."""
     semicolon: Literal["comment", "end", "error"] = "comment"
@@ -69,6 +74,15 @@ class Text:
     """What ends every block."""
     line_limit: int = 512
     """Longest line that the controller reads, in bytes."""
+    characters: int = 0
+    """Most of a line without its comments and blanks; 0: what `line_limit` says."""
+    digits: int = 0
+    """Digits of a number that count, leading zeros among them, and the rest is lost; 0: all."""
+
+    @property
+    def shortest(self) -> int:
+        """Length of a line up to which none is too long."""
+        return self.characters or self.line_limit
 
     def unsaid(self, text: bytes) -> bytes:
         """Cut a line where its message begins."""

@@ -150,9 +150,10 @@ class Executor(Phases):
         if block.problem is not None or not self.dialect.strict:
             # A control that is not strict may run what we refuse, and move what it does not name.
             state.forget_positions()
-        if block.problem is not None and self.dialect.feed_on_rapids:
+        unread = self.dialect.feed_on_rapids or b"F" in block.rest.upper()
+        if block.problem is not None and unread:
             state.put("feed", NAN)  # what is not read may hold an F, which rapids run at
-        if block.problem is not None and any(byte in b"GMOgmo#[" for byte in block.rest):
+        if block.problem is not None and any(byte in b"GMOgmo#[\r" for byte in block.rest):
             state.forget(Reason.NOT_UNDERSTOOD)
         if block.problem is not None:
             step.limits |= set_by_setting(state, block.rest, self.dialect, self.limits)

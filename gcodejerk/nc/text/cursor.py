@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from gcodejerk.nc.dialects.spelling import Text
+from gcodejerk.nc.text.block import Word
 
 LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
@@ -65,6 +66,12 @@ class Cursor:
         self.at = BLANKS.match(self.text, self.at).end()  # type: ignore[union-attr]
         return self.text[self.at : self.at + 1]
 
+    def unread(self, words: list[Word], mark: int) -> bytes:
+        """What is not understood; the last word, too, where its number may go on behind a blank."""
+        if words and self.text[mark : mark + 1].strip(b"0123456789.") != self.text[mark : mark + 1]:
+            mark = words.pop().begin
+        return self.text[mark:]
+
     def number(self) -> float | None:
         """Read the number that begins here; None for an expression."""
         begin = self.at
@@ -87,6 +94,8 @@ class Cursor:
             shown = digits.decode("latin-1")
             what = f"'{shown}' is not a number" if shown else "a number is missing"
             raise SyntaxProblem(what, begin)
+        if pattern is CLOSED_NUMBER and not match[0].startswith(digits):
+            raise SyntaxProblem("a blank behind the sign", begin)
         value = float(digits)
         if not abs(value) <= LARGEST:
             raise SyntaxProblem(f"'{digits.decode()}' is beyond any machine", begin)

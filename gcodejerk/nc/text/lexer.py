@@ -25,6 +25,8 @@ _LETTERS = 64
 """Classes from here on are letters and equal their upper-case code."""
 
 _PAD = 16
+_IN_FRONT = 5
+"""Digits in front of the point that make a long number one to be looked at."""
 _ACTIVE = re.compile(rb"[(;][ \t]*py", re.IGNORECASE)
 
 
@@ -75,7 +77,7 @@ def _blank_comments(classes: NDArray[np.uint8], text: bytes, semicolon: bool) ->
     # the closing bracket belongs to the comment, the line end does not
     step[at[good + 1] + (kind[good + 1] == _CLOSE)] -= 1
     inside = np.add.accumulate(step[:-1], dtype=np.int8)
-    classes[inside.view(np.bool_)] = _BLANK
+    classes[inside.view(np.bool_) & (classes != _CR)] = _BLANK  # where a line ends, none is inside
     line = np.cumsum(kind == _END) - (kind == _END)
     lines: NDArray[np.int64] = line[bad]
     return lines
@@ -93,6 +95,19 @@ def _whole(
     silent = (letter == ord("G")) | (letter == ord("N")) | (letter == ord("S"))
     plain: NDArray[np.bool_] = (points[end - 1] == points[begin]) & (value != 0.0) & ~silent
     return plain
+
+
+def _many_digits(
+    source: NDArray[np.uint8], begin: NDArray[np.int64], end: NDArray[np.int64], most: int
+) -> NDArray[np.bool_]:
+    """Which words hold a number of more digits than `most`, several in front of its point."""
+    many = end - begin > most + 1
+    long = np.flatnonzero(many)
+    first = begin[long] + 1
+    first += source[first] < ord(".")  # + and -
+    for k in range(_IN_FRONT):
+        many[long] &= (source[first + k] != ord(".")) & (first + k < end[long])
+    return many
 
 
 def read_lines(data: bytes, dialect: Dialect) -> Lines:
@@ -151,6 +166,8 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     good &= ~is_g | (value == 0.0) | (value == 1.0) | (value == 2.0) | (value == 3.0)
     unsigned = (letter == ord("F")) | (letter == ord("S"))
     good &= ~(unsigned & (value < 0.0))
+    if dialect.text.digits:
+        good &= ~_many_digits(source, begin, end, dialect.text.digits)
     if dialect.whole_numbers == "machine":
         good &= ~_whole(source, letter, begin, end, value)
     numbers = np.flatnonzero(letter == ord("N"))
@@ -164,7 +181,7 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     careful = np.zeros(len(line_end), dtype=np.bool_)
     for lines in careful_lines:
         careful[lines] = True
-    careful |= line_end - line_begin > dialect.text.line_limit
+    careful |= line_end - line_begin > dialect.text.shortest
     # Bits add up to their union unless one occurs twice: then the sum has fewer ones than terms.
     total = np.bincount(word_line, weights=_BIT_OF[letter], minlength=len(careful)).astype(
         np.uint32

@@ -12,11 +12,39 @@ from functools import lru_cache
 from gcodejerk.nc.dialects.spelling import Text
 from gcodejerk.nc.text.cursor import SyntaxProblem
 
+_TIGHT = re.compile(
+    rb" *\t(?![ \t]*(?:;|$))"
+    rb"|[^;]*?(?:[A-Z] *\t|N(?: *[0-9]+ *\t| +[0-9]|[0-9]+\.)|[GMT] *[-+]|[A-Z] *[-+] )",
+    re.IGNORECASE,
+)
+_COMMENTS = re.compile(rb"\([^)]*\)?|;.*")
+_FEW = 4
+"""Digits in front of the point up to which those that are lost are none that matter."""
 _UNPADDED = re.compile(rb"[A-Z](?:0|[1-9][0-9]*)(?:\.[1-9])?", re.IGNORECASE)
 
 
+def check_line(rules: Text, text: bytes) -> None:
+    """Refuse a line that the control may cut, or whose words it may read as others.
+
+    Parameters
+    ----------
+    rules : Text
+        The dialect's.
+    text : bytes
+        The line, without its end.
+    """
+    if b"\r" in text and not rules.returns:
+        raise SyntaxProblem("a carriage return may end the line", text.index(b"\r"))
+    if rules.characters and len(text) > rules.characters:
+        said = _COMMENTS.sub(b"", text).translate(None, b" \t/")
+        if len(said) > rules.characters:
+            raise SyntaxProblem(f"more than {rules.characters} characters", rules.characters)
+    if rules.tight and (found := _TIGHT.match(text)):
+        raise SyntaxProblem("a blank, tab or sign that makes another word of it", found.end() - 1)
+
+
 def check_word(rules: Text, text: bytes, begin: int) -> None:
-    """Refuse a small letter, or a code with a zero in front, where that makes another word of it.
+    """Refuse a small letter, zeros in front or many digits, where that makes another word of it.
 
     Parameters
     ----------
@@ -27,6 +55,10 @@ def check_word(rules: Text, text: bytes, begin: int) -> None:
     begin : int
         Where it stands in its line.
     """
+    if rules.digits and text[:1] not in b"Nn":
+        front, _, behind = text[1:].translate(None, b" \t+-").partition(b".")
+        if len(front) > _FEW and len(front) + len(behind) > rules.digits:
+            raise SyntaxProblem("a number has more digits than the control reads", begin + 1)
     if rules.capitals and text[:1].islower():
         raise SyntaxProblem("a small letter may be read as nothing", begin)
     if not rules.padded and text[:1] in b"GMgm" and not _UNPADDED.fullmatch(text):

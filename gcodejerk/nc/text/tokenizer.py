@@ -24,7 +24,7 @@ from gcodejerk.nc.text.cursor import (
     shown,
 )
 from gcodejerk.nc.text.klartext import parse_klartext
-from gcodejerk.nc.text.spelled import check_comments, check_word, keyword_pattern
+from gcodejerk.nc.text.spelled import check_comments, check_line, check_word, keyword_pattern
 
 CHECKSUM = "*"
 """Name of a checksum among the names of a block."""
@@ -156,7 +156,7 @@ class _Line(Cursor):
         if letter == "N" and (value is None or not self.text[begin + 1 :].lstrip()[:1].isdigit()):
             raise SyntaxProblem("N without a plain number", begin)
         text = self.text[begin : self.at]
-        if self.rules.capitals or not self.rules.padded:
+        if self.rules.capitals or not self.rules.padded or self.rules.digits:
             check_word(self.rules, text, begin)
         whole = value is not None and b"." not in text
         self.words.append(Word(letter, value, begin, self.at, text, whole, function))
@@ -405,7 +405,7 @@ def parse_line(text: bytes, dialect: Dialect) -> Block:
     text = rules.unsaid(text.rstrip(b"\r"))  # CR CR LF: a transfer in text mode made it of CR LF
     if rules.klartext:
         return parse_klartext(text, dialect)
-    if not (rules.names or rules.hexadecimal) and _PLAIN.fullmatch(text):
+    if not (rules.names or rules.hexadecimal or rules.digits) and _PLAIN.fullmatch(text):
         return Block(
             tuple(
                 Word(m[1].decode(), float(m[2]), m.start(), m.end(), m[0], b"." not in m[2])
@@ -424,6 +424,7 @@ def _parse_carefully(text: bytes, dialect: Dialect) -> Block:
         if len(text) > limit and text.strip(b" \t") != b"%":
             line.skip()
             raise SyntaxProblem(f"line is longer than {limit} bytes", limit)
+        check_line(dialect.text, text)
         while line.skip():
             mark = line.at
             line.rest()
@@ -431,7 +432,7 @@ def _parse_carefully(text: bytes, dialect: Dialect) -> Block:
         if line.words or line.names:
             check_comments(dialect.text, text, line.comments)
     except SyntaxProblem as found:
-        problem, column, rest = found.problem, found.at + 1, text[mark:]
+        problem, column, rest = found.problem, found.at + 1, line.unread(line.words, mark)
     return Block(
         tuple(line.words),
         tuple(line.comments),

@@ -224,6 +224,7 @@ class Computer:
         word = _NAMED_WORD if self.named else _HASH_WORD
         if self.named and _DEF.fullmatch(text.strip()):
             return text, relative
+        text = self._packed(text)
         variables = self._before(text, variables)
         if self.named:
             text = self._without_settings(_TURN.sub(b"RPL ", _RADIUS.sub(b" ", text)))
@@ -246,9 +247,15 @@ class Computer:
             rounds = b"ROUND" in raw and not self.named
             number = raw if plain else self._number(letter, NAN if rounds else number, inch)  # type: ignore[assignment]
             centre = how and letter in (b"I", b"J", b"K")
-            out.append(text[at : match.start()] + (b" " if centre else letter + number + b" "))  # type: ignore[operator]
+            ends = b" " if self.named else b"\0"
+            out.append(text[at : match.start()] + (b" " if centre else letter + number + ends))  # type: ignore[operator]
             at = end
         return b"".join(out) + text[at:], relative
+
+    def _packed(self, text: bytes) -> bytes:
+        """A line without its blanks, where these may stand within numbers."""
+        anywhere = self.dialect.text.blanks == "anywhere"
+        return text.translate(None, b" \t") if anywhere else text
 
     def _is_variable(self, key: str) -> bool:
         """Whether it is a parameter, or a variable that was declared, or an element of one."""
@@ -304,6 +311,7 @@ class Computer:
             return self._defined(match[1].decode(), match[2], variables)
         if b"=" not in text:
             return {}
+        text = self._packed(text)
         pattern = _NAMED_SET if self.named else _HASH_SET
         found: dict[str, float] = {}
         known = dict(variables)

@@ -21,6 +21,7 @@ from typing import BinaryIO
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 from gcodejerk.verification.second_reading.klartext import read_statement
+from gcodejerk.verification.second_reading.lengths import is_cut, is_loose, is_too_much
 from gcodejerk.verification.second_reading.limiting import Said, take_limits
 
 PIECE = 1 << 20
@@ -33,11 +34,13 @@ _INDEX = rb"(?:[ \t]*[0-9]+|[ \t]*<[^<>]*>)"
 _VARIABLE = re.compile(rb"#(?:[ \t]*#)*" + _INDEX)
 _INNERMOST = re.compile(rb"\[[^\[\]]*\]")
 _SETTINGS = re.compile(rb"#[ \t]*([0-9]+)[ \t]*=[ \t]*([0-9]+\.?(?![0-9])(?=[ \t]*(?:$|[#\0])))?")
-_CALL = re.compile(rb"[A-Z]{2,6}[ \t]*#(?:[ \t]*/[ \t]*#)?")
+_CALL = re.compile(rb"[A-Z]{2,6}[ \t]*#0?(?:[ \t]*/[ \t]*#0?)?")
 _ASSIGNMENTS = re.compile(
     rb"[ \t]*(?:N[ \t]*[0-9]+)?(?:[ \t]*(#[0-9]+|#[ \t]*<[^<>]*>)[ \t]*=[^=#;()]*)"
 )
 _TARGET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
+_SETTING = re.compile(rb"#+(?:[0-9]+|<[^<>]*>)=[-+]*(?:#+(?:[0-9]+|<[^<>]*>)|" + _NUMBER + rb")")
+"""An assignment of one operand, behind which words may follow; without blanks."""
 _COMPUTED = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+)?[ \t]*#[ \t]*[#\[].*=")
 _PERCENT = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?%")
 _LEADER = re.compile(rb"%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t\0]*")
@@ -155,6 +158,8 @@ class Text:
         """
         rules, dialect = self.dialect.text, self.dialect
         number = rb"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?![0-9.])" if decimals_matter else _NUMBER
+        if rules.digits:
+            number = number.replace(b"[0-9]+", b"[0-9]{1,4}", 1)
         letters = "".join(a for a in AXES if a in dialect.letters and a not in dialect.increments)
         letters = "".join(a for a in letters if a not in dialect.tool_frame)
         extra = "E" if dialect.one_command else "IJK" if dialect.polar else "IJKR"
@@ -171,6 +176,10 @@ class Text:
         lines = rb"(?:" + line_number + free + rest + rb")"
         stated = line_number + code + rest
         most = rb"%d}" % RUN_LINES
+        if rules.tight:
+            lines, stated = (
+                part.replace(rb"[ \t]*", b" *").replace(rb"N *", b"N") for part in (lines, stated)
+            )
         return (
             re.compile(lines + rb"{4," + most),
             re.compile(stated + lines + rb"{3," + most),
@@ -197,6 +206,9 @@ class Text:
             end = more.end()
         text = data[at:end]
         lines = text.count(b"\n")
+        most = self.dialect.text.characters
+        if most and max(map(len, text.split(b"\n"))) > most:
+            return None
         if b"(" in text:
             text = re.sub(rb"\([^()]*\)", b"", text)
         last: dict[str, float] = {}
@@ -228,16 +240,14 @@ class Text:
             line.words, line.relative, line.deleted = said.words, said.relative, said.deleted
             line.effects, line.understood = said.effects, said.understood
             return line
-        runs_python = self.python is not None and self.python.search(text) is not None
-        runs_python = runs_python or (rules.live_comments and _runs(text))
-        if len(text) > rules.line_limit or runs_python:
+        if is_cut(text, self.dialect) or self._acts(text):
             line.understood = False
             return line
         text = self._unsaid(text)
         beside = b"(" in text.partition(b";")[0]
         if self.comments is not None:
             text = self.comments.sub(b"\0", text)
-        text = text.strip(b" \t\0")
+        text = text.strip(b" \0" if rules.tight else b" \t\0")
         if text and self._misspelled(text, beside):
             line.understood = False
             return line
@@ -259,6 +269,11 @@ class Text:
             self._words(text.replace(b"\0", b" "), line)
         return line
 
+    def _acts(self, text: bytes) -> bool:
+        """Whether a comment of a line is, or may be, a command."""
+        runs_python = self.python is not None and self.python.search(text) is not None
+        return runs_python or (self.dialect.text.live_comments and _runs(text))
+
     def _unsaid(self, text: bytes) -> bytes:
         """A line without what M117 shows and M118 sends."""
         return _SAYING.sub(rb"\1", text) if self.dialect.text.messages else text
@@ -268,6 +283,7 @@ class Text:
         rules = self.dialect.text
         return (
             (beside and rules.parentheses == "lone comment")
+            or is_loose(text, self.dialect)
             or (rules.capitals and text != text.upper())
             or (not rules.padded and _PADDED.search(text) is not None)
         )
@@ -292,7 +308,7 @@ class Text:
             line.understood = line.understood or bool(leader)
         elif rules.o_word != "error" and (match := _O_WORD.match(text)):
             line.flow = match[2].decode()
-        elif rules.hexadecimal and _HEXADECIMAL.search(text):
+        elif (rules.hexadecimal and _HEXADECIMAL.search(text)) or is_too_much(text, self.dialect):
             line.understood = False
         elif rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
             line.effects.append("written")
@@ -354,6 +370,10 @@ class Text:
             text, calls = _CALL.subn(b"#0", text) if b"[" not in text else (text, 0)
             if not count + calls:
                 break
+        if b"=" in text and not self.dialect.text.open_expressions and not line.offsets:
+            text = _SETTING.sub(b"\0", text.translate(None, _BLANKS))
+            line.understood = b"=" not in text
+            return _VARIABLE.sub(b"#", text) if line.understood else b""
         if b"=" in text:
             # Values of a line are read before any is set: what follows an = belongs to it.
             line.understood = bool(_ASSIGNMENTS.match(text)) and text.count(b"=") == len(targets)

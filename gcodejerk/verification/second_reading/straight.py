@@ -74,6 +74,8 @@ class PlainLines:
         """
         self.dialect = dialect
         number = _POINTED if decimals_matter else _NUMBER
+        if dialect.text.digits:
+            number = number.replace(b"[0-9]+", b"[0-9]{1,4}", 1)
         words = b"".join(
             rb"(?:%c" % letter + number + _BLANK + rb")?" for letter in PLAIN_AXES.encode()
         )
@@ -150,7 +152,7 @@ class PlainLines:
             return None
         characters = np.frombuffer(text, dtype=np.uint8)
         ends = np.flatnonzero(characters == 10)
-        if len(ends) < FEWEST or int(np.diff(ends, prepend=-1).max()) > rules.line_limit:
+        if len(ends) < FEWEST or int(np.diff(ends, prepend=-1).max()) > rules.shortest:
             return None
         if self.dialect.arcs_refused and NO_FEED.search(text):
             return None

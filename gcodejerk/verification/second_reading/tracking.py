@@ -353,7 +353,7 @@ class Tracker(Circling):
             self.home = {}
         if kinds & {"set", "clear", "restore", "local", "table"}:
             self.shift(kinds, block.values, block.increments)
-            return True
+            return not (kinds & {"clear", "restore"} and block.axes)
         return block.g.get("tool length") not in (None, G43, G49) and block.axes != 0
 
     def _go(self, block: Sorted) -> None:

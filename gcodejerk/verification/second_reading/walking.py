@@ -77,7 +77,7 @@ class Stepper:
 
     def upper(self, bare: bytes) -> bytes:
         """A line without its comments, in upper case."""
-        comments = self.text.comments
+        comments = None if b"\r" in bare else self.text.comments
         return (bare if comments is None else comments.sub(b"\0", bare)).upper()
 
 

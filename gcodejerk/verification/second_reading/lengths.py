@@ -1,0 +1,39 @@
+"""Which lines a control cuts, refuses or reads as other words, for the second reading.
+
+Rule: what stands here is said of the bytes of a line, before anything looks at its words.
+"""
+
+from __future__ import annotations
+
+import re
+
+from gcodejerk.nc.dialects.dialect import Dialect
+
+_LOOSE = re.compile(
+    rb"[A-Z] *\t|^\t[ \t\0]*[A-Z]|N(?: | *[0-9]+(?:\.| *\t))|[GMT] *[-+]|[-+] ", re.IGNORECASE
+)
+"""What Marlin takes for another word, or for none."""
+_LONG = re.compile(rb"(?<![0-9.N])[0-9]{5,}\.?[0-9]*")
+
+
+def is_cut(text: bytes, dialect: Dialect) -> bool:
+    """Whether the control may not read a line to its end."""
+    rules = dialect.text
+    return len(text) > rules.line_limit or (b"\r" in text and not rules.returns)
+
+
+def is_loose(text: bytes, dialect: Dialect) -> bool:
+    """Whether a tab, a blank or a sign makes another word of one; comments are taken out."""
+    return dialect.text.tight and _LOOSE.search(text) is not None
+
+
+def is_too_much(text: bytes, dialect: Dialect) -> bool:
+    """Whether a line or a number is longer than the control reads; comments are taken out."""
+    rules = dialect.text
+    if not (rules.characters or rules.digits):
+        return False
+    text = text.translate(None, b" \t\0/")
+    if rules.characters and len(text) > rules.characters:
+        return True
+    numbers = _LONG.findall(text) if rules.digits else []
+    return any(len(n) - n.count(b".") > rules.digits for n in numbers)
