@@ -140,7 +140,16 @@ def test_marlin_may_read_another_word_or_none(case):
 
 
 @pytest.mark.parametrize(
-    "line", [b"\t; text", b"G 91\t", b"N10 G91", b"G0 X5\tY6", b"G0 X1" + b" " * 86 + b"Y100"]
+    "line",
+    [
+        b"\t; text",
+        b"G 91\t",
+        b"N10 G91",
+        b"G0 X5\tY6",
+        b"G0 X1" + b" " * 86 + b"Y100",
+        b"(Adaptive - depth: G -2,\tN 10)",
+        b"G0 X5 ; 16 - 4\tof N 10",
+    ],
 )
 def test_marlin_reads_these_as_they_stand(line):
     assert known("marlin", line) == [True, True]

@@ -39,8 +39,12 @@ def check_line(rules: Text, text: bytes) -> None:
         said = _COMMENTS.sub(b"", text).translate(None, b" \t/")
         if len(said) > rules.characters:
             raise SyntaxProblem(f"more than {rules.characters} characters", rules.characters)
-    if rules.tight and (found := _TIGHT.match(text)):
+    if rules.tight and (found := _TIGHT.match(_COMMENTS.sub(_blanks, text))):
         raise SyntaxProblem("a blank, tab or sign that makes another word of it", found.end() - 1)
+
+
+def _blanks(comment: re.Match[bytes]) -> bytes:
+    return b" " * len(comment[0])
 
 
 def check_word(rules: Text, text: bytes, begin: int) -> None:
