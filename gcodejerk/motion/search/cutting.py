@@ -37,7 +37,7 @@ GOOD, LONGER = 1.5, 0.3
 LONG = 0.1
 """And so much less where nothing is exceeded, but steps still gain."""
 SETTLED = 3e-3
-"""A step that costs no more than this share of what is made least does not gain any more."""
+"""Steps that can gain no more than this share of what is made least are not taken any more."""
 REACH = 0.1
 """How far away the least is thought to be at most, as a share of the accelerations."""
 NEAR = 0.2
@@ -199,7 +199,7 @@ class Cutting:
         Returns
         -------
         bool
-            Whether anything was cut, or a limit is held that was not.
+            Whether anything was cut, or a limit has to be held that was not.
         """
         cut = np.flatnonzero(cones & (self.left > self._caps))
         rows = self._starts[cut, np.newaxis] + np.arange(self._direction.shape[1])
