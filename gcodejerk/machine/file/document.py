@@ -258,12 +258,7 @@ class Document:
             depth -= isinstance(event, yaml.CollectionEndEvent)
             aliases += isinstance(event, yaml.AliasEvent)
             if nodes > MOST_NODES or depth > MOST_DEPTH or aliases > MOST_ALIASES:
-                raise refusal(
-                    self._place_of(event.start_mark),
-                    f"holds more than {MOST_NODES} values, {MOST_ALIASES} aliases or "
-                    f"{MOST_DEPTH} levels, which no machine has",
-                    "start from machines/vmc.yaml",
-                )
+                raise self._too_much(self._place_of(event.start_mark))
             tag = getattr(event, "tag", None)
             if tag is not None and tag != "!" and tag not in _PLAIN_TAGS:
                 raise refusal(
@@ -272,9 +267,20 @@ class Document:
                     "write plain words and numbers",
                 )
 
+    def _too_much(self, place: Place) -> Exception:
+        return refusal(
+            place,
+            f"holds more than {MOST_NODES} values, {MOST_ALIASES} aliases or {MOST_DEPTH} levels, "
+            "which no machine has",
+            "start from machines/vmc.yaml",
+        )
+
     def _not_yaml(self, error: yaml.MarkedYAMLError) -> Exception:
         mark = error.problem_mark or error.context_mark
         place = Place(self.name) if mark is None else self._place_of(mark)
+        if "nesting depth" in (error.problem or ""):
+            # libyaml reads ahead, and from 0.2.6 on no deeper than 1000 levels.
+            return self._too_much(place)
         remedy = "indent with spaces, put a colon and a blank after each key, close every bracket"
         if "\t" in (place.text or ""):
             remedy = "this line holds a tab; indent with spaces"
