@@ -315,7 +315,7 @@ class _Search:
     def _problem(self, looked_at: LookedAt, blocks: Blocks, active: Flags) -> Problem:
         """The programme for these blocks and groups of frequencies."""
         move, T = self.move, self.total
-        # All of them as they are: the rows are millions.
+        # All of them as they are: a copy of the rows is a few megabytes.
         used = slice(None) if active.all() else active[blocks.group]
         cone, group = blocks.cone[used], blocks.group[used]
         own = group[np.diff(cone, prepend=-1) != 0]
