@@ -9,7 +9,10 @@ Rule 2: a function and its pieces can be pickled, and a piece is a window of the
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import chain, islice
 from typing import Protocol, TypeVar
 
 In = TypeVar("In")
@@ -32,3 +35,33 @@ def here(function: Callable[[In], Out], pieces: Iterable[In]) -> Iterator[Out]:
     [1, 2]
     """
     return map(function, pieces)
+
+
+AHEAD = 2
+"""Pieces that are begun before the answer to an earlier one is asked for."""
+
+
+def ahead(function: Callable[[In], Out], pieces: Iterable[In]) -> Iterator[Out]:
+    """One after the other, in a thread of this process, while the answers are made use of.
+
+    That pays for work on arrays, in which the interpreter has no part. Pieces are asked for here,
+    and a single one is done here.
+
+    Examples
+    --------
+    >>> list(ahead(abs, [-1, 2, -3, 4]))
+    [1, 2, 3, 4]
+    """
+    pieces = iter(pieces)
+    first = list(islice(pieces, 2))
+    if len(first) < 2:
+        yield from map(function, first)
+        return
+    with ThreadPoolExecutor(1) as thread:
+        waiting: deque[Future[Out]] = deque()
+        for piece in chain(first, pieces):
+            waiting.append(thread.submit(function, piece))
+            if len(waiting) > AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()

@@ -5,6 +5,9 @@ moment it is made, so that it is gone with the process, whatever ends it. What w
 stays in memory until `release`; so whoever goes through all rows goes window by window.
 
 Rule: nothing depends on where a column is. Where there is no room on the disk, it is in memory.
+
+Blocks of some megabytes that are worked on come and go with every chunk; that they are not given
+back to the system in between is seen to here, too.
 """
 
 from __future__ import annotations
@@ -23,6 +26,12 @@ MANY = 1 << 15
 """Rows from which a column is on disk."""
 AT_ONCE = 1 << 14
 """Rows that are looked at at a time."""
+
+_BLOCK = 1 << 23
+# glibc gives a freed block back to the system at once where it is larger than any freed before, and
+# what is free at the end of its heap beyond twice that. So each chunk's arrays would be new pages,
+# which cost more than most that is done with them. One larger block, freed untouched, teaches it.
+np.empty(_BLOCK, dtype=np.uint8)
 
 _maps: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
@@ -141,7 +150,7 @@ class Growing:
     def extend(self, values: NDArray[Any]) -> None:
         """Take more rows; they are not written to behind our back."""
         if len(values):
-            self._parts.append(values)
+            self._parts.append(np.asarray(values, dtype=self.dtype))
             self._waiting += len(values)
             if self._waiting >= AT_ONCE and len(self) >= MANY and not self._in_memory:
                 self._settle()
@@ -163,18 +172,18 @@ class Growing:
 
     def _joined(self) -> NDArray[Any]:
         """The rows that wait."""
-        rows = np.concatenate([np.empty(self._shape(0), self.dtype), *self._parts])
-        return rows.astype(self.dtype, copy=False)
+        return np.concatenate([np.empty(self._shape(0), self.dtype), *self._parts])
 
     def _settle(self) -> None:
         """Put the rows that wait where they stay."""
-        rows = self._joined()
         if self._file is None and self.once and (self._first is not None or not self._count):
-            self._first = rows[0].copy() if self._first is None else self._first
-            if _same_bits(rows, self._first):
-                self._count += len(rows)
+            first = self._parts[0][0].copy() if self._first is None else self._first
+            self._first = first
+            if all(_same_bits(part, first) for part in self._parts):
+                self._count += self._waiting
                 self._parts, self._waiting = [], 0
                 return
+        rows = self._parts[0] if len(self._parts) == 1 else self._joined()
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 (lives on)
@@ -214,6 +223,7 @@ def _is_mapped(values: NDArray[Any]) -> bool:
 
 def _same_bits(rows: NDArray[Any], first: NDArray[Any]) -> bool:
     """Whether all rows are the first to the bit."""
+    rows = rows if rows.strides[0] else rows[:1]
     kind = f"u{rows.itemsize}"
     return bool((rows.view(kind) == np.asarray(first).view(kind)).all())
 

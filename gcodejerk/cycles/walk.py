@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.program import read_chunk
+from gcodejerk.nc.program import plain_lines, read_chunk
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.start import Start
@@ -66,7 +66,7 @@ class Walker(Reader):
         self.places = array("q")
         """The columns of the map, row by row."""
         self.newline = b"\n"
-        self._chunk = Chunk(b"", 0, 1)
+        self._chunk = Chunk(b"", 0, 1, 0)
         self._at = 0
         self._out = 0
         self._added = 0
@@ -85,7 +85,7 @@ class Walker(Reader):
                 crlf = first > 0 and chunk.data[first - 1 : first] == b"\r"
                 self.newline = b"\r\n" if crlf else b"\n"
             self._chunk = chunk
-            read_chunk(self, chunk, fast=True)
+            read_chunk(self, chunk, plain_lines(chunk, self.dialect))
             self._copy(chunk.offset + len(chunk.data))
         self.finish_series()
         return digest.digest()

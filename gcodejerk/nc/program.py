@@ -33,6 +33,8 @@ from gcodejerk.nc.text.block import Block, Line
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK, Chunk, read_chunks
 from gcodejerk.nc.text.lexer import read_lines
 from gcodejerk.nc.text.tokenizer import parse_line
+from gcodejerk.nc.text.words import Lines
+from gcodejerk.spread import ahead
 from gcodejerk.start import NOTHING_KNOWN, Start
 
 STAMP_LINES = 50
@@ -231,17 +233,21 @@ def follow(
     digest = hashlib.blake2b(digest_size=16)
     size = lines = 0
     newline, stamp = b"\n", None
-    for chunk in chunks:
+
+    def cut(chunk: Chunk) -> tuple[Chunk, Lines | None]:
         digest.update(chunk.data)
+        return chunk, plain_lines(chunk, chosen) if fast else None
+
+    for chunk, plain in ahead(cut, chunks):
         if not size:
             refuse_klartext(chunk.data, chosen, name)
             stamp = find_stamp(chunk, chosen)
             first = chunk.data.find(b"\n")
             if first > 0 and chunk.data[first - 1 : first] == b"\r":
                 newline = b"\r\n"
-        read_chunk(reader, chunk, fast=fast)
+        read_chunk(reader, chunk, plain)
         size += len(chunk.data)
-        lines += chunk.data.count(b"\n") + (not chunk.data.endswith(b"\n"))
+        lines += chunk.feeds + (not chunk.data.endswith(b"\n"))
         if progress is not None:
             progress(size)
     reader.finish()
@@ -264,16 +270,17 @@ def follow(
     )
 
 
-def read_chunk(reader: Reader, chunk: Chunk, *, fast: bool) -> None:
-    """Take the lines of one chunk."""
-    if not fast or not reader.dialect.quick:
+def plain_lines(chunk: Chunk, dialect: Dialect) -> Lines | None:
+    """Cut a chunk into lines, the plain ones with their words, where the dialect has such."""
+    return read_lines(chunk.data, dialect) if dialect.quick else None
+
+
+def read_chunk(reader: Reader, chunk: Chunk, lines: Lines | None) -> None:
+    """Take the lines of one chunk; where nobody has cut it, all of them with care."""
+    if lines is None:
         for line in split_lines(chunk):
             reader.read_line(*line)
         return
-    lines = read_lines(chunk.data, reader.dialect)
-    complete = chunk.data.endswith(b"\n")
-    begins = lines.begin.tolist()
-    ends = [begin - 1 for begin in begins[1:]] + [len(chunk.data) - complete]
     careful = [*np.flatnonzero(lines.careful).tolist(), len(lines)]
     place = (chunk.line, chunk.offset)
     at = following = by_hand = 0
@@ -290,9 +297,10 @@ def read_chunk(reader: Reader, chunk: Chunk, *, fast: bool) -> None:
                 by_hand = at + patience
                 patience *= 2
         else:
-            text = chunk.data[begins[at] : ends[at]]
-            ended = at + 1 < len(lines) or complete
-            reader.read_line(text, chunk.offset + begins[at], chunk.line + at, int(ended))
+            begin, ended = int(lines.begin[at]), int(lines.terminator[at] != 0)
+            last = at + 1 == len(lines)
+            end = len(chunk.data) - ended if last else int(lines.begin[at + 1]) - 1
+            reader.read_line(chunk.data[begin:end], chunk.offset + begin, chunk.line + at, ended)
             at += 1
 
 

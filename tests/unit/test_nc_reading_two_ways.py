@@ -69,6 +69,75 @@ def test_both_ways_agree_on_an_odd_line_anywhere_in_a_run(where, beginning, requ
         assert differences(b"".join(run)[:-1]) == [], odd
 
 
+ODD_WORDS = (
+    *("X123456789", "X1234567890", "X0000000001", "X-0", "X+0.", "Y-.5", "Y+.0", "Z.", "Z-", "Z+."),
+    *("X1234567.1234567", "X12345678.123456", "X123456789.12345", "X-123456789.12345"),
+    *("X1234567.12345678", "X1.23456789012345", "X.12345678901234", "X.123456789012345"),
+    *(
+        "X1,5",
+        "X1/5",
+        "X/5",
+        "X,5",
+        "X1.2.3",
+        "X1-2",
+        "X--1",
+        "X-+1",
+        "X5.-",
+        "X.-5",
+        "X1 .5",
+        "X 5",
+    ),
+    *(
+        "F-0",
+        "F+5",
+        "F-5",
+        "F0",
+        "S-5",
+        "S+5",
+        "N10.5Y1",
+        "N-5Y1",
+        "N+5Y1",
+        "N.5Y1",
+        "N123456789Y1",
+    ),
+    *(
+        "N1234567890Y1",
+        "N5(a)Y1",
+        "(a)N5Y1",
+        " N5Y1",
+        "Y1N5",
+        "G01.X1",
+        "G1.0X1",
+        "G001X1",
+        "G+1X1",
+    ),
+    *("G.1X1", "G1X1G0", "G0G0X1", "X1X2", "G4P1", "G00X1", "G03X1R5", "G04X1", "G10X1", "G31X1"),
+    *(
+        "(5)X1",
+        "(5 5)5",
+        "X1(12345678901234567890)",
+        "X1(X2)",
+        "X1;X2",
+        "X1;5",
+        ";5",
+        "X1;(",
+        "X1(;)",
+    ),
+    *("X1(a\r)", "X1;a\r5", "X1\r", "X1()", "()X1", "X1()()Y2", "X1(a)Y2(b)", "X1(a(b)", "X1(a))"),
+)
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "grbl", "haas", "fanuc-lathe-b"])
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+def test_both_ways_agree_on_every_odd_word_in_a_run(dialect, end):
+    start = Start(diameter=dialect.startswith("fanuc-lathe"))
+    for word in (word.encode() for word in ODD_WORDS):
+        lines = [b"G21 G90 F100" if dialect != "fanuc-lathe-b" else b"G21 G90 G94 F100", *PLAIN]
+        data = b"".join(line.rstrip() + end for line in [*lines, word, *PLAIN, word])
+        assert differences(data, start, dialect) == [], word
+        assert differences(data[: -len(end)], start, dialect) == [], word
+
+
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_both_ways_agree_on_a_long_run_in_every_dialect(dialect):
     # Found by fuzzing: lines of linear and rotary axes together.

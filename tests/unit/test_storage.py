@@ -22,6 +22,25 @@ def few(monkeypatch):
     monkeypatch.setattr(storage, "AT_ONCE", 5)
 
 
+def test_a_column_that_grows_by_one_value_for_many_rows_keeps_it_once(few):
+    for second in (np.broadcast_to(np.float64(2.5), 9), np.full(9, 2.5)):
+        column = storage.Growing(np.float64, once=True)
+        column.extend(np.broadcast_to(np.float64(2.5), 7))
+        column.extend(second)
+        finished = column.finish()
+        assert finished.tolist() == [2.5] * 16
+        assert finished.strides == (0,)
+
+
+def test_a_column_that_is_no_more_of_one_value_keeps_all_rows(few):
+    column = storage.Growing(np.float64, once=True)
+    for value, rows in ((2.5, 9), (2.5, 4), (-0.0, 3), (0.0, 6)):
+        column.extend(np.broadcast_to(np.float64(value), rows))
+    finished = column.finish()
+    assert finished.tolist() == [2.5] * 13 + [0.0] * 9
+    assert np.signbit(finished).tolist() == [False] * 13 + [True] * 3 + [False] * 6
+
+
 def _holes(rapids):
     """Holes at 64 places, again and again; one G0 that is left alone for each row of them."""
     lines = ["G21 G90 G94 G17 G40 G49 G64", "G0 Z5", "G0 X-10 Y-10", "F600"]

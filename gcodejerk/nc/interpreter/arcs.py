@@ -138,8 +138,8 @@ def doubtful(
     columns: list[Any] = [_ways(state, lines, axis, rows, (first, last)) for axis in axes]
     for letter in (*(_CENTRES[axis] for axis in axes), "R"):
         whole = np.full(len(letters), NAN if letter == "R" else 0.0)
-        at, value = lines.cut(letter, first, last)
-        whole[at] = value * (state.unit or NAN)
+        words = lines.words(letter, first, last)
+        whole[words.line] = words.values() * (state.unit or NAN)
         columns.append(whole[rows])
     in_plane = np.uint32(BIT[axes[0]] | BIT[axes[1]])
     found: NDArray[np.bool_] = _misses(*columns) | (letters[rows] & in_plane == 0)
@@ -151,8 +151,8 @@ def _ways(
 ) -> NDArray[np.float64]:
     """How far an axis goes in each of these lines of a run."""
     k = AXES.index(axis)
-    at, value = lines.cut(axis, *run)
-    value = value * state.scale(k)
+    words = lines.words(axis, *run)
+    at, value = words.line, words.values() * state.scale(k)
     before, behind = (np.searchsorted(at, rows, side=side) for side in ("left", "right"))
     named = behind > before
     if state.distance == G91:

@@ -7,8 +7,9 @@ word without a use, no F in G93), the run ends in front of it and the careful wa
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +23,18 @@ from gcodejerk.nc.interpreter.limits import beyond_path
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
-from gcodejerk.nc.text.words import BIT, Lines
+from gcodejerk.nc.text.words import BIT, Lines, Words, read_words
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 AXIS_BITS = (1 << len(AXES)) - 1
 CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
 _ARC_WORDS = CENTRES | BIT["R"]
-_IS_LINEAR = np.array([axis in LINEAR for axis in AXES])
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
+
+
+def _bits(axes: Iterable[str]) -> np.uint16:
+    """The bits of some axes."""
+    return np.uint16(sum(BIT[axis] for axis in axes if axis in AXES))
 
 
 def can_run(state: State) -> bool:
@@ -119,15 +124,15 @@ def run_plain(
     """
     assert state.motion is not None
     letters = lines.letters[first:last]
-    codes, code_values = lines.cut("G", first, last)
-    motion = _spread(codes, code_values.astype(np.uint8), state.motion // 10, last - first)
+    codes = lines.words("G", first, last)
+    motion = _spread(codes.line, codes.codes(), state.motion // 10, last - first)
     sure = sure_lines(letters, motion, state)
     if dialect.arcs_refused and state.unit is not None:
         arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
         sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
     if dialect.arcs_refused:
-        feeds, feed_values = lines.cut("F", first, last)
-        sure[feeds[feed_values == 0.0]] = False
+        given = lines.words("F", first, last)
+        sure[given.line[given.values() == 0.0]] = False
     if not sure.all():
         last = first + int(np.argmin(sure))
         letters, motion = letters[: last - first], motion[: last - first]
@@ -137,53 +142,111 @@ def run_plain(
     named = (letters & AXIS_BITS).astype(np.uint16)
     moves = (named != 0) | ((motion >= 2) & (letters & CENTRES != 0))
     events = np.where(moves & (motion != 0), np.uint8(USES_FEED), np.uint8(0))
-    feeds, feed_values = lines.cut("F", first, last)
-    events[feeds] = GIVES_FEED
     rapid = np.flatnonzero((named != 0) & (motion == 0))
-
-    start, target = _positions(state, lines, first, last, rapid)
-    history = np.concatenate([[state.feed], feed_values])
-    columns: dict[str, Any] = asdict(ModeColumns.of(state))
+    feeds = _History.of("F", lines, letters, first, rapid)
+    events[feeds.words.line] = GIVES_FEED
+    start, target, feed = _told(state, feeds, lines, letters, first, rapid)
     row = rapid + first
+    columns: dict[str, Any] = asdict(ModeColumns.of(state))
     columns.update(
         line=row + place[0],
-        begin=lines.begin[row] + place[1],
-        end=lines.end[row] + place[1],
-        terminator=lines.terminator[row],
+        begin=lines.begin.take(row) + place[1],
+        end=lines.end.take(row) + place[1],
+        terminator=lines.terminator.take(row),
         start=start,
         target=target,
-        words=named[rapid],
-        feed=history[np.searchsorted(feeds, rapid, side="right")],
+        words=named.take(rapid),
+        feed=feed,
         # A whole number that matters would have made its line odd.
-        feed_whole=np.searchsorted(feeds, rapid, side="right") == 0 if state.feed_whole else False,
-        reason=reasons(state, named[rapid], start, target, dialect),
+        feed_whole=feeds.behind == 0 if state.feed_whole else False,
+        reason=reasons(state, named.take(rapid), start, target, dialect),
     )
     # What stands behind the end of the program uses no F.
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
     if dialect.dark_rapids and state.spindle != 5 and not state.ended:
         log.habits |= bool(((events == USES_FEED) & (letters & BIT["S"] != 0)).any())
     state.motion = int(motion[-1]) * 10
-    state.feed = float(history[-1])
-    state.feed_whole = bool(state.feed_whole) and not len(feeds)
+    state.feed_whole = bool(state.feed_whole) and not len(feeds.words.line)
     certain = np.flatnonzero(columns["reason"] == CERTAIN)
     return last, int(row[certain[0]]) + place[0] if len(certain) else None
 
 
-def _positions(
-    state: State, lines: Lines, first: int, last: int, rapid: NDArray[np.intp]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where each rapid of the run starts and ends; the state is moved to the run's end."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _History:
+    """The words of one letter in a run, and how many stand in front of rapids, and behind."""
+
+    words: Words
+    before: NDArray[np.intp]
+    behind: NDArray[np.intp]
+
+    @classmethod
+    def of(
+        cls,
+        letter: str,
+        lines: Lines,
+        letters: NDArray[np.uint32],
+        first: int,
+        rapid: NDArray[np.intp],
+    ) -> Self:
+        """Of the lines from `first` on that have these letters, and the rapids among them."""
+        words = lines.words(letter, first, first + len(letters))
+        if not len(words.line):
+            none = np.zeros(len(rapid), dtype=np.intp)
+            return cls(words, none, none)
+        stands = letters & BIT[letter] != 0
+        behind = np.cumsum(stands, dtype=np.intp).take(rapid)
+        return cls(words, behind - stands.take(rapid), behind)
+
+    def which(self, summed: bool) -> NDArray[np.intp]:
+        """Words whose numbers matter: all where they are summed, else the last ones somewhere."""
+        matters = np.full(len(self.words.line) + 1, summed)
+        matters[self.before] = matters[self.behind] = matters[-1] = True
+        return np.flatnonzero(matters[1:])
+
+    def held(
+        self, before: float, which: NDArray[np.intp], values: NDArray[np.float64], summed: bool
+    ) -> NDArray[np.float64]:
+        """What holds behind each word, and in front of all, where that was `before`."""
+        held = np.empty(len(self.words.line) + 1)
+        held[0] = before
+        held[which + 1] = values
+        return np.add.accumulate(held) if summed else held
+
+
+def _told(
+    state: State,
+    feeds: _History,
+    lines: Lines,
+    letters: NDArray[np.uint32],
+    first: int,
+    rapid: NDArray[np.intp],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
+    """Where each rapid starts and ends, and its F; the state is moved to the run's end."""
     start = np.empty((len(rapid), len(AXES)))
-    target = np.empty_like(start)
-    for axis, letter in enumerate(AXES):
-        at, value = lines.cut(letter, first, last)
-        history = np.concatenate([[state.position[axis]], value * state.scale(axis)])
-        if state.distance == G91:
-            history = np.add.accumulate(history)
-        start[:, axis] = history[np.searchsorted(at, rapid, side="left")]
-        target[:, axis] = history[np.searchsorted(at, rapid, side="right")]
-        state.position[axis] = float(history[-1])
-    return start, target
+    start[:] = state.position
+    target, feed = start.copy(), state.feed
+    axes = _axes_of(int(np.bitwise_or.reduce(letters)))
+    summed = state.distance == G91
+    histories = [_History.of(AXES[axis], lines, letters, first, rapid) for axis in axes]
+    which = [history.which(summed) for history in histories]
+    given = feeds.which(summed=False)
+    *numbers, fed = read_words(
+        [*zip((history.words for history in histories), which, strict=True), (feeds.words, given)]
+    )
+    for axis, history, index, values in zip(axes, histories, which, numbers, strict=True):
+        held = history.held(state.position[axis], index, values * state.scale(axis), summed)
+        start[:, axis], target[:, axis] = held.take(history.before), held.take(history.behind)
+        state.position[axis] = float(held[-1])
+    if not len(given):
+        return start, target, feed
+    held = feeds.held(feed, given, fed, summed=False)
+    state.feed = float(held[-1])
+    return start, target, held.take(feeds.behind)
+
+
+def _axes_of(bits: int) -> list[int]:
+    """The axes of which a bit is set."""
+    return [axis for axis in range(len(AXES)) if bits >> axis & 1]
 
 
 def reasons(
@@ -201,18 +264,22 @@ def reasons(
     bar = barred(state)
     if bar is not None:
         return np.full(len(named), _INDEX[bar], dtype=np.uint8)
-    is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
-    unknown = (is_named & (np.isnan(start) | np.isnan(target))).any(axis=1)
-    moving = is_named & (start != target)
-    moves = moving.any(axis=1)
+    unknown, moving = (np.zeros(len(named), dtype=np.uint16) for _ in range(2))
+    for axis in _axes_of(int(np.bitwise_or.reduce(named, initial=0))):
+        begin, end, bit = start[:, axis], target[:, axis], np.uint16(1 << axis)
+        unknown |= (np.isnan(begin) | np.isnan(end)) * bit
+        moving |= (begin != end) * bit
+    unknown, moving = unknown & named != 0, moving & named
+    moves = moving != 0
     reason = np.full(len(named), CERTAIN, dtype=np.uint8)
-    apart = np.array([axis in dialect.apart for axis in AXES])
-    reason[moving[:, apart].any(axis=1) & moving[:, ~apart].any(axis=1)] = _INDEX[Reason.APART]
-    reason[(moving & apart).sum(axis=1) > 1] = _INDEX[Reason.APART]
+    apart = moving & _bits(dialect.apart)
+    reason[(apart != 0) & (moving != apart)] = _INDEX[Reason.APART]
+    reason[apart & (apart - np.uint16(1)) != 0] = _INDEX[Reason.APART]
     if not dialect.feed_of_mixed:
-        both = moving[:, _IS_LINEAR].any(axis=1) & moving[:, ~_IS_LINEAR].any(axis=1)
-        reason[both] = _INDEX[Reason.MIXED_AXES]
+        linear = moving & _bits(LINEAR)
+        reason[(linear != 0) & (moving != linear)] = _INDEX[Reason.MIXED_AXES]
     if state.path_limits:
+        is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
         limited = beyond_path(state, np.where(is_named, target - start, 0.0))
         reason[limited] = _INDEX[Reason.LIMIT_SET]
     reason[~moves] = _INDEX[Reason.NO_MOTION]

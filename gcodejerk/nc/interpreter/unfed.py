@@ -73,9 +73,10 @@ def run_unfed(
         Number, in the file, of the first certain rapid.
     """
     letters = lines.letters[first:last]
-    at, value = lines.cut("G", first, last)
+    codes = lines.words("G", first, last)
+    at = codes.line
     stated = np.full(len(letters), _NOBODY_KNOWS)
-    stated[at] = value
+    stated[at] = codes.codes()
     moves, centred = letters & AXIS_BITS != 0, letters & CENTRES != 0
     may_be_refused = (stated >= 1) & (moves | ((stated >= 2) & centred))
     before = _NOBODY_KNOWS if state.motion is None else state.motion // 10
@@ -129,9 +130,10 @@ def _positions(
     start = np.empty((len(rapid), len(AXES)))
     target = np.empty_like(start)
     for axis, letter in enumerate(AXES):
-        at, value = lines.cut(letter, first, first + len(lost))
+        words = lines.words(letter, first, first + len(lost))
+        at = words.line
         said = np.full(len(lost), NAN)
-        said[at] = value * state.scale(axis)
+        said[at] = words.values() * state.scale(axis)
         said[lost] = NAN
         told = np.zeros(len(lost), dtype=np.bool_)
         told[at] = True

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
+import numpy as np
+
 from gcodejerk.errors import Place, ProgramError
 
 CHUNK = 512 * 1024
@@ -39,6 +41,8 @@ class Chunk:
     """Of the first byte, in the file."""
     line: int
     """Of the first line, counted from 1."""
+    feeds: int
+    """How many of its lines end."""
 
 
 def _text(data: bytes) -> str:
@@ -65,10 +69,16 @@ def _check_start(data: bytes, name: str) -> None:
         )
 
 
-def _check_bytes(data: bytes, line: int, name: str) -> None:
-    """Refuse control characters that no text holds."""
+def _check_bytes(data: bytes, line: int, name: str) -> int:
+    """Refuse control characters that no text holds; how many line feeds there are."""
+    source = np.frombuffer(data, dtype=np.uint8)
+    feeds = int(np.count_nonzero(source == ord("\n")))
+    # Hardly a program has any others, but for those of CR LF.
+    others = np.count_nonzero(source < ord(" ")) - feeds
+    if others == 0 or others == np.count_nonzero(source == ord("\r")):
+        return feeds
     if len(data.translate(None, _BINARY)) == len(data):
-        return
+        return feeds
     found = _CONTROL.search(data)
     assert found is not None
     begin = data.rfind(b"\n", 0, found.start()) + 1
@@ -120,26 +130,26 @@ def read_chunks(file: BinaryIO, name: str) -> Iterator[Chunk]:
             _check_line(kept, line, name)
             continue
         data, kept = kept + piece[:cut], piece[cut:]
-        _check_bytes(data, line, name)
+        feeds = _check_bytes(data, line, name)
         first = data.find(b"\n")
         _check_line(data[:first], line, name)
-        yield from _whole_lines(data, offset, line, name)
+        _check_lines(data, line, name)
+        yield Chunk(data, offset, line, feeds)
         offset += len(data)
-        line += data.count(b"\n")
+        line += feeds
         _check_line(kept, line, name)
     if kept:
         _check_bytes(kept, line, name)
-        yield Chunk(kept, offset, line)
+        yield Chunk(kept, offset, line, 0)
     elif not offset:
         raise ProgramError("file is empty", "give an NC program", Place(name))
 
 
-def _whole_lines(data: bytes, offset: int, line: int, name: str) -> Iterator[Chunk]:
-    """Pass the piece on, once no line in it is too long."""
+def _check_lines(data: bytes, line: int, name: str) -> None:
+    """Refuse an endless line among whole ones."""
     at = 0
     while len(data) - at > LONGEST_LINE:
         end = data.rfind(b"\n", at, at + LONGEST_LINE + 1)
         if end < 0:
             _check_line(data[at : at + LONGEST_LINE + 1], line + data.count(b"\n", 0, at), name)
         at = end + 1
-    yield Chunk(data, offset, line)

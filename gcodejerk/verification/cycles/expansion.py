@@ -18,7 +18,7 @@ from gcodejerk.nc import Block, Dialect, Start, find_dialect, parse_block
 from gcodejerk.nc.dialects.dialect import PLANES
 from gcodejerk.nc.dialects.gcodes import G17, G91
 from gcodejerk.nc.interpreter.modal import State
-from gcodejerk.nc.program import read_chunk, split_lines
+from gcodejerk.nc.program import plain_lines, read_chunk, split_lines
 from gcodejerk.nc.reader import Reader
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.verification.bytes.source import Window
@@ -145,8 +145,8 @@ class _Proof:
         plain = self.series is None and not _CANDIDATE.search(chunk.data)
         if plain and self.theirs.peek(len(chunk.data)) == chunk.data:
             self.theirs.skip(len(chunk.data))
-            read_chunk(self.reader, chunk, fast=True)
-            self.kept += chunk.data.count(b"\n")
+            read_chunk(self.reader, chunk, plain_lines(chunk, self.reader.dialect))
+            self.kept += chunk.feeds
             return True
         return all(self._line(*line) for line in split_lines(chunk))
 

@@ -1,0 +1,111 @@
+"""The joints of a chunk: the bytes that are no digits, and what each of them is.
+
+What stands between two joints are digits and nothing else, so a program is its joints and their
+distances. They are fewer than half of its bytes, and a byte's class is looked up for them alone.
+
+Rule: what stands within a plain comment is `COMMENT`, whatever it is.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcodejerk.nc.text.words import COMMENT, DOT, PLAIN_LETTERS, SIGN
+
+BLANK, END, CR, OPEN, CLOSE, SEMICOLON, OTHER = range(SIGN + 1, SIGN + 8)
+LETTERS = 64
+"""Classes from here on are letters and equal their upper-case code."""
+
+_ACTIVE = re.compile(rb"[(;][ \t]*py", re.IGNORECASE)
+_MAY_BE_ACTIVE = np.array([byte in b"pP \t" for byte in range(256)])
+"""Whether such a byte behind its opening may begin one."""
+
+
+def _classes() -> bytes:
+    """Make the table that translates a byte to its class."""
+    table = bytearray([OTHER] * 256)
+    table[ord(".")] = DOT
+    table[ord("+")] = table[ord("-")] = SIGN
+    table[ord(" ")] = table[ord("\t")] = BLANK
+    table[ord("\n")], table[ord("\r")] = END, CR
+    table[ord("(")], table[ord(")")], table[ord(";")] = OPEN, CLOSE, SEMICOLON
+    for letter in PLAIN_LETTERS:
+        table[ord(letter)] = table[ord(letter.lower())] = ord(letter)
+    return bytes(table)
+
+
+_CLASS = _classes()
+_REMARKS = tuple(bytes([kind]) for kind in (OPEN, CLOSE, SEMICOLON))
+
+
+def find_joints(
+    text: bytes, begin: int, semicolon: bool
+) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.bool_]]:
+    r"""Find the joints of a text, and what they are.
+
+    Parameters
+    ----------
+    text : bytes
+        Begins and ends with a line feed.
+    begin : int
+        Where the line feed in front of the first line stands.
+    semicolon : bool
+        A ``;`` begins a comment.
+
+    Returns
+    -------
+    joint : ndarray of int64, shape (k,)
+        Their places, from `begin` on.
+    kind : ndarray of uint8, shape (k,)
+        Their classes; `COMMENT` from what opens one to what closes it.
+    wrong : ndarray of bool, shape (k,)
+        A bracket, or a semicolon, of what is no plain comment.
+
+    Examples
+    --------
+    >>> joint, kind, wrong = find_joints(b"\nX5(1 a)\nY2.(\n", 0, semicolon=True)
+    >>> joint.tolist(), (kind == COMMENT).nonzero()[0].tolist(), wrong.nonzero()[0].tolist()
+    ([0, 1, 3, 5, 6, 7, 8, 9, 11, 12, 13], [2, 3, 4], [9])
+    """
+    source = np.frombuffer(text, dtype=np.uint8)[begin:]
+    # '0' to '9' alone are below 10 when 48 is taken from a byte, modulo 256
+    joint = np.flatnonzero(source - np.uint8(ord("0")) > 9)
+    classes = source.take(joint).tobytes().translate(_CLASS)
+    kind = np.frombuffer(classes, dtype=np.uint8)
+    joint += begin
+    if not any(mark in classes for mark in _REMARKS):
+        return joint, kind, np.zeros(len(joint), dtype=np.bool_)
+    return joint, *_comments(text, joint, kind, semicolon)
+
+
+def _comments(
+    text: bytes, joint: NDArray[np.int64], kind: NDArray[np.uint8], semicolon: bool
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """The classes with `COMMENT` throughout plain comments; what opens or closes any other."""
+    at = np.flatnonzero((kind >= END) & (kind <= SEMICOLON) & (kind != CR))
+    what = kind.take(at)
+    following, previous = np.roll(what, -1), np.roll(what, 1)
+    is_open, is_semicolon = what == OPEN, what == SEMICOLON
+    bad = is_open & (following != CLOSE)
+    bad |= (what == CLOSE) & (previous != OPEN)
+    bad |= is_semicolon & ((following != END) | (not semicolon))
+    # A comment may run Python: (py,...)
+    opens = np.flatnonzero(is_open | is_semicolon)
+    source = np.frombuffer(text, dtype=np.uint8)
+    behind = source.take(joint.take(at.take(opens)) + 1)
+    for index in opens[_MAY_BE_ACTIVE.take(behind)].tolist():
+        bad[index] = bad[index] or _ACTIVE.match(text, int(joint[at[index]])) is not None
+    opens = opens[~bad.take(opens)]
+    last = at.take(opens + 1)
+    step = np.zeros(len(kind), dtype=np.int64)
+    step[at.take(opens)], step[last] = 1, -1
+    # A carriage return within a comment may end the line, so it is not passed over.
+    kind = np.where((np.cumsum(step) != 0) & (kind != CR), np.uint8(COMMENT), kind)
+    # The bracket that closes a comment is a blank; the end of a line stays what it is.
+    kind[last[kind.take(last) == CLOSE]] = BLANK
+    wrong = np.zeros(len(kind), dtype=np.bool_)
+    wrong[at[bad]] = True
+    return kind, wrong
