@@ -161,7 +161,8 @@ def read_program(
     origin = file.tell() if neighbours else 0
     program = follow(read_chunks(file, name), reader, progress, fast)
     if neighbours:
-        program = replace(program, rapids=with_neighbours(file, origin, program.rapids))
+        rapids = with_neighbours(file, origin, program.rapids, reader.dialect, name)
+        program = replace(program, rapids=rapids)
     return program
 
 

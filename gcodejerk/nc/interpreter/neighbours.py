@@ -17,7 +17,7 @@ keep.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import BinaryIO
@@ -25,9 +25,13 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.near_plain import NO, UNSAID, YES, Fast, are_followed, are_queued
 from gcodejerk.nc.interpreter.rapids import Rapids
+from gcodejerk.nc.text.chunks import Chunk, read_chunks
+from gcodejerk.nc.text.lexer import read_lines
 from gcodejerk.reasons import CERTAIN
-from gcodejerk.storage import alike, windows
+from gcodejerk.storage import alike, release, windows
 from gcodejerk.units import MM_PER_INCH
 
 WINDOW = 512
@@ -35,6 +39,8 @@ WINDOW = 512
 FARTHEST = 1 << 14
 IN_FRONT = 512
 """Bytes in front of a rapid that are looked at. [bytes]"""
+FEW = 8
+"""Certain rapids of a chunk up to which each is looked at by itself."""
 REMEMBERED = 1 << 12
 """Lines that are taken apart once: each is near some rapids."""
 LONG_TIME, LONG_RAPID = 0.02, 2.0
@@ -56,7 +62,9 @@ _MOVES = frozenset({0, 1, 2, 3, 53, 73, 81, 82, 83, 85, 86, 89})
 _MOVING = {bytes([c]) for c in b"XYZABCUVWIJK"}
 
 
-def with_neighbours(file: BinaryIO, origin: int, rapids: Rapids) -> Rapids:
+def with_neighbours(
+    file: BinaryIO, origin: int, rapids: Rapids, dialect: Dialect, name: str
+) -> Rapids:
     """Say of each certain rapid whether it is alone.
 
     Parameters
@@ -67,6 +75,10 @@ def with_neighbours(file: BinaryIO, origin: int, rapids: Rapids) -> Rapids:
         Where the program begins in it.
     rapids : Rapids
         Found in it.
+    dialect : Dialect
+        How it is written.
+    name : str
+        For messages.
 
     Returns
     -------
@@ -75,26 +87,74 @@ def with_neighbours(file: BinaryIO, origin: int, rapids: Rapids) -> Rapids:
     """
     lone: NDArray[np.bool_] = rapids.lone.copy()
     queued: NDArray[np.bool_] = rapids.queued.copy()
-    for i in _certain(rapids):
-        unit = MM_PER_INCH if rapids.inch[i] else 1.0
-        begin, end = origin + int(rapids.begin[i]), origin + int(rapids.end[i])
-        file.seek(max(begin - IN_FRONT, origin))
-        text = file.read(end - file.tell())
-        before, block = text[: len(text) - (end - begin)], text[len(text) - (end - begin) :]
-        whole = len(before) < IN_FRONT
-        lines = before.split(b"\n")[0 if whole else 1 : -1]
-        feed = float(rapids.feed[i]) * unit if rapids.feed_mode[i] == 94 else np.nan
-        if _kind(block):
-            queued[i] = _long_motion(lines, bool(rapids.incremental[i]), unit, feed)
-        if lone[i]:
-            lone[i] = not _followed(file, begin, end)
+    if dialect.quick:
+        file.seek(origin)
+        left = [
+            _among_plain_lines(c, rapids, dialect, lone, queued) for c in read_chunks(file, name)
+        ]
+        unsaid: Iterable[NDArray[np.int64]] = left
+    else:
+        unsaid = (_certain(rapids, part) for part in windows(len(rapids)))
+    for rows in unsaid:
+        for i in rows.tolist():
+            _look(file, origin, rapids, i, lone, queued)
     return replace(rapids, lone=alike(lone), queued=alike(queued))
 
 
-def _certain(rapids: Rapids) -> Iterator[int]:
-    """Indices of the certain rapids."""
-    for part in windows(len(rapids)):
-        yield from (part.start + np.flatnonzero(rapids.reason[part] == CERTAIN)).tolist()
+def _certain(rapids: Rapids, part: slice) -> NDArray[np.int64]:
+    """Indices of the certain rapids among some."""
+    rows: NDArray[np.int64] = part.start + np.flatnonzero(rapids.reason[part] == CERTAIN)
+    return rows
+
+
+def _among_plain_lines(
+    chunk: Chunk,
+    rapids: Rapids,
+    dialect: Dialect,
+    lone: NDArray[np.bool_],
+    queued: NDArray[np.bool_],
+) -> NDArray[np.int64]:
+    """Say it of the rapids of a chunk, as far as the plain lines do; of which they don't."""
+    ends = (chunk.offset, chunk.offset + len(chunk.data))
+    rows = _certain(rapids, slice(*np.searchsorted(rapids.begin, ends).tolist()))
+    if len(rows) < FEW:
+        return rows
+    lines = read_lines(chunk.data, dialect)
+    at = np.searchsorted(lines.begin, rapids.begin[rows] - chunk.offset, side="right") - 1
+    unit = np.where(rapids.inch[rows], MM_PER_INCH, 1.0)
+    feed = np.where(rapids.feed_mode[rows] == 94, rapids.feed[rows] * unit, np.nan)
+    how = Fast(rapids.incremental[rows], unit, feed, LONG_RAPID, LONG_TIME)
+    follows = are_followed(lines, at, WINDOW)
+    stands = are_queued(lines, at, chunk.offset, how, IN_FRONT)
+    unsaid = (stands == UNSAID) | (lone[rows] & (follows == UNSAID))
+    queued[rows[stands == YES]] = True
+    lone[rows[~unsaid]] &= follows[~unsaid] == NO
+    release()
+    looked_at: NDArray[np.int64] = rows[unsaid]
+    return looked_at
+
+
+def _look(
+    file: BinaryIO,
+    origin: int,
+    rapids: Rapids,
+    i: int,
+    lone: NDArray[np.bool_],
+    queued: NDArray[np.bool_],
+) -> None:
+    """Say it of one rapid, line by line."""
+    unit = MM_PER_INCH if rapids.inch[i] else 1.0
+    begin, end = origin + int(rapids.begin[i]), origin + int(rapids.end[i])
+    file.seek(max(begin - IN_FRONT, origin))
+    text = file.read(end - file.tell())
+    before, block = text[: len(text) - (end - begin)], text[len(text) - (end - begin) :]
+    whole = len(before) < IN_FRONT
+    lines = before.split(b"\n")[0 if whole else 1 : -1]
+    feed = float(rapids.feed[i]) * unit if rapids.feed_mode[i] == 94 else np.nan
+    if _kind(block):
+        queued[i] = _long_motion(lines, bool(rapids.incremental[i]), unit, feed)
+    if lone[i]:
+        lone[i] = not _followed(file, begin, end)
 
 
 def _long_motion(lines: list[bytes], incremental: bool, unit: float, feed: float) -> bool:
