@@ -122,7 +122,10 @@ def map_amplitudes(
     output: Annotated[
         str | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="draw (.png, .svg, .pdf) or write a .csv"
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="draw (.png, .svg, .pdf) or write a .csv; - is standard output",
         ),
     ] = None,
     points: Annotated[
@@ -140,9 +143,11 @@ def map_amplitudes(
     as_json: JsonOption = False,
 ) -> None:
     """Map what is left of vibration over T1 and T_SUM, for one move of one axis."""
-    from gcodejerk.batch.files import new_file
+    from gcodejerk.batch.files import STANDARD, new_file
 
     suffix = _suffix_of_map(output, condition, conditions=conditions)
+    if as_json and output == STANDARD:
+        raise typer.BadParameter("--json and -o - are both on standard output: choose one")
     if output is None and (points is not None or longest is not None):
         raise typer.BadParameter("--points and --longest are of a map that is written (-o FILE)")
     described = load_machine(machine)
@@ -174,6 +179,8 @@ def map_amplitudes(
 
 def _suffix_of_map(output: str | None, condition: str | None, *, conditions: bool) -> str:
     """What kind of file a map goes to, empty for none; options that contradict it are refused."""
+    from gcodejerk.batch.files import STANDARD
+
     if condition is not None and condition.upper() not in CONDITIONS:
         raise typer.BadParameter(f"--condition {condition}: choose I, II or III")
     if conditions and condition is not None:
@@ -182,9 +189,11 @@ def _suffix_of_map(output: str | None, condition: str | None, *, conditions: boo
         raise typer.BadParameter("--conditions is of maps that are drawn (-o FILE)")
     if output is None:
         return ""
-    suffix = Path(output).suffix.lower()
+    suffix = TABLE if output == STANDARD else Path(output).suffix.lower()
     if suffix not in MAPS:
-        raise typer.BadParameter(f"-o {output}: a map is one of {', '.join(MAPS)}")
+        raise typer.BadParameter(
+            f"-o {output}: a map is one of {', '.join(MAPS)}, or - for the table on standard output"
+        )
     if conditions and suffix == TABLE:
         raise typer.BadParameter(
             f"-o {output}: --conditions draws {', '.join(FIGURES)}; a .csv is of one condition"

@@ -7,6 +7,7 @@ from pathlib import Path, PurePath
 
 import typer
 
+from gcodejerk.batch.files import STANDARD
 from gcodejerk.batch.inputs import (
     Input,
     NameClashError,
@@ -45,8 +46,12 @@ class Outputs:
             raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
         if "-" in files and len(files) > 1:
             raise typer.BadParameter("standard input (-) is one program: give it alone")
-        if self.if_changed and (self.in_place or self.output == "-"):
+        if self.if_changed and (self.in_place or self.output == STANDARD):
             raise typer.BadParameter("--if-changed compares a program with its output: name one")
+        if self.if_changed and self.report == STANDARD:
+            raise typer.BadParameter(
+                "--if-changed compares a program with its files: name a report"
+            )
         if self.backup and not self.in_place:
             raise typer.BadParameter("--backup is of --in-place: elsewhere the original stays")
         if self.in_place and "-" in files:
@@ -59,12 +64,11 @@ class Outputs:
             raise typer.BadParameter(
                 "-o and --report FILE take one program; use --output-dir and --report DIR/"
             )
-        if one_report is not None and not one_report.lower().endswith(
-            (".json", ".json.gz", SUFFIX)
-        ):
+        kinds = (".json", ".json.gz", SUFFIX)
+        if one_report not in (None, STANDARD) and not str(one_report).lower().endswith(kinds):
             raise typer.BadParameter(
-                f"--report {one_report}: a report is a file .json.gz or .json, or a page .html to "
-                "look at"
+                f"--report {one_report}: a report is a file .json.gz or .json, a page .html to "
+                "look at, or - for JSON on standard output"
             )
 
     def jobs(
@@ -78,7 +82,11 @@ class Outputs:
                 "--in-place: this controller's streams are a file of their own"
             )
         outputs = [self._output(program, suffix) for program in found]
-        if beside and mode == "write" and "-" in outputs:
+        if self.report == STANDARD and mode == "write" and STANDARD in outputs:
+            raise typer.BadParameter(
+                "standard output holds one: the program (-o -) or its report (--report -)"
+            )
+        if beside and mode == "write" and STANDARD in outputs:
             raise typer.BadParameter(
                 f"controller {emitter.name} writes two files, the program and its {beside}: "
                 "standard output holds one; name a file with -o"

@@ -66,7 +66,8 @@ def process(
         str | None,
         typer.Option(
             metavar="FILE",
-            help="write a report: .html to look at, .json(.gz) for programs; DIR/: one for each",
+            help="write a report: .html to look at, .json(.gz) for programs, - on standard output; "
+            "DIR/: one for each",
         ),
     ] = None,
     jobs: Annotated[
@@ -115,6 +116,7 @@ def process(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors and notes")] = False,
 ) -> None:
     """Rewrite every rapid that is certain; verify; write the result in one move."""
+    from gcodejerk.batch.files import STANDARD
     from gcodejerk.batch.inputs import find_inputs
     from gcodejerk.batch.jobs import run_jobs
     from gcodejerk.cli.outputs import Outputs
@@ -146,7 +148,10 @@ def process(
     described = calling(described, subprograms)
     mode = "check" if check else "diff" if diff else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
-    aside = diff or any(job.output == "-" for job in batch)
+    reports = report == STANDARD and not check
+    if reports and (diff or as_json):
+        raise typer.BadParameter("--report - has standard output to itself: no --diff, no --json")
+    aside = diff or reports or any(job.output == STANDARD for job in batch)
     tally = _Tally(mode, quiet, aside=aside, many=many, as_json=as_json, verbose=verbose)
     for problem in problems:
         tally.fail(str(problem))

@@ -67,6 +67,12 @@ def test_the_table_is_the_formula_at_every_point(run, tmp_path):
     assert A[here] == pytest.approx(5313.6, abs=0.06)
 
 
+def test_the_table_goes_to_standard_output_too(run, tmp_path):
+    code, said = run("-m", "paper", *MOVE, "-o", "-")
+    assert code == run("-m", "paper", *MOVE, "-o", "map.csv")[0] == 0
+    assert said == (tmp_path / "map.csv").read_text()
+
+
 @pytest.mark.parametrize("condition", ["I", "ii"])
 def test_the_table_of_another_condition_and_another_mode(run, tmp_path, condition):
     code, _ = run("-m", "paper", *MOVE, "--condition", condition, "--mode", 1, "-o", "m.csv")
@@ -208,7 +214,8 @@ def test_the_summary_of_a_move_that_needs_more_than_its_time(run):
         ),
         ((*MOVE, "-o", "map.gif"), 2, "a map is one of .png, .svg, .pdf, .csv"),
         ((*MOVE, "-o", "map"), 2, "a map is one of"),
-        ((*MOVE, "-o", "-"), 2, "a map is one of"),
+        ((*MOVE, "-o", "-", "--json"), 2, "both on standard output"),
+        ((*MOVE, "-o", "-", "--conditions"), 2, "a .csv is of one condition"),
         ((*MOVE, "-o", "map.png", "--points", 1), 2, "--points"),
         ((*MOVE, "--points", 50), 2, "-o FILE"),
         ((*MOVE, "-o", "map.png", "--longest", 0.01), 1, "for example --longest 0.08"),

@@ -1,6 +1,9 @@
 """What `process` never overwrites, and what it never keeps to itself."""
 
+import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -79,3 +82,29 @@ def test_the_machine_file_is_never_an_output(run, folder, force):
     code, out = run("process", "plate.ngc", "-m", "vmc", "-o", "plate.ngc", *force)
     assert (code, "is the input itself" in out) == (1, True)
     assert (folder / "mill.yaml").read_bytes() == text
+
+
+def test_a_report_on_standard_output_is_the_one_of_a_file_and_has_it_to_itself(folder):
+    command = [sys.executable, "-m", "gcodejerk.cli", "process", "plate.ngc", "-m", "vmc"]
+    said = subprocess.run([*command, "--report", "-"], cwd=folder, capture_output=True, check=True)
+    subprocess.run([*command, "--report", "r.json"], cwd=folder, capture_output=True, check=True)
+    assert json.loads(said.stdout) == json.loads((folder / "r.json").read_bytes())
+    assert b"plate.ngc: " in said.stderr
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("-o", "-"), "standard output holds one"),
+        (("--diff",), "--report - has standard output to itself"),
+        (("--json",), "--report - has standard output to itself"),
+        (("--if-changed",), "name a report"),
+        (("other.ngc",), "--report FILE take one program"),
+    ],
+)
+def test_what_else_goes_to_standard_output_is_refused_beside_a_report(run, folder, more, message):
+    shutil.copy(folder / "plate.ngc", folder / "other.ngc")
+    code, said = run("process", "plate.ngc", *more, "-m", "vmc", "--report", "-")
+    assert code == 2
+    assert message in " ".join(said.replace("│", " ").split())
+    assert sorted(p.name for p in folder.iterdir()) == ["other.ngc", "plate.ngc"]
