@@ -25,6 +25,8 @@ from gcodejerk.verification import Verification
 
 REMEMBERED = 2000
 """Reported profiles that are kept."""
+AT_HAND = 1024
+"""Lines of which it is at hand which profile is theirs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,8 @@ class ReportedProfiles(Mapping[int, Array]):
             rows.extend(like[begin[single]])
         self.lines, self.length, self.row = lines.finish(), lengths.finish(), rows.finish()
         self.made: dict[tuple[int, float], Array] = {}
+        self._near: dict[int, tuple[int, float]] = {}
+        """Of the lines around the one that was asked for last: row of the profile, and length."""
 
     def between(self, first: int, last: int) -> ReportedProfiles:
         """Those of some lines, both included, with their own profiles alone."""
@@ -127,6 +131,7 @@ class ReportedProfiles(Mapping[int, Array]):
         own = copy(self)
         own.profiles, own.row = self.profiles.take(rows), row.reshape(-1)
         own.lines, own.length, own.made = self.lines[part].copy(), self.length[part].copy(), {}
+        own._near = {}
         return own
 
     def __len__(self) -> int:
@@ -136,10 +141,9 @@ class ReportedProfiles(Mapping[int, Array]):
         return iter(self.lines.tolist())
 
     def __getitem__(self, line: int) -> Array:
-        at = int(np.searchsorted(self.lines, line, side="right")) - 1
-        if at < 0 or self.lines[at] != line:
-            raise KeyError(line)
-        key = int(self.row[at]), float(self.length[at])
+        key = self._near.get(line)
+        if key is None:
+            key = self._looked_up(line)
         made = self.made.get(key)
         if made is None:
             profiles, (row, length) = self.profiles, key
@@ -150,6 +154,16 @@ class ReportedProfiles(Mapping[int, Array]):
                 self.made.clear()
             self.made[key] = made
         return made
+
+    def _looked_up(self, line: int) -> tuple[int, float]:
+        """Have a line and those behind it at hand; they are asked for in the order of the file."""
+        begin = int(np.searchsorted(self.lines, line))
+        last = self.lines[begin : begin + AT_HAND][-1:]
+        # Of several on one line it is the last that counts.
+        near = slice(begin, int(np.searchsorted(self.lines, last, side="right").sum()))
+        rows = zip(self.row[near].tolist(), self.length[near].tolist(), strict=True)
+        self._near = dict(zip(self.lines[near].tolist(), rows, strict=True))
+        return self._near[line]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

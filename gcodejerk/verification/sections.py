@@ -23,6 +23,7 @@ from gcodejerk.nc import Program, Rapids
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.spread import Spread
 from gcodejerk.verification.bytes.alignment import Alignment, Progress
+from gcodejerk.verification.bytes.proven import Key
 from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.physics.aligned import Reported
@@ -100,7 +101,7 @@ class Judge:
     program: Program
     machine: Machine
     alike: Alike | None = None
-    known: dict[bytes, bytes] = field(default_factory=dict)
+    known: dict[Key, bytes] = field(default_factory=dict)
     size: int = 0
 
     def __call__(self, section: Section) -> Proof | None:

@@ -108,7 +108,7 @@ def _op(
         if match := _GOTO.fullmatch(rest):
             return _goto(script, unit, match[1], condition, at)
         if match := _THEN.fullmatch(rest):
-            then = replace(line, block=parse_line(match[1], dialect))
+            then = line._replace(block=parse_line(match[1], dialect))
             if then.block.problem is None and then.block.assigns and not then.block.words:
                 return Op("set", condition, at + 1, at + 1, line=then)
     if name.name in ("WHILE", "DO") and not block.block_delete:

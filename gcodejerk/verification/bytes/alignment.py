@@ -20,7 +20,7 @@ from gcodejerk.verification.bytes.aligned_form import AlignedReader
 from gcodejerk.verification.bytes.allowed import decimals_of, line_limit
 from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.bytes.guarded_form import GuardedReader
-from gcodejerk.verification.bytes.proven import Proven, Reported
+from gcodejerk.verification.bytes.proven import Key, Proven, Reported
 from gcodejerk.verification.bytes.recognised import Recognised
 from gcodejerk.verification.bytes.source import Window, skip_common
 from gcodejerk.verification.bytes.states import States
@@ -73,7 +73,7 @@ class Alignment:
             held_to = (reported or {}) if self.aligned else {}
             self.proven = Proven(processed, program.rapids, states, held_to)
         self.progress: Progress | None = None
-        self._key = b""
+        self._key: Key = b"", b"", False, None, b""
         self._stamp_at: int | None = program.insert_at
         self._stamp_line: int | None = None
 

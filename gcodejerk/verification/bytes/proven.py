@@ -6,12 +6,11 @@ profile that was reported. Where all of that is as it was with one in which noth
 nothing is wrong with it here.
 
 Rule: nothing is learned before it was judged, and nothing any more once anything was complained of.
-The text is compared with that of the file; only the rest is a hash.
+All of that is compared as it is, and so is the text with that of the file.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 
 import numpy as np
@@ -22,8 +21,12 @@ from gcodejerk.verification.bytes.source import Window
 from gcodejerk.verification.bytes.states import States
 
 Reported = Mapping[int, NDArray[np.float64]]
+Key = tuple[bytes, bytes, bool, bytes | None, bytes]
+"""Columns but for the places, places, whether a stream stands in front, profile, and block."""
 MOST_BYTES = 1 << 24
-"""Text that is remembered."""
+"""Text that is remembered, with its keys."""
+KEY_BYTES = 1 << 10
+"""What a key and its places take, about."""
 
 
 class Proven:
@@ -45,12 +48,12 @@ class Proven:
         """
         self.window, self.states, self.reported = window, states, reported
         self.line = rapids.line
-        self.known: dict[bytes, bytes] = {}
+        self.known: dict[Key, bytes] = {}
         self.size = 0
-        self.open: list[tuple[bytes, bytes]] = []
+        self.open: list[tuple[Key, bytes]] = []
         """Read, and not judged yet."""
 
-    def key(self, i: int, block: bytes, follows: bool) -> bytes:
+    def key(self, i: int, block: bytes, follows: bool) -> Key:
         """What the judgement of a replacement depends on, but for its own text.
 
         Parameters
@@ -62,20 +65,12 @@ class Proven:
         follows : bool
             Whether a stream stands right in front of it.
         """
-        state = self.states.state(i)
-        key = hashlib.blake2b(state, digest_size=16)
-        key.update(self.states.place(i))
-        key.update(b"follows" if follows else b"alone")
-        if self.reported:
-            profile = self.reported.get(int(self.line[i]))
-            if profile is not None:
-                key.update(b"%d " % profile.size)
-                key.update(profile.tobytes())
-        # The block at the end: all in front of it has a length that can be told.
-        key.update(block)
-        return key.digest()
+        profile = self.reported.get(int(self.line[i])) if self.reported else None
+        # As many numbers in a row as any other: the bytes say how many rows there are.
+        said = None if profile is None else profile.tobytes()
+        return self.states.state(i), self.states.place(i), follows, said, block
 
-    def passes(self, key: bytes) -> bool:
+    def passes(self, key: Key) -> bool:
         """Pass a replacement that was proven; whether one stands here."""
         text = self.known.get(key)
         if text is None:
@@ -87,17 +82,17 @@ class Proven:
         window.skip(len(text))
         return True
 
-    def read(self, key: bytes, text: bytes) -> None:
+    def read(self, key: Key, text: bytes) -> None:
         """Note a replacement that was read, and is still to be judged."""
         self.open.append((key, text))
 
     def judged(self, without_fault: bool) -> None:
         """All that were read have been judged."""
         for key, text in self.open if without_fault else ():
-            if self.size + len(text) > MOST_BYTES:
+            if self.size + len(text) + KEY_BYTES > MOST_BYTES:
                 self.known.clear()
                 self.size = 0
             if key not in self.known:
                 self.known[key] = text
-                self.size += len(text)
+                self.size += len(text) + KEY_BYTES
         self.open.clear()

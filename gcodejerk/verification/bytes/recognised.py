@@ -16,6 +16,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import lru_cache
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids
@@ -31,7 +32,8 @@ AHEAD = 1 << 15
 """Text in which the end of a stream is looked for. [bytes]"""
 _BLOCK = re.compile(rb"(?:N[0-9]{1,9} ?)?(?:G0?0 ?)?((?:[XYZABCUVW]-?[0-9]{0,9}\.?[0-9]{0,12} ?)+)")
 _AXIS = re.compile(rb"([XYZABCUVW])(-?(?:[0-9]{1,9}\.?[0-9]{0,12}|\.[0-9]{1,12}))(?= |[A-Z]|$)")
-_NUMBERS = re.compile(rb"[-0-9.]+")
+_NUMBERS = b"-.0123456789"
+"""What stands behind each letter of a plain block, and nowhere else."""
 _WORD = re.compile(rb"(?<=[NGXYZABCUVW0-9.])(?=[A-Z])| +")
 _LEAD = re.compile(
     rb"(G[01]) ([XYZABCUVW])(-?[0-9]{1,9}\.?[0-9]{0,12})(?: (F)([0-9]{1,9}\.[0-9]{1,12}))?"
@@ -66,20 +68,27 @@ class Plain:
         match = _BLOCK.fullmatch(text)
         if match is None:
             return None
-        axes = _AXIS.findall(match[1])
-        letters = [letter for letter, _ in axes]
-        if len(set(letters)) < len(letters) or len(b"".join(map(b"".join, axes))) != len(
-            match[1].replace(b" ", b"")
-        ):
+        words = match[1]
+        axes = _AXIS.findall(words)
+        blanks = words.count(b" ")
+        if len({letter for letter, _ in axes}) < len(axes):
+            return None
+        if len(axes) + sum(len(number) for _, number in axes) + blanks != len(words):
             return None
         head = text[: match.start(1)]
         return cls(
-            _NUMBERS.sub(b"#", text) + bytes(b"." in number for _, number in axes),
-            head + _AXIS.sub(b"", match[1]),
+            text.translate(None, _NUMBERS) + bytes(b"." in number for _, number in axes),
+            head + b" " * blanks,
             tuple(axes),
-            b" ".join([*_WORD.sub(b" ", head).split(), *(a + number for a, number in axes)]),
+            b" ".join([*_words(head), *(letter + number for letter, number in axes)]),
             text,
         )
+
+
+@lru_cache(maxsize=256)
+def _words(head: bytes) -> list[bytes]:
+    """The words in front of the axes, as a comment has them."""
+    return _WORD.sub(b" ", head).split()
 
 
 @dataclass(frozen=True, slots=True)

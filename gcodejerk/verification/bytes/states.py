@@ -7,6 +7,7 @@ Columns that are added to `Rapids` are in the first without being named here.
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,28 +27,35 @@ class States:
     def __init__(self, rapids: Rapids) -> None:
         self.rapids = rapids
         self._begin = -AT_ONCE
-        self._states = self._places = memoryview(b"")
-        self._wide = self._far = 0
+        self._states: list[bytes] = []
+        self._places: list[bytes] = []
 
     def state(self, i: int) -> bytes:
         """All that the columns say of a rapid but for its places."""
-        k = self._row(i)
-        return bytes(self._states[k * self._wide : (k + 1) * self._wide])
+        row = self._row(i)
+        return self._states[row]
 
     def place(self, i: int) -> bytes:
         """Where the axes begin and end that its block names, or that move, and in which frame."""
-        k = self._row(i)
-        return bytes(self._places[k * self._far : (k + 1) * self._far])
+        row = self._row(i)
+        return self._places[row]
 
     def _row(self, i: int) -> int:
         """Have the bytes of a rapid; which of those that are at hand it is."""
         if not self._begin <= i < self._begin + AT_ONCE:
             self._begin = i - i % AT_ONCE
             part = slice(self._begin, self._begin + AT_ONCE)
-            states, places = _states(self.rapids, part), _places(self.rapids, part)
-            self._wide, self._far = states.shape[1], places.shape[1] * places.itemsize
-            self._states, self._places = (memoryview(m.tobytes()) for m in (states, places))
+            # Most rapids of a program say the same: that is kept once.
+            told: dict[bytes, bytes] = {}
+            self._states = [told.setdefault(row, row) for row in _rows(_states(self.rapids, part))]
+            self._places = _rows(_places(self.rapids, part))
         return i - self._begin
+
+
+def _rows(values: NDArray[Any]) -> list[bytes]:
+    """The bytes of each row."""
+    data, wide = values.tobytes(), values.shape[1] * values.itemsize
+    return [data[at : at + wide] for at in range(0, len(data), wide)]
 
 
 def _states(rapids: Rapids, part: slice) -> NDArray[np.uint8]:
