@@ -10,6 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Number = float | NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +32,21 @@ class RapidFeed:
         """As the settings of an output say it."""
         return f"rapid-feed {self.feed!r} {self.clearance!r}"
 
-    def covers(self, feed: float, start: float, end: float, unit: float) -> bool:
-        """Whether a straight feed move is one of them.
+    def covers(self, feed: Number, start: Number, end: Number, unit: float) -> Any:
+        """Whether straight feed moves are some of them.
 
         Parameters
         ----------
-        feed : float
+        feed : float or ndarray
             F in force, in feed per minute. [program's unit/min]
-        start, end : float
-            Z in front of it and behind it; NaN where unknown. [mm]
+        start, end : float or ndarray
+            Z in front of each and behind it; NaN where unknown. [mm]
         unit : float
             Millimetres of the program's unit. [mm]
+
+        Returns
+        -------
+        bool or ndarray of bool
 
         Examples
         --------
@@ -46,7 +56,7 @@ class RapidFeed:
         False
         """
         least = self.clearance * unit - _NEAR
-        return feed == self.feed and start >= least and end >= least
+        return (feed == self.feed) & (start >= least) & (end >= least)
 
 
 _NEAR = 1e-6

@@ -164,12 +164,11 @@ class Reader:
     def can_run(self) -> bool:
         """Whether the lines that follow may be taken as a run."""
         alone = self._plain and not self.flow.inside and not self._structure
-        quick = self.dialect.quick and self.runner.executor.rapid_feed is None
         if self._unfed:
-            able = self.runner.executor.told_unfed and can_run_unfed(self.state)
+            able = self.runner.executor.told_unfed and can_run_unfed(self.state, self.dialect)
         else:
-            able = can_run(self.state)
-        return quick and self.started and alone and able
+            able = can_run(self.state, self.dialect)
+        return self.dialect.quick and self.started and alone and able
 
     @property
     def _unfed(self) -> bool:
@@ -179,8 +178,11 @@ class Reader:
     def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
         """Take plain lines of a chunk as arrays; the first that was not taken."""
         what = (self.state, self.log, lines, first, last, place, self.dialect)
-        stays = self.runner.executor.stays
-        stop, certain = run_unfed(*what, stays) if self._unfed else run_plain(*what)
+        executor = self.runner.executor
+        if self._unfed:
+            stop, certain = run_unfed(*what, executor.stays)
+        else:
+            stop, certain = run_plain(*what, executor.rapid_feed)
         self.blocks += int(np.count_nonzero(lines.letters[first:stop]))
         if certain is not None:
             self.runner.ask(certain)

@@ -1,11 +1,15 @@
 """The quick way and the careful way through a program give the same columns, on every real file."""
 
+import io
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc import DIALECTS, Start
+from gcodejerk.nc import DIALECTS, Start, find_dialect, read_program
+from gcodejerk.nc.reader import Reader
+from gcodejerk.start import RapidFeed
 from gcodejerk.testing.programs import differences
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
@@ -127,15 +131,88 @@ ODD_WORDS = (
 )
 
 
-@pytest.mark.parametrize("dialect", ["linuxcnc", "grbl", "haas", "fanuc-lathe-b"])
-@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
-def test_both_ways_agree_on_every_odd_word_in_a_run(dialect, end):
-    start = Start(diameter=dialect.startswith("fanuc-lathe"))
-    for word in (word.encode() for word in ODD_WORDS):
-        lines = [b"G21 G90 F100" if dialect != "fanuc-lathe-b" else b"G21 G90 G94 F100", *PLAIN]
-        data = b"".join(line.rstrip() + end for line in [*lines, word, *PLAIN, word])
-        assert differences(data, start, dialect) == [], word
-        assert differences(data[: -len(end)], start, dialect) == [], word
+HEADS = {
+    "siemens": ["G710 G90 G94 G17 G40 G64", "F100"],
+    "fagor": ["G71 G90 G94 G17 G40", "F100"],
+    "heidenhain-iso": ["G71 G90 G17 G40", "F100"],
+    "marlin": ["G21", "G90", "G1 X1 F100"],
+    "klipper": ["G90", "G1 X1 F100"],
+    "duet": ["G21", "G90", "G94", "G17", "G1 X1 F100"],
+    "fanuc-lathe-a": ["G21 G99 G40 F100."],
+    "fanuc-lathe-b": ["G21 G95 G90 G40 F100."],
+}
+"""What a program begins with, so that runs are taken behind it; most: G21 G90 G94 G17 G40."""
+ODD_LINES = (
+    *(*ODD_WORDS, "X1 E.5", "G0 X1 E.5", "G1 X1 F100 E1", "E1", "X1*", "X1 Y2* ", "X1*5", "*"),
+    *(
+        "G0 X5",
+        "G0X5",
+        "G0X10X5",
+        "G00 X5",
+        "G1 x5",
+        "g1 X5",
+        "\tG0 X5",
+        "G0\tX5",
+        "G0 X5\t",
+        " G0 X5",
+    ),
+    *("G1 X5 F300", "G1 Z5 F100", "G1 Z50 F100", "X5 F100", "G0 X5 F300", "S5", "G1 X5 S5", "F300"),
+    *(
+        "G2 X1 Y1 I.5 J.5",
+        "G3 X1. Y1. R5.",
+        "X1 I1",
+        "G1 X1 J1",
+        "Y1;(5",
+        "Y1;;(",
+        "Y1 ; G0 X5",
+        ";G0 X5",
+    ),
+)
+"""Lines that some dialect reads in a way of its own."""
+
+
+def beginning(dialect):
+    """What a program begins with, and a run of lines that move, as the dialect has them."""
+    language = find_dialect(dialect)
+    head = HEADS.get(dialect, ["G21 G90 G94 G17 G40 F100."])
+    axes = "XZ" if language.lathe == "yes" else "XY"
+    code = "" if language.modal_motion else "G0 "
+    plain = [f"{code}{axes[n % 2]}{n}.5 {axes[1 - n % 2]}{n + 1}." for n in range(26)]
+    return [*head, *([] if code else ["G0 X0. Z0."])], plain
+
+
+@pytest.mark.parametrize("dialect", [d for d in DIALECTS if find_dialect(d).quick])
+def test_both_ways_agree_on_every_odd_line_in_a_run(dialect, request):
+    language = find_dialect(dialect)
+    head, plain = beginning(dialect)
+    begins = Start(diameter=language.lathe == "yes", rapid_feed=RapidFeed(100.0, 5.0))
+    # Each dialect has a quarter of the lines, and its neighbours the others.
+    stride = 1 if request.config.getoption("--long") else 4
+    for word in ODD_LINES[list(DIALECTS).index(dialect) % stride :: stride]:
+        lines = [*head, *plain, word, *head, *plain, "G1 Z50. F100.", *plain, word]
+        for end in ("\n", "\r\n"):
+            data = end.join(lines).encode("latin-1")
+            assert differences(data, begins, dialect) == [], word
+            assert differences(data + end.encode(), replace(begins, rapid_feed=None), dialect) == []
+
+
+@pytest.mark.parametrize("dialect", [d for d in DIALECTS if find_dialect(d).quick])
+def test_plain_lines_of_every_dialect_are_taken_as_runs(dialect, monkeypatch):
+    taken = []
+    whole = Reader.read_run
+
+    def read_run(reader, lines, first, last, place):
+        stop = whole(reader, lines, first, last, place)
+        taken.append(stop - first)
+        return stop
+
+    monkeypatch.setattr(Reader, "read_run", read_run)
+    head, plain = beginning(dialect)
+    data = "\n".join([*head, *plain, ""]).encode()
+    start = Start(diameter=find_dialect(dialect).lathe == "yes")
+    rapids = read_program(io.BytesIO(data), dialect=dialect, start=start).rapids
+    assert sum(taken) >= len(plain)
+    assert len(rapids) >= len(plain)
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)

@@ -324,8 +324,10 @@ class Dialect:
     """G code that lets the motion of its own block alone end in a standstill."""
     stops_after_rapid: bool = False
     """Every G0 ends in a standstill, checked before the next block begins."""
-    quick: bool = False
-    """Plain lines mean what they mean in RS274/NGC, so that they can be read as arrays."""
+    quick: bool = True
+    """Plain lines are made of letters with numbers, so that they can be read as arrays."""
+    extrudes: bool = False
+    """E feeds what is printed with, and moves no axis that a machine file knows."""
     writing: Writing | None = None
     """None where no form of a stream is known."""
     note: str = ""

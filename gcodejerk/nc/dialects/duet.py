@@ -107,6 +107,7 @@ DUET = Dialect(
     paths={640: 64},
     transforms={680: ("rotation", True), 690: ("rotation", False)},
     modal_motion=False,
+    extrudes=True,
     one_command=True,
     feed_lost=True,
     in_turn=_MODES,

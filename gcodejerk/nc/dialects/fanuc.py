@@ -227,7 +227,6 @@ FANUC = Dialect(
         {0, 90, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 930, 940, 950, 960, 970}
         | {980, 990, 800, 150, 500, 501, 690, 131, 670, 220, 230, 51, 80}
     ),
-    quick=True,
     # Whether M3, M5, M8 and the like run with the motion of their block or behind it, the builder
     # chooses; M0, M1, M2, M30 act when the block is done.
     before_m=frozenset(),

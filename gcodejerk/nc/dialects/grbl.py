@@ -124,7 +124,6 @@ GRBL = Dialect(
     incremental_set=True,
     redrawn=frozenset({382, 383, 384, 385}),
     harmless=frozenset({0, 40, 170, 180, 190, 200, 210, 400, 610, 900, 910, 911, 930, 940}),
-    quick=True,
     # gcode.c, step 4 of gc_execute_line: spindle, coolant, overrides, motion, then program flow.
     before_m=frozenset({3, 4, 5, 7, 8, 9}),
     after_m=frozenset({0, 1, 2, 30}),

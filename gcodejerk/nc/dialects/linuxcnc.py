@@ -164,7 +164,6 @@ LINUXCNC = Dialect(
     # "Order of execution" of the manual: spindle, coolant and overrides, then motion, then stops.
     before_m=frozenset({3, 4, 5, 7, 8, 9, 48, 49, 50, 51, 52, 53}),
     after_m=frozenset({0, 1, 2, 30, 60}),
-    quick=True,
     # Numbers are doubles all the way to the motion (emcmotion's EmcPose).
     writing=Writing((b"(", b")"), b"G4 P0", doubles=True),
 )

@@ -113,6 +113,5 @@ MACH = Dialect(
     # NIST RS274/NGC, table of the order of execution, which Mach's manual repeats.
     before_m=frozenset({3, 4, 5, 7, 8, 9, 48, 49}),
     after_m=frozenset({0, 1, 2, 30}),
-    quick=True,
     writing=Writing((b"(", b")"), b"G4 P0"),
 )

@@ -80,6 +80,7 @@ MARLIN = Dialect(
     feed_modes={},
     paths={640: 64},
     modal_motion=False,
+    extrudes=True,
     one_command=True,
     dark_rapids=True,
     incremental_set=True,

@@ -95,7 +95,6 @@ def _read_in_part(name: str, title: str, *sources: str, apart: str = "") -> Dial
         apart=frozenset(apart),
         harmless=RS274.harmless - {930},
         before_m=frozenset(),
-        quick=False,
         note=f"{own}: it is read as what LinuxCNC, grbl and Mach read alike, unverified, and "
         "nothing is rewritten behind a code that is not among that",
     )

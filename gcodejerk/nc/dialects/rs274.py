@@ -101,6 +101,5 @@ RS274 = Dialect(
     harmless=frozenset({0, 40, 170, 180, 190, 200, 210, 400, 900, 910, 911, 930, 940}),
     before_m=frozenset({3, 4, 5, 7, 8, 9}),
     after_m=frozenset({0, 1, 2, 30}),
-    quick=True,
     writing=Writing((b"(", b")"), b"G4 P0", line_limit=79, digits=8),
 )

@@ -404,7 +404,7 @@ class Phases(Effects):
         if wanted is None or state.unit is None or state.feed_mode != 94:
             return False
         z = AXES.index("Z")
-        return wanted.covers(state.feed, step.start[z], state.position[z], state.unit)
+        return bool(wanted.covers(state.feed, step.start[z], state.position[z], state.unit))
 
     def _select_motion(self, codes: Codes) -> None:
         """Put the motion code of the block in force, if it states one."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +20,21 @@ from gcodejerk.nc.dialects.gcodes import G40, G90, G91
 from gcodejerk.nc.interpreter.arcs import doubtful
 from gcodejerk.nc.interpreter.eligibility import barred
 from gcodejerk.nc.interpreter.limits import beyond_path
-from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines, Words, read_words
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
+from gcodejerk.start import RapidFeed
+from gcodejerk.units import SECONDS_PER_MINUTE
 
 AXIS_BITS = (1 << len(AXES)) - 1
 CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
 _ARC_WORDS = CENTRES | BIT["R"]
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
+_MOTIONS = (0, 10, 20, 30)
+_BESIDE = "FSE"
+"""Letters beside a straight move that some dialects have no use for."""
 
 
 def _bits(axes: Iterable[str]) -> np.uint16:
@@ -37,10 +42,10 @@ def _bits(axes: Iterable[str]) -> np.uint16:
     return np.uint16(sum(BIT[axis] for axis in axes if axis in AXES))
 
 
-def can_run(state: State) -> bool:
+def can_run(state: State, dialect: Dialect) -> bool:
     """Whether the state is one that runs are computed in."""
     return (
-        state.motion in (0, 10, 20, 30)
+        (state.motion in _MOTIONS or not dialect.modal_motion)
         and state.compensation == G40
         and state.distance is not None
         and state.diameter is not None
@@ -51,6 +56,7 @@ def can_run(state: State) -> bool:
         and state.cycle is None
         and state.bars.get(LEFT_OVER, False) is False
         and not any(on is not False for on in state.transforms.values())
+        and not any(on is not False for on in state.shifted.values())
     )
 
 
@@ -64,7 +70,7 @@ def _spread(
 
 
 def sure_lines(
-    letters: NDArray[np.uint32], motion: NDArray[np.uint8], state: State
+    letters: NDArray[np.uint32], motion: NDArray[np.uint8], state: State, dialect: Dialect
 ) -> NDArray[np.bool_]:
     """Which lines are complete beyond doubt."""
     arc_words = letters & _ARC_WORDS
@@ -86,6 +92,14 @@ def sure_lines(
         sure = sure & (letters & np.uint32(counting) == 0)  # where they end, the way they go says
     if state.feed_mode == 93:
         sure = sure & ((motion == 0) | (letters & AXIS_BITS == 0) | (letters & BIT["F"] != 0))
+    if not dialect.modal_motion:
+        sure = sure & ((letters & BIT["G"] != 0) | (letters & ~np.uint32(BIT["N"]) == 0))
+    for letter in _BESIDE:
+        if (users := dialect.uses.get(letter)) is not None:
+            idle = np.array([f"G{code // 10}" not in users for code in _MOTIONS])
+            sure = sure & ((letters & BIT[letter] == 0) | ~idle.take(motion))
+    if not dialect.redrawn.isdisjoint(_MOTIONS):
+        sure = sure & ~np.array([code in dialect.redrawn for code in _MOTIONS]).take(motion)
     return sure
 
 
@@ -97,6 +111,7 @@ def run_plain(
     last: int,
     place: tuple[int, int],
     dialect: Dialect,
+    rapid_feed: RapidFeed | None,
 ) -> tuple[int, int | None]:
     """Execute the plain lines first:last of a chunk, or as many of them as are sure.
 
@@ -114,6 +129,8 @@ def run_plain(
         Number of the chunk's first line and offset of its first byte, in the file.
     dialect : Dialect
         Of the program.
+    rapid_feed : RapidFeed, optional
+        Feed moves that count as rapids.
 
     Returns
     -------
@@ -122,11 +139,10 @@ def run_plain(
     certain : int or None
         Number, in the file, of the first certain rapid.
     """
-    assert state.motion is not None
     letters = lines.letters[first:last]
     codes = lines.words("G", first, last)
-    motion = _spread(codes.line, codes.codes(), state.motion // 10, last - first)
-    sure = sure_lines(letters, motion, state)
+    motion = _spread(codes.line, codes.codes(), (state.motion or 0) // 10, last - first)
+    sure = sure_lines(letters, motion, state, dialect)
     if dialect.arcs_refused and state.unit is not None:
         arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
         sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
@@ -141,12 +157,19 @@ def run_plain(
 
     named = (letters & AXIS_BITS).astype(np.uint16)
     moves = (named != 0) | ((motion >= 2) & (letters & CENTRES != 0))
-    events = np.where(moves & (motion != 0), np.uint8(USES_FEED), np.uint8(0))
-    rapid = np.flatnonzero((named != 0) & (motion == 0))
-    feeds = _History.of("F", lines, letters, first, rapid)
+    events = np.where(
+        moves & ((motion != 0) | dialect.feed_on_rapids), np.uint8(USES_FEED), np.uint8(0)
+    )
+    fast = (named != 0) & (motion == 0)
+    run = _Run(state, lines, letters, first)
+    fed = run.counted((named != 0) & (motion == 1), rapid_feed)
+    fast[fed] = True
+    rapid = np.flatnonzero(fast)
+    feeds = run.history("F", rapid)
     events[feeds.words.line] = GIVES_FEED
-    start, target, feed = _told(state, feeds, lines, letters, first, rapid)
+    start, target, feed = run.told(feeds, rapid)
     row = rapid + first
+    said = letters.take(rapid)
     columns: dict[str, Any] = asdict(ModeColumns.of(state))
     columns.update(
         line=row + place[0],
@@ -156,16 +179,29 @@ def run_plain(
         start=start,
         target=target,
         words=named.take(rapid),
-        feed=feed,
+        feed=NAN if dialect.feed_lost else feed,
         # A whole number that matters would have made its line odd.
         feed_whole=feeds.behind == 0 if state.feed_whole else False,
-        reason=reasons(state, named.take(rapid), start, target, dialect),
+        reason=reasons(state, said, start, target, dialect),
+        fed=np.isin(rapid, fed, assume_unique=True),
     )
+    if dialect.feed_on_rapids or len(fed):
+        speed = np.broadcast_to(feed * (state.unit or NAN) / SECONDS_PER_MINUTE, rapid.shape)
+        runs_at_f = columns["fed"] | dialect.feed_on_rapids
+        columns["speed"] = np.where(runs_at_f, speed, NAN)
+        unknown = runs_at_f & ~(speed > 0.0) & (columns["reason"] == CERTAIN)
+        columns["reason"][unknown] = _INDEX[Reason.FEED_UNKNOWN]
     # What stands behind the end of the program uses no F.
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
     if dialect.dark_rapids and state.spindle != 5 and not state.ended:
-        log.habits |= bool(((events == USES_FEED) & (letters & BIT["S"] != 0)).any())
-    state.motion = int(motion[-1]) * 10
+        feeding = (named != 0) & (motion != 0)
+        log.habits |= bool((feeding & (letters & BIT["S"] != 0)).any())
+    said_last = np.flatnonzero(letters)[-1:]
+    if dialect.modal_motion:
+        state.motion = int(motion[-1]) * 10
+    elif len(said_last):
+        states_one = letters[said_last[0]] & BIT["G"] != 0
+        state.motion = int(motion[said_last[0]]) * 10 if states_one else None
     state.feed_whole = bool(state.feed_whole) and not len(feeds.words.line)
     certain = np.flatnonzero(columns["reason"] == CERTAIN)
     return last, int(row[certain[0]]) + place[0] if len(certain) else None
@@ -173,29 +209,11 @@ def run_plain(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _History:
-    """The words of one letter in a run, and how many stand in front of rapids, and behind."""
+    """The words of one letter in a run, and how many stand in front of some lines, and behind."""
 
     words: Words
     before: NDArray[np.intp]
     behind: NDArray[np.intp]
-
-    @classmethod
-    def of(
-        cls,
-        letter: str,
-        lines: Lines,
-        letters: NDArray[np.uint32],
-        first: int,
-        rapid: NDArray[np.intp],
-    ) -> Self:
-        """Of the lines from `first` on that have these letters, and the rapids among them."""
-        words = lines.words(letter, first, first + len(letters))
-        if not len(words.line):
-            none = np.zeros(len(rapid), dtype=np.intp)
-            return cls(words, none, none)
-        stands = letters & BIT[letter] != 0
-        behind = np.cumsum(stands, dtype=np.intp).take(rapid)
-        return cls(words, behind - stands.take(rapid), behind)
 
     def which(self, summed: bool) -> NDArray[np.intp]:
         """Words whose numbers matter: all where they are summed, else the last ones somewhere."""
@@ -213,35 +231,71 @@ class _History:
         return np.add.accumulate(held) if summed else held
 
 
-def _told(
-    state: State,
-    feeds: _History,
-    lines: Lines,
-    letters: NDArray[np.uint32],
-    first: int,
-    rapid: NDArray[np.intp],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
-    """Where each rapid starts and ends, and its F; the state is moved to the run's end."""
-    start = np.empty((len(rapid), len(AXES)))
-    start[:] = state.position
-    target, feed = start.copy(), state.feed
-    axes = _axes_of(int(np.bitwise_or.reduce(letters)))
-    summed = state.distance == G91
-    histories = [_History.of(AXES[axis], lines, letters, first, rapid) for axis in axes]
-    which = [history.which(summed) for history in histories]
-    given = feeds.which(summed=False)
-    *numbers, fed = read_words(
-        [*zip((history.words for history in histories), which, strict=True), (feeds.words, given)]
-    )
-    for axis, history, index, values in zip(axes, histories, which, numbers, strict=True):
-        held = history.held(state.position[axis], index, values * state.scale(axis), summed)
-        start[:, axis], target[:, axis] = held.take(history.before), held.take(history.behind)
-        state.position[axis] = float(held[-1])
-    if not len(given):
-        return start, target, feed
-    held = feeds.held(feed, given, fed, summed=False)
-    state.feed = float(held[-1])
-    return start, target, held.take(feeds.behind)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Run:
+    """A run of plain lines, and what is in force in front of it."""
+
+    state: State
+    lines: Lines
+    letters: NDArray[np.uint32]
+    """Of the lines of the run."""
+    first: int
+    """The first of these in the chunk."""
+
+    def history(self, letter: str, rows: NDArray[np.intp]) -> _History:
+        """The words of a letter, as some lines see them."""
+        words = self.lines.words(letter, self.first, self.first + len(self.letters))
+        if not len(words.line):
+            none = np.zeros(len(rows), dtype=np.intp)
+            return _History(words, none, none)
+        stands = self.letters & BIT[letter] != 0
+        behind = np.cumsum(stands, dtype=np.intp).take(rows)
+        return _History(words, behind - stands.take(rows), behind)
+
+    def counted(self, feeding: NDArray[np.bool_], rapid_feed: RapidFeed | None) -> NDArray[np.intp]:
+        """Which of the feed moves count as rapids; the state stays where it is."""
+        state = self.state
+        rows = np.flatnonzero(feeding)
+        if rapid_feed is None or state.unit is None or state.feed_mode != 94:
+            return rows[:0]
+        feeds, summed = self.history("F", rows), False
+        which = feeds.which(summed)
+        (values,) = read_words([(feeds.words, which)])
+        feed = feeds.held(state.feed, which, values, summed).take(feeds.behind)
+        rows = rows[feed == rapid_feed.feed]
+        z, summed = AXES.index("Z"), state.distance == G91
+        heights = self.history("Z", rows)
+        which = heights.which(summed)
+        (values,) = read_words([(heights.words, which)])
+        held = heights.held(state.position[z], which, values * state.scale(z), summed)
+        begin, end = held.take(heights.before), held.take(heights.behind)
+        counted: NDArray[np.intp] = rows[rapid_feed.covers(rapid_feed.feed, begin, end, state.unit)]
+        return counted
+
+    def told(
+        self, feeds: _History, rapid: NDArray[np.intp]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
+        """Where each rapid starts and ends, and its F; the state is moved to the run's end."""
+        state = self.state
+        start = np.empty((len(rapid), len(AXES)))
+        start[:] = state.position
+        target, feed = start.copy(), state.feed
+        axes = _axes_of(int(np.bitwise_or.reduce(self.letters)))
+        summed = state.distance == G91
+        histories = [self.history(AXES[axis], rapid) for axis in axes]
+        which = [history.which(summed) for history in histories]
+        given = feeds.which(summed=False)
+        words = (history.words for history in histories)
+        *numbers, fed = read_words([*zip(words, which, strict=True), (feeds.words, given)])
+        for axis, history, index, values in zip(axes, histories, which, numbers, strict=True):
+            held = history.held(state.position[axis], index, values * state.scale(axis), summed)
+            start[:, axis], target[:, axis] = held.take(history.before), held.take(history.behind)
+            state.position[axis] = float(held[-1])
+        if not len(given):
+            return start, target, feed
+        held = feeds.held(feed, given, fed, summed=False)
+        state.feed = float(held[-1])
+        return start, target, held.take(feeds.behind)
 
 
 def _axes_of(bits: int) -> list[int]:
@@ -251,12 +305,13 @@ def _axes_of(bits: int) -> list[int]:
 
 def reasons(
     state: State,
-    named: NDArray[np.uint16],
+    letters: NDArray[np.uint32],
     start: NDArray[np.float64],
     target: NDArray[np.float64],
     dialect: Dialect,
 ) -> NDArray[np.uint8]:
-    """Why each rapid has to be left alone, as `execute` would decide."""
+    """Why each rapid has to be left alone, as `execute` would decide, by what its line names."""
+    named = (letters & AXIS_BITS).astype(np.uint16)
     if state.ended:
         return np.full(len(named), _INDEX[Reason.AFTER_END], dtype=np.uint8)
     if state.transformed:
@@ -278,6 +333,12 @@ def reasons(
     if not dialect.feed_of_mixed:
         linear = moving & _bits(LINEAR)
         reason[(linear != 0) & (moving != linear)] = _INDEX[Reason.MIXED_AXES]
+    if dialect.extrudes and not dialect.uses:
+        reason[letters & BIT["E"] != 0] = _INDEX[Reason.OTHER_WORDS]
+    if dialect.path_has_to_be_stated and state.path is None:
+        reason[:] = _INDEX[Reason.PATH_UNKNOWN]
+    if dialect.lengths_only and state.feed_unit != state.unit:
+        reason[:] = _INDEX[Reason.FEED_UNIT]
     if state.path_limits:
         is_named = (named[:, np.newaxis] >> np.arange(len(AXES), dtype=np.uint16)) & 1 == 1
         limited = beyond_path(state, np.where(is_named, target - start, 0.0))

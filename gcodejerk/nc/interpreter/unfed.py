@@ -29,17 +29,17 @@ from gcodejerk.reasons import CERTAIN
 _NOBODY_KNOWS = -1
 
 
-def can_run_unfed(state: State) -> bool:
+def can_run_unfed(state: State, dialect: Dialect) -> bool:
     """Whether the state is one that such runs are computed in."""
-    return state.distance == G90 and (can_run(state) or _without_motion(state))
+    return state.distance == G90 and (can_run(state, dialect) or _without_motion(state, dialect))
 
 
-def _without_motion(state: State) -> bool:
+def _without_motion(state: State, dialect: Dialect) -> bool:
     """Whether the motion that is in force is all that is missing."""
     if state.motion is not None:
         return False
     state.motion = 0
-    able = can_run(state)
+    able = can_run(state, dialect)
     state.motion = None
     return able
 
@@ -85,7 +85,7 @@ def run_unfed(
     held = np.concatenate([[before], after]).astype(np.int64)
     motion = held[np.searchsorted(at, np.arange(len(letters)), side="right")]
     does = np.where(stated >= 0, stated, motion)
-    sure = sure_lines(letters, np.maximum(does, 0).astype(np.uint8), state)
+    sure = sure_lines(letters, np.maximum(does, 0).astype(np.uint8), state, dialect)
     sure &= letters & BIT["F"] == 0
     stop = len(sure) if sure.all() else int(np.argmin(sure))
     if stop == 0:
@@ -107,12 +107,12 @@ def run_unfed(
         target=target,
         words=named,
         feed=state.feed,
-        reason=reasons(state, named, start, target, dialect),
+        reason=reasons(state, letters[rapid], start, target, dialect),
     )
     events = np.where(moves & (does != 0) | doubted, np.uint8(USES_FEED), np.uint8(0))
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
     if dialect.dark_rapids and state.spindle != 5 and not state.ended:
-        log.habits |= bool(((events == USES_FEED) & (letters & BIT["S"] != 0)).any())
+        log.habits |= bool((moves & (does >= 1) & (letters & BIT["S"] != 0)).any())
     state.motion = None if motion[stop - 1] < 0 else int(motion[stop - 1]) * 10
     certain = np.flatnonzero(columns["reason"] == CERTAIN)
     return first + stop, int(row[certain[0]]) + place[0] if len(certain) else None

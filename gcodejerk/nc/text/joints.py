@@ -9,40 +9,47 @@ Rule: what stands within a plain comment is `COMMENT`, whatever it is.
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.nc.dialects.spelling import Text
 from gcodejerk.nc.text.words import COMMENT, DOT, PLAIN_LETTERS, SIGN
 
-BLANK, END, CR, OPEN, CLOSE, SEMICOLON, OTHER = range(SIGN + 1, SIGN + 8)
+BLANK, END, CR, OPEN, CLOSE, SEMICOLON, STAR, OTHER = range(SIGN + 1, SIGN + 9)
 LETTERS = 64
 """Classes from here on are letters and equal their upper-case code."""
 
 _ACTIVE = re.compile(rb"[(;][ \t]*py", re.IGNORECASE)
+_REMARKS = tuple(bytes([kind]) for kind in (OPEN, CLOSE, SEMICOLON))
 _MAY_BE_ACTIVE = np.array([byte in b"pP \t" for byte in range(256)])
 """Whether such a byte behind its opening may begin one."""
 
 
-def _classes() -> bytes:
+@lru_cache(maxsize=32)
+def _classes(rules: Text) -> bytes:
     """Make the table that translates a byte to its class."""
     table = bytearray([OTHER] * 256)
     table[ord(".")] = DOT
     table[ord("+")] = table[ord("-")] = SIGN
-    table[ord(" ")] = table[ord("\t")] = BLANK
+    table[ord(" ")] = BLANK
+    table[ord("\t")] = OTHER if rules.tight else BLANK
     table[ord("\n")], table[ord("\r")] = END, CR
-    table[ord("(")], table[ord(")")], table[ord(";")] = OPEN, CLOSE, SEMICOLON
+    if rules.parentheses in ("comment", "open comment"):
+        table[ord("(")], table[ord(")")] = OPEN, CLOSE
+    if rules.semicolon == "comment":
+        table[ord(";")] = SEMICOLON
+    if rules.end:
+        table[ord(rules.end)] = STAR
     for letter in PLAIN_LETTERS:
-        table[ord(letter)] = table[ord(letter.lower())] = ord(letter)
+        table[ord(letter)] = ord(letter)
+        table[ord(letter.lower())] = OTHER if rules.capitals else ord(letter)
     return bytes(table)
 
 
-_CLASS = _classes()
-_REMARKS = tuple(bytes([kind]) for kind in (OPEN, CLOSE, SEMICOLON))
-
-
 def find_joints(
-    text: bytes, begin: int, semicolon: bool
+    text: bytes, begin: int, rules: Text
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.bool_]]:
     r"""Find the joints of a text, and what they are.
 
@@ -52,8 +59,8 @@ def find_joints(
         Begins and ends with a line feed.
     begin : int
         Where the line feed in front of the first line stands.
-    semicolon : bool
-        A ``;`` begins a comment.
+    rules : Text
+        Of the dialect: what begins a comment, and what is a byte of its own.
 
     Returns
     -------
@@ -66,32 +73,31 @@ def find_joints(
 
     Examples
     --------
-    >>> joint, kind, wrong = find_joints(b"\nX5(1 a)\nY2.(\n", 0, semicolon=True)
+    >>> joint, kind, wrong = find_joints(b"\nX5(1 a)\nY2.(\n", 0, Text())
     >>> joint.tolist(), (kind == COMMENT).nonzero()[0].tolist(), wrong.nonzero()[0].tolist()
     ([0, 1, 3, 5, 6, 7, 8, 9, 11, 12, 13], [2, 3, 4], [9])
     """
     source = np.frombuffer(text, dtype=np.uint8)[begin:]
     # '0' to '9' alone are below 10 when 48 is taken from a byte, modulo 256
     joint = np.flatnonzero(source - np.uint8(ord("0")) > 9)
-    classes = source.take(joint).tobytes().translate(_CLASS)
+    classes = source.take(joint).tobytes().translate(_classes(rules))
     kind = np.frombuffer(classes, dtype=np.uint8)
     joint += begin
     if not any(mark in classes for mark in _REMARKS):
         return joint, kind, np.zeros(len(joint), dtype=np.bool_)
-    return joint, *_comments(text, joint, kind, semicolon)
+    return joint, *_comments(text, joint, kind)
 
 
 def _comments(
-    text: bytes, joint: NDArray[np.int64], kind: NDArray[np.uint8], semicolon: bool
+    text: bytes, joint: NDArray[np.int64], kind: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """The classes with `COMMENT` throughout plain comments; what opens or closes any other."""
-    at = np.flatnonzero((kind >= END) & (kind <= SEMICOLON) & (kind != CR))
+    at = _marks(kind)
     what = kind.take(at)
     following, previous = np.roll(what, -1), np.roll(what, 1)
     is_open, is_semicolon = what == OPEN, what == SEMICOLON
     bad = is_open & (following != CLOSE)
     bad |= (what == CLOSE) & (previous != OPEN)
-    bad |= is_semicolon & ((following != END) | (not semicolon))
     # A comment may run Python: (py,...)
     opens = np.flatnonzero(is_open | is_semicolon)
     source = np.frombuffer(text, dtype=np.uint8)
@@ -109,3 +115,18 @@ def _comments(
     wrong = np.zeros(len(kind), dtype=np.bool_)
     wrong[at[bad]] = True
     return kind, wrong
+
+
+def _marks(kind: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Which joints open or close comments, or end lines; none behind the semicolon of its line."""
+    at = np.flatnonzero((kind >= END) & (kind <= SEMICOLON) & (kind != CR))
+    what = kind.take(at)
+    count = np.cumsum(what == SEMICOLON)
+    if not count[-1]:
+        return at
+    ends = np.flatnonzero(what == END)
+    # So many stand in front of the line that each mark is on.
+    before = np.repeat(np.append(0, count[ends]), np.diff(ends, prepend=-1, append=len(what) - 1))
+    open_ = (what == END) | (count - (what == SEMICOLON) == before)
+    marks: NDArray[np.int64] = at[open_]
+    return marks

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.text.joints import BLANK, CR, END, LETTERS, OPEN, find_joints
+from gcodejerk.nc.text.joints import BLANK, CR, END, LETTERS, OPEN, STAR, find_joints
 from gcodejerk.nc.text.numbers import AROUND, LONGEST, parse_numbers
 from gcodejerk.nc.text.words import BIT, COMMENT, DOT, SIGN, Joints, Lines
 
@@ -52,7 +52,7 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     data : bytes
         Whole lines; the last one may lack its end.
     dialect : Dialect
-        One whose plain lines mean what they mean in RS274/NGC (`Dialect.quick`).
+        One that has plain lines (`Dialect.quick`).
 
     Returns
     -------
@@ -62,7 +62,7 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     complete = data.endswith(b"\n")
     # A line feed stands in front of the first line, and one behind the last.
     text = b"\n" * _PAD + data + (b"" if complete else b"\n") + b"\n" + b"0" * AROUND
-    joint, kind, bad = find_joints(text, _PAD - 1, dialect.text.semicolon == "comment")
+    joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
     joints = Joints(np.frombuffer(text, dtype=np.uint8), joint, kind)
     width = np.diff(joint, append=joint[-1])
     bad |= _misplaced(kind, width > 1)
@@ -85,6 +85,7 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     # Bits add up to their union unless one occurs twice: then the sum has fewer ones than terms.
     careful |= _ONES.take(letters) != weight >> _BITS
     own = set(dialect.letters) - set(dialect.increments) | set("GN")
+    own -= {dialect.text.variables, "" if dialect.extrudes else "E"}
     foreign = sum(bit for name, bit in BIT.items() if name not in own)
     careful |= letters & np.uint32(foreign) != 0
     if careful.any():
@@ -115,7 +116,7 @@ def _misplaced(kind: NDArray[np.uint8], digits: Flags) -> Flags:
     bad: Flags = letter & ~number
     bad |= sign & ~_before(letter & ~digits)
     bad |= dot & ~_before(letter | sign)
-    bad |= (kind >= OPEN) & ~letter
+    bad |= (kind >= OPEN) & ~letter & ~((kind == STAR) & _next((kind == END) | (kind == CR)))
     bad |= (kind >= BLANK) & ~letter & digits
     bad |= (kind == CR) & ~_next(kind == END)
     return bad
@@ -131,8 +132,13 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
     bad |= is_n & ~_before(kind == END)
     codes = np.flatnonzero(is_g)
     first, behind = place.take(codes) + 1, place.take(codes + 1)
-    zeros = (behind - first == 1) | ((behind - first == 2) & (text.take(first) == ord("0")))
+    zeros = behind - first == 1
+    if dialect.text.padded:
+        zeros |= (behind - first == 2) & (text.take(first) == ord("0"))
     bad[codes] |= ~zeros | (text.take(behind - 1) > ord("3"))
+    if dialect.text.hexadecimal:
+        xs = np.flatnonzero(kind == ord("X"))
+        bad[xs] |= text.take(place.take(xs) - 1) == ord("0")
 
     wide = np.flatnonzero(width > _SHORT + 1)
     if len(wide):

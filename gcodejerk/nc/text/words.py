@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.nc.text.numbers import parse_numbers
 
-PLAIN_LETTERS = AXES + "NGFSIJKR"
+PLAIN_LETTERS = AXES + "NGFSIJKRE"
 """Letters that a plain line may hold; letter k has bit k in `Lines.letters`."""
 
 BIT = {letter: 1 << k for k, letter in enumerate(PLAIN_LETTERS)}
