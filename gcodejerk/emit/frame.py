@@ -20,54 +20,121 @@ from gcodejerk.nc.dialects.gcodes import G90
 from gcodejerk.nc.dialects.spelling import Writing
 from gcodejerk.units import MM_PER_INCH
 
+MOST = 1000
+"""Different words around streams that are kept."""
 COMMENT_LENGTH = 69
 """Controllers and senders with short lines choke on longer comments."""
 _SHOWN = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in range(256))
 """Characters as comments have them."""
 
 
+class Spelled:
+    """The modal words around streams, which most rapids of a program have in common."""
+
+    def __init__(self, rapids: Rapids, dialect: Dialect) -> None:
+        self.rapids, self.dialect = rapids, dialect
+        self._modes: dict[tuple[bool, int, bool, int], list[bytes]] = {}
+        self._restored: dict[tuple[int, float, bool], list[bytes]] = {}
+
+    def modes(self, move: int) -> list[bytes]:
+        """The modes of the stream that are not in force, or not stated."""
+        rapids = self.rapids
+        key = (
+            bool(rapids.distance_stated[move]),
+            int(rapids.feed_mode[move]),
+            bool(rapids.feed_mode_stated[move]),
+            int(rapids.path[move]),
+        )
+        if key not in self._modes:
+            self._modes[key] = self._spell_modes(*key)
+        return self._modes[key]
+
+    def _spell_modes(
+        self, distance_stated: bool, feed_mode: int, feed_mode_stated: bool, path: int
+    ) -> list[bytes]:
+        dialect = self.dialect
+        codes: list[int | None] = []
+        if not distance_stated and dialect.groups.get(G90) == "distance":
+            codes.append(G90)
+        if feed_mode != 94 or not feed_mode_stated:
+            codes.append(dialect.feed_code(94))
+        if path in (61, 62):
+            codes.append(dialect.path_code(64))
+        words = b" ".join(code_name(code) for code in codes if code is not None)
+        return [words] if words else []
+
+    def restored(self, move: int) -> list[bytes]:
+        """Words that restore the feed mode and F."""
+        rapids = self.rapids
+        key = int(rapids.feed_mode[move]), float(rapids.feed[move]), bool(rapids.feed_whole[move])
+        if key not in self._restored:
+            if len(self._restored) >= MOST:
+                self._restored.clear()
+            self._restored[key] = self._spell_restored(*key)
+        return self._restored[key]
+
+    def _spell_restored(self, mode: int, feed: float, whole: bool) -> list[bytes]:
+        """`whole`: F has to go without a decimal point, as it was written."""
+        words = []
+        code = self.dialect.feed_code(mode)
+        if mode != 94 and code is not None:
+            words.append(code_name(code))
+        if mode != 93 and not np.isnan(feed):
+            number = plain(Decimal(repr(feed)))
+            words.append(b"F" + (number.rstrip(b"0").rstrip(b".") if whole else number))
+        return words
+
+
 class Frame:
     """The lines around a move's points: what its block says besides, and what it relies on."""
 
-    def __init__(
-        self, rapids: Rapids, move: int, block: Block, text: bytes, dialect: Dialect
-    ) -> None:
-        self.rapids, self.move, self.block, self.text = rapids, move, block, text
-        self.dialect, self.writing = dialect, writing_of(dialect)
-        self.axis_words = [w for w in block.words if w.letter in AXES or w.letter in self.turned]
-        after = dialect.after_m
-        self.behind = [w for w in block.words if w.letter == "M" and w.value in after]
+    def __init__(self, spelled: Spelled, move: int, block: Block, text: bytes) -> None:
+        self.spelled, self.rapids, self.dialect = spelled, spelled.rapids, spelled.dialect
+        self.move, self.block, self.text = move, block, text
+        self.writing = writing_of(self.dialect)
+        self.fed = bool(self.rapids.fed[move])
+        """The block is a G1 that counts as a rapid."""
+        self.axis_words: list[Word] = []
+        self.behind: list[Word] = []
         """What the control runs when the motion has ended."""
-        exact = None if dialect.exact_stop is None else dialect.exact_stop / 10
-        self.exact = [w for w in block.words if w.letter == "G" and w.value == exact]
+        self.exact: list[Word] = []
         """G9, which is about the end of the motion of its own block."""
+        self.others: list[Word] = []
+        """What is said in front of the points; of G0, and the G1 of such a block, nothing."""
+        self._moved: list[Word] = []
+        self._sort()
+
+    def _sort(self) -> None:
+        """Put each word where it belongs."""
+        dialect = self.dialect
+        exact = None if dialect.exact_stop is None else dialect.exact_stop / 10
+        for word in self.block.words:
+            letter, value = word.letter, word.value
+            if letter in AXES or letter in self.turned:
+                self.axis_words.append(word)
+            elif letter == "M" and value in dialect.after_m:
+                self.behind.append(word)
+            elif letter == "G" and value == exact:
+                self.exact.append(word)
+            elif not (letter == "G" and value == 1.0 and self.fed):
+                self.others += [] if letter == "G" and value == 0.0 else [word]
+                continue
+            self._moved.append(word)
 
     @property
     def turned(self) -> Mapping[str, str]:
         """Addresses of increments, with their axes."""
         return self.dialect.increments
 
-    @property
-    def fed(self) -> bool:
-        """Whether the block is a G1 that counts as a rapid."""
-        return bool(self.rapids.fed[self.move])
-
-    @property
-    def motion_words(self) -> list[Word]:
-        """The G1 of such a block: without axis words it is a motion of no length."""
-        return [w for w in self.block.words if self.fed and w.letter == "G" and w.value == 1.0]
-
     def head(self, comments: bool) -> list[bytes]:
         """A comment that names the block, and the block without its axis words."""
         out = [self._comment()] if comments else []
-        rest, at = [], 0
-        moved = [*self.axis_words, *self.behind, *self.exact, *self.motion_words]
-        for word in sorted(moved, key=lambda w: w.begin):
-            rest.append(self.text[at : word.begin])
-            at = word.end
-        rest.append(self.text[at:])
-        others = [w for w in self.block.words if w not in moved]
-        if self.block.comments or any(not (w.letter == "G" and w.value == 0.0) for w in others):
+        if self.block.comments or self.others:
+            rest, at = [], 0
+            for word in self._moved:
+                rest.append(self.text[at : word.begin])
+                at = word.end
+            rest.append(self.text[at:])
             out.append(b"".join(rest).rstrip(b" \t\r"))
         return out
 
@@ -88,16 +155,7 @@ class Frame:
 
     def modes(self) -> list[bytes]:
         """The modes of the stream that are not in force, or not stated."""
-        rapids, move, dialect = self.rapids, self.move, self.dialect
-        codes: list[int | None] = []
-        if not rapids.distance_stated[move] and dialect.groups.get(G90) == "distance":
-            codes.append(G90)
-        if rapids.feed_mode[move] != 94 or not rapids.feed_mode_stated[move]:
-            codes.append(dialect.feed_code(94))
-        if rapids.path[move] in (61, 62):
-            codes.append(dialect.path_code(64))
-        words = b" ".join(code_name(code) for code in codes if code is not None)
-        return [words] if words else []
+        return self.spelled.modes(self.move)
 
     def last_point(self, before_end: Mapping[int, Decimal], code: bytes = b"G1") -> bytes:
         """The last point: the block's own words, or what is left of its increments."""
@@ -142,24 +200,11 @@ class Frame:
 
     def restored(self) -> list[bytes]:
         """Words that restore the feed mode and F."""
-        rapids, move, dialect = self.rapids, self.move, self.dialect
-        words = []
-        mode = int(rapids.feed_mode[move])
-        code = dialect.feed_code(mode)
-        if mode != 94 and code is not None:
-            words.append(code_name(code))
-        if mode != 93 and not np.isnan(rapids.feed[move]):
-            feed = plain(Decimal(repr(float(rapids.feed[move]))))
-            words.append(b"F" + (feed.rstrip(b"0").rstrip(b".") if self._whole() else feed))
-        return words
+        return self.spelled.restored(self.move)
 
     def after(self) -> list[bytes]:
         """What the block says when its motion has ended."""
         return [b" ".join(b"".join(w.text.split()) for w in self.behind)] if self.behind else []
-
-    def _whole(self) -> bool:
-        """Whether F has to go without a decimal point, as it was written."""
-        return bool(self.rapids.feed_whole[self.move])
 
 
 def writing_of(dialect: Dialect) -> Writing:

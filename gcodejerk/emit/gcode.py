@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Options, axis_steps, step_sizes
 from gcodejerk.emit.feeds import Feeds, mean_feeds
-from gcodejerk.emit.frame import Frame, plain, writing_of
+from gcodejerk.emit.frame import Frame, Spelled, plain, writing_of
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.emit.raised import has_to_rise
 from gcodejerk.machine import Machine
@@ -117,11 +117,9 @@ class GcodeController(Controller):
         writing = writing_of(dialect)
         feeds = self.feeds(batch, rapids, writing.digits)
         points = self._points(batch, rapids, line_ends, feeds, writing.doubles)
-        out = []
+        spelled, out = Spelled(rapids, dialect), []
         for row, move in enumerate(moves):
-            frame = Frame(
-                rapids, int(move), parse_block(blocks[row], dialect), blocks[row], dialect
-            )
+            frame = Frame(spelled, int(move), parse_block(blocks[row], dialect), blocks[row])
             last = frame.last_point(points[row].before_end) + b" F" + plain(feeds.of_end(row))
             follows = follows_stream(batch.plans, rapids, int(move))
             lines = [

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
-from gcodejerk.emit.frame import Frame
+from gcodejerk.emit.frame import Frame, Spelled
 from gcodejerk.emit.gcode import line_ends_of, origins
 from gcodejerk.emit.guard import guarded, in_structures
 from gcodejerk.emit.linuxcnc_settings import LinuxcncSettings
@@ -119,10 +119,10 @@ class LinuxcncController(LinuxcncSettings, Controller):
             _Points(batch, rapids, row, feed[row], *more)
             for row, more in enumerate(zip(way, leading, starts, outer, strict=True))
         ]
-        texts = _texts(every, ends)
+        texts, spelled = _texts(every, ends), Spelled(rapids, options.dialect)
         for row, move in enumerate(batch.moves.tolist()):
             block = parse_block(blocks[row], options.dialect)
-            frame = Frame(rapids, move, block, blocks[row], options.dialect)
+            frame = Frame(spelled, move, block, blocks[row])
             points = every[row]
             lines = [
                 *frame.modes(),

@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
-from gcodejerk.emit.frame import Frame
+from gcodejerk.emit.frame import Frame, Spelled
 from gcodejerk.emit.gcode import LINE_ENDS, GcodeController
 from gcodejerk.emit.hal_words import ADAPTIVE, POSITION, check_words
 from gcodejerk.emit.linuxcnc import LinuxcncController
@@ -209,12 +209,12 @@ class LinuxcncHalController(GcodeController):
         options: Options,
     ) -> list[bytes]:
         """Text of each move."""
-        out = []
+        spelled, out = Spelled(rapids, options.dialect), []
         for row, move in enumerate(batch.moves.tolist()):
             last_end = LINE_ENDS[rapids.terminator[move]]
             line_end = newline if last_end in (b"", b"\r") else last_end
             block = parse_block(blocks[row], options.dialect)
-            frame = Frame(rapids, move, block, blocks[row], options.dialect)
+            frame = Frame(spelled, move, block, blocks[row])
             adaptive = self.form == ADAPTIVE
             middle = self._adaptive(frame, batch, row) if adaptive else _position(frame, batch)
             lines = [*frame.head(options.comments), *middle]

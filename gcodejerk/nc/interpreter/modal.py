@@ -357,9 +357,15 @@ class State:
 
     def shift(self, axis: int) -> float:
         """Machine coordinate minus program coordinate of an axis [mm, deg]; NaN if unknown."""
-        if self.transformed and (axis < 2 or self.rotated is False):
-            return NAN
-        return self.g5x[axis] + self.g92[axis] + self.tool[axis]
+        return self.shifts()[axis]
+
+    def shifts(self) -> list[float]:
+        """The same of all axes."""
+        sums = [sum(offsets) for offsets in zip(self.g5x, self.g92, self.tool, strict=True)]
+        if self.transformed:
+            turned = 2 if self.rotated is not False else len(AXES)
+            sums[:turned] = [NAN] * turned
+        return sums
 
     def scale(self, axis: int) -> float:
         """Mm (or deg) per unit of an axis word; NaN if unknown."""

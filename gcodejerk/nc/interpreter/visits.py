@@ -66,7 +66,7 @@ class ModeColumns:
             path_p=state.path_p,
             path_q=state.path_q,
             lone=state.path not in EXACT,
-            offset=[state.shift(axis) for axis in range(len(AXES))],
+            offset=state.shifts(),
             feed_whole=bool(state.feed_whole),
             beam=state.spindle != 5,
         )
