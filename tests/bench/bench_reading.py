@@ -3,9 +3,9 @@
     python tests/bench/bench_reading.py [--megabytes 10] [--memory]
 
 The finishing program is three-axis, modal words omitted, with a retract and an approach every 200
-lines. The plain tracker does the least that finds the rapids: a regular expression over each line,
-G0 to G3, G90, G91 and the last X, Y, Z. `--memory` reads 100 MB in a fresh process and prints its
-largest resident size.
+lines; the printed part is Marlin's, with extrusion. The plain tracker does the least that finds the
+rapids: a regular expression over each line, G0 to G3, G90, G91 and the last X, Y, Z. `--memory`
+reads 100 MB in a fresh process and prints its largest resident size.
 """
 
 import argparse
@@ -50,6 +50,25 @@ def drilling_program(lines):
     return b"\n".join([*rows, b"M2", b"%", b""])
 
 
+def printed_part(lines):
+    """Perimeters of islands, layer by layer, with comments, extrusion and travels by G0."""
+    random = np.random.default_rng(3)
+    rows = [b"G21", b"G90", b"M83", b"M104 S215", b"G28 ; home all axes", b"G1 Z5 F5000"]
+    layer, x, y = 0, 100.0, 100.0
+    while len(rows) < lines:
+        layer += 1
+        rows += [b";LAYER_CHANGE", b";Z:%.1f" % (0.2 * layer), b"G1 Z%.2f F9000" % (0.2 * layer)]
+        for _ in range(4):
+            x, y = random.uniform(60.0, 140.0, 2)
+            rows += [b"G0 X%.3f Y%.3f F9000" % (x, y), b"G1 E.8 F2400", b";TYPE:Perimeter"]
+            rows.append(b"G1 F1500")
+            for step_x, step_y, e in random.uniform((-2, -2, 0), (2, 2, 0.1), (80, 3)).tolist():
+                x, y = x + step_x, y + step_y
+                rows.append(b"G1 X%.3f Y%.3f E%.5f" % (x, y, e))
+            rows.append(b"G1 E-.8 F2400")
+    return b"\n".join([*rows, b"M107", b"M84", b""])
+
+
 WORD = re.compile(rb"([A-Z])([-+]?[0-9.]+)")
 
 
@@ -84,14 +103,22 @@ def main():
     lines = int(given.megabytes * 46600)
     print(f"{'program':22}{'MB':>6}{'lines':>9}{'rapids':>9}{'certain':>9}", end="")
     print(f"{'MB/s':>8}{'plain':>8}{'ratio':>7}{'careful':>9}")
-    makers = {"3-axis finishing": finishing_program, "commented drilling": drilling_program}
-    for name, make in makers.items():
+    makers = {
+        "3-axis finishing": (finishing_program, "linuxcnc"),
+        "commented drilling": (drilling_program, "linuxcnc"),
+        "printed part": (printed_part, "marlin"),
+    }
+    for name, (make, dialect) in makers.items():
         data = make(lines)
         megabytes = len(data) / 1e6
-        quick, program = best_of(lambda data=data: read_program(io.BytesIO(data)))
+
+        def read(data=data, dialect=dialect, fast=True):
+            return read_program(io.BytesIO(data), dialect=dialect, fast=fast)
+
+        quick, program = best_of(read)
         plain, found = best_of(lambda data=data: plain_tracker(data))
         few = data[: len(data) // 10]
-        careful, _ = best_of(lambda few=few: read_program(io.BytesIO(few), fast=False), 1)
+        careful, _ = best_of(lambda few=few, read=read: read(few, fast=False), 1)
         rapids = program.rapids
         assert set(rapids.line.tolist()) == {number for number, _, _ in found}
         print(f"{name:22}{megabytes:6.1f}{program.lines:9}{len(rapids):9}", end="")

@@ -183,25 +183,14 @@ class Reader:
         """Points of streams as columns."""
         rapids = self.rapids
         index = np.array([stream.rapid for stream in streams], dtype=np.int64)
-        fast = _fast_points(streams)
-        counts = np.array(
-            [len(s.lead) + len(f) + len(s.rest) for f, s in zip(fast, streams, strict=True)],
-            dtype=np.int64,
-        )
+        points = np.array([s.text.count(b"\n") for s in streams], dtype=np.int64)
+        lead = np.array([len(s.lead) for s in streams], dtype=np.int64)
+        counts = lead + points + np.array([len(s.rest) for s in streams], dtype=np.int64)
         end = np.cumsum(counts + 1)
         begin = end - counts - 1
         raw = np.full((int(end[-1]), len(AXES) + 1), np.nan)
-        for stream, first, numbers in zip(streams, begin.tolist(), fast, strict=True):
-            columns = [_COLUMN[letter] for letter in stream.letters + "F"]
-            begun = first + 1 + len(stream.lead)
-            raw[begun : begun + len(numbers), columns] = numbers
-            others = (
-                *range(first + 1, begun),
-                *range(begun + len(numbers), begun + len(numbers) + len(stream.rest)),
-            )
-            for at, words in zip(others, (*stream.lead, *stream.rest), strict=True):
-                for letter, value in words.items():
-                    raw[at, _COLUMN[letter]] = value
+        _put_points(raw, streams, begin + 1 + lead, points)
+        _put_others(raw, streams, begin.tolist(), points.tolist())
         start = np.nan_to_num(rapids.start[index])
         displacement = rapids.target[index] - rapids.start[index]
         displacement = np.where(np.abs(displacement) > STANDSTILL, displacement, 0.0)
@@ -229,7 +218,7 @@ class Reader:
             speed=rapids.speed[index],
             step=np.where(rapids.inch[index, np.newaxis], self.inch_step, self.step),
             lone=rapids.lone[index],
-            lead=np.array([len(s.lead) for s in streams], dtype=np.int64),
+            lead=lead,
             digits=15 if self.dialect.writing is None else self.dialect.writing.digits,
         )
 
@@ -237,25 +226,44 @@ class Reader:
 _COLUMN = {letter: column for column, letter in enumerate(AXES + "F")}
 
 
-def _fast_points(streams: Sequence[Stream]) -> list[Array]:
-    """Numbers of the points that are written alike, one matrix for each stream."""
-    out: list[Array] = [np.zeros((0, len(s.letters) + 1)) for s in streams]
-    groups: dict[int, list[int]] = {}
+def _put_points(raw: Array, streams: Sequence[Stream], first: Index, count: Index) -> None:
+    """Numbers of the points that are written alike, into the rows of each stream."""
+    groups: dict[str, list[int]] = {}
     for k, stream in enumerate(streams):
         if stream.text:
-            groups.setdefault(len(stream.letters), []).append(k)
-    for axes, members in groups.items():
+            groups.setdefault(stream.letters, []).append(k)
+    for letters, members in groups.items():
         # The code goes out first: "G1" holds a digit.
-        text = b"".join(streams[k].text for k in members)
+        text = b"".join([streams[k].text for k in members])
         text = text.replace(b"G01", b"").replace(b"G1", b"").translate(_NUMBERS_ONLY)
-        numbers = np.fromstring(text.decode("ascii"), sep=" ").reshape(-1, axes + 1)
-        at = 0
-        for k in members:
-            lines = streams[k].text.count(b"\n")
-            out[k] = numbers[at : at + lines]
-            at += lines
-        assert at == len(numbers)
-    return out
+        numbers = np.fromstring(text.decode("ascii"), sep=" ").reshape(-1, len(letters) + 1)
+        lines = count[members]
+        rows = np.repeat(first[members] - np.cumsum(lines) + lines, lines) + np.arange(lines.sum())
+        raw[rows[:, np.newaxis], [_COLUMN[letter] for letter in letters + "F"]] = numbers
+
+
+def _put_others(
+    raw: Array, streams: Sequence[Stream], begin: Sequence[int], count: Sequence[int]
+) -> None:
+    """The same of the points in front of these, and behind."""
+    rows: list[int] = []
+    columns: list[int] = []
+    values: list[float] = []
+    for stream, row, lines in zip(streams, begin, count, strict=True):
+        for words in stream.lead:
+            row += 1
+            for letter, value in words.items():
+                rows.append(row)
+                columns.append(_COLUMN[letter])
+                values.append(float(value))
+        row += lines
+        for words in stream.rest:
+            row += 1
+            for letter, value in words.items():
+                rows.append(row)
+                columns.append(_COLUMN[letter])
+                values.append(float(value))
+    raw[rows, columns] = values
 
 
 def sum_up(increments: Array, begin: Index, end: Index) -> Array:
