@@ -7,6 +7,7 @@ the modal values that the program relies on behind it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from decimal import Decimal
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
-from gcodejerk.nc import Block, Dialect, Rapids, Word
+from gcodejerk.nc import Block, Dialect, Rapids, Word, parse_block
 from gcodejerk.nc.dialects.dialect import code_name
 from gcodejerk.nc.dialects.gcodes import G90
 from gcodejerk.nc.dialects.spelling import Writing
@@ -24,6 +25,10 @@ MOST = 1000
 """Different words around streams that are kept."""
 COMMENT_LENGTH = 69
 """Controllers and senders with short lines choke on longer comments."""
+_SIMPLE = re.compile(
+    rb"(?:G0?0 )?((?:[XYZABCUVW]-?[0-9]+\.[0-9]*)(?: [XYZABCUVW]-?[0-9]+\.[0-9]*)*)"
+)
+"""A block of G0 and places: the most usual one, which need not be taken apart."""
 _SHOWN = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in range(256))
 """Characters as comments have them."""
 
@@ -33,6 +38,8 @@ class Spelled:
 
     def __init__(self, rapids: Rapids, dialect: Dialect) -> None:
         self.rapids, self.dialect = rapids, dialect
+        self.other_axes = [axis.encode() for axis in dialect.increments]
+        """Addresses that look like those of axes."""
         self._modes: dict[tuple[bool, int, bool, int], list[bytes]] = {}
         self._restored: dict[tuple[int, float, bool], list[bytes]] = {}
 
@@ -83,6 +90,20 @@ class Spelled:
             number = plain(Decimal(repr(feed)))
             words.append(b"F" + (number.rstrip(b"0").rstrip(b".") if whole else number))
         return words
+
+
+def frame_of(spelled: Spelled, move: int, text: bytes) -> Frame:
+    """The frame of a move, by the text of its block."""
+    simple = _SIMPLE.fullmatch(text)
+    if (
+        simple is None
+        or len(text) > COMMENT_LENGTH // 2
+        or spelled.rapids.incremental[move]
+        or spelled.rapids.fed[move]
+        or any(letter in simple[1] for letter in spelled.other_axes)
+    ):
+        return Frame(spelled, move, parse_block(text, spelled.dialect), text)
+    return SimpleFrame(spelled, move, text, simple[1])
 
 
 class Frame:
@@ -205,6 +226,26 @@ class Frame:
     def after(self) -> list[bytes]:
         """What the block says when its motion has ended."""
         return [b" ".join(b"".join(w.text.split()) for w in self.behind)] if self.behind else []
+
+
+class SimpleFrame(Frame):
+    """The same of a block that is nothing but G0 and where the axes go."""
+
+    def __init__(self, spelled: Spelled, move: int, text: bytes, places: bytes) -> None:
+        super().__init__(spelled, move, Block(), text)
+        self.places = places
+
+    def _comment(self) -> bytes:
+        opens, closes = self.writing.comment
+        return opens + b"gcodejerk: " + self.text + closes
+
+    def last_point(self, before_end: Mapping[int, Decimal], code: bytes = b"G1") -> bytes:
+        """The last point: the block's own words."""
+        return b" ".join([code, *self._ending(), self.places])
+
+    def own_motion(self) -> bytes:
+        """The rapid as its own block has it."""
+        return b"G0 " + self.places
 
 
 def writing_of(dialect: Dialect) -> Writing:

@@ -36,11 +36,11 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Options, axis_steps, step_sizes
 from gcodejerk.emit.feeds import Feeds, mean_feeds
-from gcodejerk.emit.frame import Frame, Spelled, plain, writing_of
+from gcodejerk.emit.frame import Spelled, frame_of, plain, writing_of
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.emit.raised import has_to_rise
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Dialect, Rapids, parse_block
+from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
@@ -119,7 +119,7 @@ class GcodeController(Controller):
         points = self._points(batch, rapids, line_ends, feeds, writing.doubles)
         spelled, out = Spelled(rapids, dialect), []
         for row, move in enumerate(moves):
-            frame = Frame(spelled, int(move), parse_block(blocks[row], dialect), blocks[row])
+            frame = frame_of(spelled, int(move), blocks[row])
             last = frame.last_point(points[row].before_end) + b" F" + plain(feeds.of_end(row))
             follows = follows_stream(batch.plans, rapids, int(move))
             lines = [

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
-from gcodejerk.emit.frame import Frame, Spelled
+from gcodejerk.emit.frame import Frame, Spelled, frame_of
 from gcodejerk.emit.gcode import line_ends_of, origins
 from gcodejerk.emit.guard import guarded, in_structures
 from gcodejerk.emit.linuxcnc_settings import LinuxcncSettings
@@ -40,7 +40,7 @@ from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.emit.raised import NEAR, moving_axes
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import LINUXCNC, STREAM_HEADROOM, Machine
-from gcodejerk.nc import Dialect, Program, Rapids, parse_block
+from gcodejerk.nc import Dialect, Program, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
@@ -121,8 +121,7 @@ class LinuxcncController(LinuxcncSettings, Controller):
         ]
         texts, spelled = _texts(every, ends), Spelled(rapids, options.dialect)
         for row, move in enumerate(batch.moves.tolist()):
-            block = parse_block(blocks[row], options.dialect)
-            frame = Frame(spelled, move, block, blocks[row])
+            frame = frame_of(spelled, move, blocks[row])
             points = every[row]
             lines = [
                 *frame.modes(),

@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.emit.base import Controller, Form, Options
-from gcodejerk.emit.frame import Frame, Spelled
+from gcodejerk.emit.frame import Frame, Spelled, frame_of
 from gcodejerk.emit.gcode import LINE_ENDS, GcodeController
 from gcodejerk.emit.hal_words import ADAPTIVE, POSITION, check_words
 from gcodejerk.emit.linuxcnc import LinuxcncController
@@ -50,7 +50,7 @@ from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.nc import Dialect, Program, Rapids, parse_block
+from gcodejerk.nc import Dialect, Program, Rapids
 from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
@@ -213,8 +213,7 @@ class LinuxcncHalController(GcodeController):
         for row, move in enumerate(batch.moves.tolist()):
             last_end = LINE_ENDS[rapids.terminator[move]]
             line_end = newline if last_end in (b"", b"\r") else last_end
-            block = parse_block(blocks[row], options.dialect)
-            frame = Frame(spelled, move, block, blocks[row])
+            frame = frame_of(spelled, move, blocks[row])
             adaptive = self.form == ADAPTIVE
             middle = self._adaptive(frame, batch, row) if adaptive else _position(frame, batch)
             lines = [*frame.head(options.comments), *middle]

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -306,32 +305,38 @@ def _played(motion: _Motion, interval: float) -> tuple[Paths, Index]:
 
 def _off_profile(played: Paths, moment: Index, interval: float, reported: Reported) -> Rows:
     """Periods in which a stream is too far from the profile that was reported."""
-    off = np.zeros(len(played.position), dtype=np.bool_)
+    wanted = np.full(len(played.position), np.nan)
+    alike: dict[int, tuple[Array, list[int]]] = {}
     for k, line in enumerate(played.original_line.tolist()):
         segments = reported.get(line)
-        if segments is None:
-            continue
-        rows = slice(int(played.begin[k]), int(played.end[k]))
-        length = float(np.sqrt((played.displacement[k] ** 2).sum()))
-        moved = np.sqrt(((played.position[rows] - played.start[k]) ** 2).sum(axis=1))
-        wanted = np.minimum(_way((moment[rows] - 1) * interval, segments), length)
-        off[rows] = np.abs(moved - wanted) > TOLERANCE
+        if segments is not None:
+            alike.setdefault(id(segments), (segments, []))[1].append(k)
+    t = np.asarray((moment - 1) * interval, dtype=np.float64)
+    for segments, streams in alike.values():
+        rows = played.rows_of(np.array(streams))
+        wanted[rows] = _way(t[rows], segments)
+    owner = played.owner
+    length = np.sqrt((played.displacement**2).sum(axis=1))
+    moved = np.sqrt(((played.position - played.start[owner]) ** 2).sum(axis=1))
+    off: Rows = np.abs(moved - np.minimum(wanted, length[owner])) > TOLERANCE
     return off
 
 
-def _way(t: NDArray[np.floating[Any]], segments: Array) -> Array:
+def _way(t: Array, segments: Array) -> Array:
     """Way along the path at some moments, of segments of constant jerk [mm]."""
-    out = np.zeros(len(t))
-    x = v = a = begin = 0.0
+    begins, states = [0.0], [(0.0, 0.0, 0.0)]
     for duration, jerk in segments.tolist():
-        tau = np.clip(t - begin, 0.0, duration)
-        inside = t >= begin
-        out[inside] = (x + (v + (a / 2.0 + jerk * tau / 6.0) * tau) * tau)[inside]
+        x, v, a = states[-1]
         x += (v + (a / 2.0 + jerk * duration / 6.0) * duration) * duration
         v += (a + jerk * duration / 2.0) * duration
-        a += jerk * duration
-        begin += duration
-    return out
+        states.append((x, v, a + jerk * duration))
+        begins.append(begins[-1] + duration)
+    at = np.searchsorted(begins[:-1], t, side="right") - 1
+    x, v, a = np.array(states)[at].T
+    duration, jerk = segments[at].T
+    tau = np.clip(t - np.array(begins)[at], 0.0, duration)
+    way: Array = (x + (v + (a / 2.0 + jerk * tau / 6.0) * tau) * tau) * (at >= 0)
+    return way
 
 
 def _complain(
