@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,9 +142,18 @@ class ReportedProfiles(Mapping[int, Array]):
         return iter(self.lines.tolist())
 
     def __getitem__(self, line: int) -> Array:
+        made: Array | None = self.get(line)
+        if made is None:
+            raise KeyError(line)
+        return made
+
+    def get(self, line: int, default: Any = None) -> Any:
+        """The profile of a line, or another where it has none."""
         key = self._near.get(line)
         if key is None:
             key = self._looked_up(line)
+            if key is None:
+                return default
         made = self.made.get(key)
         if made is None:
             profiles, (row, length) = self.profiles, key
@@ -155,7 +165,7 @@ class ReportedProfiles(Mapping[int, Array]):
             self.made[key] = made
         return made
 
-    def _looked_up(self, line: int) -> tuple[int, float]:
+    def _looked_up(self, line: int) -> tuple[int, float] | None:
         """Have a line and those behind it at hand; they are asked for in the order of the file."""
         begin = int(np.searchsorted(self.lines, line))
         last = self.lines[begin : begin + AT_HAND][-1:]
@@ -163,7 +173,7 @@ class ReportedProfiles(Mapping[int, Array]):
         near = slice(begin, int(np.searchsorted(self.lines, last, side="right").sum()))
         rows = zip(self.row[near].tolist(), self.length[near].tolist(), strict=True)
         self._near = dict(zip(self.lines[near].tolist(), rows, strict=True))
-        return self._near[line]
+        return self._near.get(line)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -32,6 +32,9 @@ AHEAD = 1 << 15
 """Text in which the end of a stream is looked for. [bytes]"""
 _BLOCK = re.compile(rb"(?:N[0-9]{1,9} ?)?(?:G0?0 ?)?((?:[XYZABCUVW]-?[0-9]{0,9}\.?[0-9]{0,12} ?)+)")
 _AXIS = re.compile(rb"([XYZABCUVW])(-?(?:[0-9]{1,9}\.?[0-9]{0,12}|\.[0-9]{1,12}))(?= |[A-Z]|$)")
+_PLACE = rb"([XYZABCUVW])(-?[0-9]{1,9}\.[0-9]{0,12})"
+_USUAL = re.compile(rb"(G0?0) " + _PLACE + (rb"(?: " + _PLACE + rb")?") * 2)
+"""The most usual block: G0 and up to three places, one blank between them."""
 _NUMBERS = b"-.0123456789"
 """What stands behind each letter of a plain block, and nowhere else."""
 _WORD = re.compile(rb"(?<=[NGXYZABCUVW0-9.])(?=[A-Z])| +")
@@ -59,12 +62,20 @@ class Plain:
     comment: bytes
     """What names it, without the brackets."""
     text: bytes
+    line_end: bytes
 
     @classmethod
-    def of(cls, text: bytes) -> Plain | None:
+    def of(cls, text: bytes, line_end: bytes) -> Plain | None:
         """Take a block apart; None where it is another."""
         if len(text) > LONGEST_BLOCK:
             return None
+        if usual := _USUAL.fullmatch(text):
+            code, *places = usual.groups()
+            letters = [letter for letter in places[::2] if letter is not None]
+            if len(set(letters)) < len(letters):
+                return None
+            named = tuple(zip(letters, places[1::2], strict=False))
+            return cls(b"usual " + b"".join(letters), code + b" ", named, text, text, line_end)
         match = _BLOCK.fullmatch(text)
         if match is None:
             return None
@@ -82,6 +93,7 @@ class Plain:
             tuple(axes),
             b" ".join([*_words(head), *(letter + number for letter, number in axes)]),
             text,
+            line_end,
         )
 
 
@@ -128,12 +140,14 @@ class Recognised:
 
     def plain(self, i: int, text: bytes) -> Plain | None:
         """The block of a rapid, if it is one that this module knows about."""
-        if not self.usable or not LINE_ENDS[int(self.rapids.terminator[i])].endswith(b"\n"):
+        line_end = LINE_ENDS[int(self.rapids.terminator[i])]
+        if not self.usable or not line_end.endswith(b"\n"):
             return None
-        plain = Plain.of(text)
+        plain = Plain.of(text, line_end)
         if plain is None:
             return None
-        if any(letter.decode() in self.dialect.increments for letter, _ in plain.axes):
+        turned = self.dialect.increments
+        if turned and any(letter.decode() in turned for letter, _ in plain.axes):
             return None
         if self._points_needed and not all(b"." in number for _, number in plain.axes):
             return None
@@ -144,7 +158,7 @@ class Recognised:
         form = self.forms.get(self._key(i, plain, follows))
         if form is None:
             return None
-        window, line_end = self.window, LINE_ENDS[int(self.rapids.terminator[i])]
+        window, line_end = self.window, plain.line_end
         have = window.fill(AHEAD)
         data, at = window.data, window.at
         if data.startswith(plain.text, at):

@@ -113,6 +113,12 @@ def skip_common(one: Window, other: Window, size: int | None) -> int | None:
         Lines passed; None where they differ: both then stand at the first line that does.
     """
     lines = 0
+    if size is not None and size <= PIECE:  # the most usual: a few lines between two streams
+        text = one.peek(size)
+        if len(text) == size and other.peek(size) == text:
+            one.skip(size)
+            other.skip(size)
+            return text.count(b"\n")
     while size is None or size > 0:
         want = PIECE if size is None else min(PIECE, size)
         have = one.fill(want)
