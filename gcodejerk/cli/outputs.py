@@ -40,8 +40,13 @@ class Outputs:
         """The folder of the reports, where one was named."""
         return self.report if self.report is not None and self.report.endswith("/") else None
 
-    def check(self, files: list[str]) -> None:
-        """Refuse options that contradict each other or the inputs, as wrong usage."""
+    def check(self, files: list[str], told: bool) -> None:
+        """Refuse options that contradict each other or the inputs, as wrong usage.
+
+        `told`: the command prints something on standard output by itself.
+        """
+        if told and self.report == STANDARD:
+            raise typer.BadParameter("--report - has standard output to itself: no --diff, --json")
         if sum(map(bool, (self.output, self.output_dir, self.in_place))) > 1:
             raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
         if "-" in files and len(files) > 1:

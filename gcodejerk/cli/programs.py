@@ -126,7 +126,7 @@ def process(
     # A slicer gives the program a name for the time being, and says the user's.
     called = output_name() if in_place and len(files) == 1 else None
     outputs = Outputs(output, output_dir, in_place, report, backup, if_changed, called)
-    outputs.check(files)
+    outputs.check(files, told=diff or as_json)
     if revert:
         _revert(files)
         return
@@ -148,10 +148,7 @@ def process(
     described = calling(described, subprograms)
     mode = "check" if check else "diff" if diff else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
-    reports = report == STANDARD and not check
-    if reports and (diff or as_json):
-        raise typer.BadParameter("--report - has standard output to itself: no --diff, no --json")
-    aside = diff or reports or any(job.output == STANDARD for job in batch)
+    aside = diff or any(STANDARD in (job.output, job.report) for job in batch)
     tally = _Tally(mode, quiet, aside=aside, many=many, as_json=as_json, verbose=verbose)
     for problem in problems:
         tally.fail(str(problem))

@@ -156,7 +156,10 @@ def test_csv_has_one_row_per_interval(run, folder):
         (["process", ".", "-m", "vmc", "-o", "a"], "one program"),
         (["process", ".", "-m", "vmc", "--report", "r.json"], "one program"),
         (["process", "-", "part.nc", "-m", "vmc"], "give it alone"),
-        (["process", "part.nc", "-m", "vmc", "--report", "r.txt"], ".json, or a page .html"),
+        (
+            ["process", "part.nc", "-m", "vmc", "--report", "r.txt"],
+            ".json, a page .html to look at, or -",
+        ),
         (["process", "-", "-m", "vmc", "--in-place"], "needs a file"),
         (["process", "-m", "vmc"], "Missing argument"),
         (["process", "part.nc"], "no machine: state --machine"),

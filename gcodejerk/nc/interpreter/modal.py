@@ -355,12 +355,8 @@ class State:
         """Whether a rotation, scaling, mirroring or polar frame is, or may be, in force."""
         return self.rotated is not False or any(on is not False for on in self.transforms.values())
 
-    def shift(self, axis: int) -> float:
-        """Machine coordinate minus program coordinate of an axis [mm, deg]; NaN if unknown."""
-        return self.shifts()[axis]
-
     def shifts(self) -> list[float]:
-        """The same of all axes."""
+        """Machine coordinate minus program coordinate of each axis [mm, deg]; NaN if unknown."""
         sums = [sum(offsets) for offsets in zip(self.g5x, self.g92, self.tool, strict=True)]
         if self.transformed:
             turned = 2 if self.rotated is not False else len(AXES)

@@ -96,7 +96,7 @@ def go_to_stored_point(state: State, codes: Codes, dialect: Dialect) -> None:
 def _named_place(state: State, axis: int, machine: float) -> float:
     """The name of a machine coordinate; of an axis that counts turns, it says the angle alone."""
     turns = AXES[axis] not in LINEAR and state.wraps[axis] in ("shortest", "sign")
-    return NAN if turns else machine - state.shift(axis)
+    return NAN if turns else machine - state.shifts()[axis]
 
 
 def lose_tool_length(state: State, axes: Iterable[int] = range(len(AXES))) -> None:

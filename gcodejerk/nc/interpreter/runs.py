@@ -21,7 +21,7 @@ from gcodejerk.nc.interpreter.arcs import doubtful
 from gcodejerk.nc.interpreter.eligibility import barred
 from gcodejerk.nc.interpreter.limits import beyond_path
 from gcodejerk.nc.interpreter.modal import NAN, State
-from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
+from gcodejerk.nc.interpreter.rapids import FEED_UNKNOWN, GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines, Words, read_words
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
@@ -143,12 +143,8 @@ def run_plain(
     codes = lines.words("G", first, last)
     motion = _spread(codes.line, codes.codes(), (state.motion or 0) // 10, last - first)
     sure = sure_lines(letters, motion, state, dialect)
-    if dialect.arcs_refused and state.unit is not None:
-        arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
-        sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
     if dialect.arcs_refused:
-        given = lines.words("F", first, last)
-        sure[given.line[given.values() == 0.0]] = False
+        _doubt_refused(sure, lines, letters, motion, state, first)
     if not sure.all():
         last = first + int(np.argmin(sure))
         letters, motion = letters[: last - first], motion[: last - first]
@@ -190,21 +186,44 @@ def run_plain(
         runs_at_f = columns["fed"] | dialect.feed_on_rapids
         columns["speed"] = np.where(runs_at_f, speed, NAN)
         unknown = runs_at_f & ~(speed > 0.0) & (columns["reason"] == CERTAIN)
-        columns["reason"][unknown] = _INDEX[Reason.FEED_UNKNOWN]
+        columns["reason"][unknown] = FEED_UNKNOWN
     # What stands behind the end of the program uses no F.
     log.add_many(columns, np.zeros_like(events) if state.ended else events, rapid)
     if dialect.dark_rapids and state.spindle != 5 and not state.ended:
         feeding = (named != 0) & (motion != 0)
         log.habits |= bool((feeding & (letters & BIT["S"] != 0)).any())
-    said_last = np.flatnonzero(letters)[-1:]
-    if dialect.modal_motion:
-        state.motion = int(motion[-1]) * 10
-    elif len(said_last):
-        states_one = letters[said_last[0]] & BIT["G"] != 0
-        state.motion = int(motion[said_last[0]]) * 10 if states_one else None
+    state.motion = _motion_behind(letters, motion, state, dialect)
     state.feed_whole = bool(state.feed_whole) and not len(feeds.words.line)
     certain = np.flatnonzero(columns["reason"] == CERTAIN)
     return last, int(row[certain[0]]) + place[0] if len(certain) else None
+
+
+def _doubt_refused(
+    sure: NDArray[np.bool_],
+    lines: Lines,
+    letters: NDArray[np.uint32],
+    motion: NDArray[np.uint8],
+    state: State,
+    first: int,
+) -> None:
+    """Mark what the control may refuse: arcs that do not meet their end, and F0."""
+    if state.unit is not None:
+        arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
+        sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
+    given = lines.words("F", first, first + len(letters))
+    sure[given.line[given.values() == 0.0]] = False
+
+
+def _motion_behind(
+    letters: NDArray[np.uint32], motion: NDArray[np.uint8], state: State, dialect: Dialect
+) -> int | None:
+    """The motion code in force behind a run; where every block has its own, that of the last."""
+    if dialect.modal_motion:
+        return int(motion[-1]) * 10
+    blocks = np.flatnonzero(letters)
+    if not len(blocks):
+        return state.motion
+    return int(motion[blocks[-1]]) * 10 if letters[blocks[-1]] & BIT["G"] else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
