@@ -13,6 +13,7 @@ from typing import BinaryIO
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.elsewhere import Elsewhere
 from gcodejerk.nc.flow.following import Follower
+from gcodejerk.nc.flow.labels import label_script
 from gcodejerk.nc.flow.macro_b import NotFollowedError, macro_script
 from gcodejerk.nc.flow.named import named_script
 from gcodejerk.nc.flow.o_words import Passes
@@ -34,6 +35,7 @@ _BY_NUMBER = re.compile(
     rb"(?<![A-Z0-9_])REPEATB?[ \t]+(?:[A-Z_][A-Z0-9_]*[ \t]+)?N?[0-9]+(?![A-Z0-9_=])", re.IGNORECASE
 )
 """``REPEATB N10``: of a stream only its first block bears the number."""
+_LABELS = re.compile(rb"(?<![A-Z0-9_])(?:LBL(?![A-Z0-9_])|G[ \t]*98(?![0-9.]))", re.IGNORECASE)
 _MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[", re.IGNORECASE)
 
 
@@ -43,6 +45,8 @@ def worth_following(file: BinaryIO, dialect: Dialect) -> bool:
         pattern = _NAMED
     elif dialect.text.keywords and dialect.text.o_word == "program":
         pattern = _MACRO
+    elif dialect.text.variables == "Q":
+        pattern = _LABELS
     else:
         return False
     begin = file.tell()
@@ -59,7 +63,7 @@ class FollowingReader(Reader):
         name: str,
         dialect: Dialect,
         start: Start,
-        calls: Callable[[Runner], Calls],
+        calls: Callable[[Runner], Calls] | None,
         elsewhere: Elsewhere,
     ) -> None:
         super().__init__(name, dialect, start)
@@ -94,6 +98,8 @@ class FollowingReader(Reader):
             self._closed = True
         if self.percent is None and not self.blocks:
             self.percent, self.insert_at, self.started = line.number, line.end, True
+            if any(word.letter == "G" for word in line.block.words):
+                self._count(line)  # %PART G71 of Heidenhain
         self._run(line)
 
     def finish(self) -> None:
@@ -112,7 +118,8 @@ class FollowingReader(Reader):
                 runner.observe = observe
                 self.passes = Passes(runner)
         else:
-            self.refer(self._make_calls(self.runner))
+            if self._make_calls is not None:
+                self.refer(self._make_calls(self.runner))
             self._replay_all()
         self._finish_log()
 
@@ -139,6 +146,8 @@ class FollowingReader(Reader):
         lines, more = [line for line, _ in self._kept], self._elsewhere.lines
         if self.dialect.text.names:
             return named_script([*lines, *more])
+        if self.dialect.text.variables == "Q":
+            return label_script(lines, self.dialect)
         own = [line for line in lines if not line.block.percent]
         return macro_script([*own, *more], self.dialect)
 
@@ -177,5 +186,5 @@ class FollowingReader(Reader):
                 self.blocks, self.started = blocks, True
                 super()._run(line, first)
         self.blocks, self.started, self.insert_at = blocks, started, insert_at
-        assert self.calls is not None
-        self.calls.finish()
+        if self.calls is not None:
+            self.calls.finish()

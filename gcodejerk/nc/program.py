@@ -189,7 +189,13 @@ def open_reader(
     if chosen.unknown_lasts:
         file = seekable(file)
         returns = may_go_back(file, chosen, name)
-    if not refers(chosen):
+    labels = chosen.text.variables == "Q"
+    if labels:
+        file = seekable(file)
+    reader: Reader
+    if labels and worth_following(file, chosen):
+        reader = FollowingReader(name, chosen, start, None, Elsewhere())
+    elif not refers(chosen):
         reader = Reader(name, chosen, start)
         if chosen.text.o_word == "flow" and (start.positions or start.startup):
             file = seekable(file)

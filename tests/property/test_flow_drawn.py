@@ -1,8 +1,8 @@
-"""Flow of Siemens and of macro B: drawn structures, run in plain Python, against both readers.
+"""Flow of Siemens, macro B and Heidenhain: drawn structures, run in plain Python, both readers.
 
-No interpreter of either control is at hand. A program is drawn as a structure (loops, branches,
+No interpreter of these controls is at hand. A program is drawn as a structure (loops, branches,
 calls, assignments, moves); `Control` runs the structure, with values for the variables that nobody
-knows, and `Siemens` and `MacroB` write it down. Both readers read the text.
+knows, and `Siemens`, `MacroB`, `Klartext` and `DinIso` write it down. Both readers read the text.
 """
 
 import io
@@ -25,6 +25,8 @@ STARTS = {
     "siemens": Start(positions=HOME, offsets={"G54": HOME}, startup="G710 G64"),
     "fanuc": Start(positions=HOME, offsets={"G54": HOME}, decimal_point="calculator"),
     "haas": Start(positions=HOME, offsets={"G54": HOME}, decimal_point="calculator"),
+    "klartext": Start(positions=HOME),
+    "heidenhain-iso": Start(positions=HOME),
 }
 MINE = ("a", "b", "c")
 HIDDEN = ("h", "k")
@@ -332,6 +334,200 @@ class MacroB(Writer):
         return "\n".join(self.lines).encode() + b"\n"
 
 
+@dataclass
+class Labels(Writer):
+    """What both languages of Heidenhain share: labels, jumps on a condition, Q parameters."""
+
+    names: ClassVar = {
+        "a": "Q1",
+        "b": "QL2",
+        "c": "Q03",
+        "h": "Q90",
+        "k": "Q91",
+        "i": "Q21",
+        "j": "Q22",
+        "l": "Q23",
+    }
+
+    def number(self, value):
+        return f"{value:+g}"
+
+    def body(self, statements):
+        for statement in statements:
+            kind, *rest = statement
+            if kind == "move":
+                rest[1] = {axis: self.single(axis, value) for axis, value in rest[1].items()}
+            self.places[id(statement)] = len(self.lines) + 1
+            getattr(self, "do_" + kind.replace("if", "if_"))(*rest)
+
+    def single(self, axis, value):
+        """A word has room for one parameter."""
+        if isinstance(value, tuple):
+            self.do_set(name := "XYZ".index(axis) + 80, value)
+            return name
+        return value
+
+    def operand(self, value):
+        return f"Q{value}" if isinstance(value, int) else super().operand(value)
+
+    def do_set(self, name, value):
+        if isinstance(value, tuple) and self.label() % 2:
+            self.function(self.operand(name), value)
+        else:
+            self.block(f"{self.operand(name)} = {self.sum(value)}")
+
+    def do_if_(self, condition, yes, no):
+        other, end = self.label(), self.label()
+        self.jump(condition, other)
+        self.body(no)
+        self.jump((0.0, "==", 0.0), end)
+        self.mark(other)
+        self.body(yes)
+        self.mark(end)
+
+    def do_skip(self, condition, body):
+        label = self.label()
+        self.jump(condition, label)
+        self.body(body)
+        self.mark(label)
+
+    def do_while(self, count, body):
+        self.do_for(1, count, body)
+
+    def do_again(self, count, body):
+        name, label = COUNTERS[self.depth], self.label()
+        self.depth += 1
+        self.do_set(name, 0.0)
+        self.mark(label)
+        self.body(body)
+        self.do_set(name, (name, "+", 1.0))
+        self.jump((name, "<", float(count)), label)
+        self.depth -= 1
+
+    def do_for(self, first, last, body):
+        name, label, end = COUNTERS[self.depth], self.label(), self.label()
+        self.depth += 1
+        self.do_set(name, float(first))
+        self.mark(label)
+        self.jump((name, ">", float(last)), end)
+        self.body(body)
+        self.do_set(name, (name, "+", 1.0))
+        self.jump((0.0, "==", 0.0), label)
+        self.mark(end)
+        self.depth -= 1
+
+    def do_part(self, count, body):
+        label = self.label()
+        self.mark(label)
+        self.body(body)
+        self.call(label, count)
+
+    def do_call(self, name, value, count):
+        self.do_set("c", value)
+        for _ in range(count):
+            self.call(900 + int(name[1]), 0)
+
+    def programs(self, programs):
+        self.body(programs[""])
+        self.block("M30")
+        for name in ("S1", "S2"):
+            self.mark(900 + int(name[1]))
+            own = {key: f"Q{4 + int(name[1])}{k}" for k, key in enumerate(COUNTERS)}
+            self.names = {**Labels.names, **own}
+            self.body(programs[name])
+            self.mark(0)
+
+
+@dataclass
+class Klartext(Labels):
+    def block(self, text):
+        self.write(f"{len(self.lines)} {text}")
+
+    def word(self, axis, value):
+        return f"{axis}{self.operand(value)}"
+
+    def function(self, name, value):
+        a, how, b = value
+        number = " +-*".index(how)
+        self.block(f"FN {number}: {name} = {self.operand(a)} {how} {self.operand(b)} ; computed")
+
+    def jump(self, condition, label):
+        a, how, b = condition
+        k = ["==", "<>", ">", "<"].index(how)
+        word = ["EQU", "NE", "GT", "LT"][k]
+        test = f"IF {self.operand(a)} {word} {self.operand(b)}"
+        self.block(f"FN {9 + k}: {test} GOTO LBL {label}")
+
+    def mark(self, label):
+        self.block(f"LBL {label}")
+
+    def call(self, label, again):
+        text = f" REP {again}" if again % 2 else f" REP {again}/{again}"
+        self.block(f"CALL LBL {label}" + (text if again else ""))
+
+    def do_mode(self, code):
+        self.block("M8")
+
+    def do_move(self, code, axes):
+        step = "" if code else "I"  # an increment stands in front of each axis here
+        words = [step + self.word(axis, value) for axis, value in axes.items()]
+        self.block(" ".join(["L", *words, "F500" if code == "G1" else "FMAX"]))
+
+    def do_place(self, at):
+        words = [self.word(axis, value) for axis, value in zip("XYZ", at, strict=True)]
+        self.block("L " + " ".join(words) + " R0 FMAX")
+
+    def file(self, programs):
+        self.write("BEGIN PGM MAIN MM")
+        self.block("L X+0 Y+0 Z+0 R0 F500")
+        self.programs(programs)
+        self.block("END PGM MAIN MM")
+        return "\n".join(self.lines).encode() + b"\n"
+
+
+@dataclass
+class DinIso(Labels):
+    def block(self, text):
+        self.write(f"N{len(self.lines)}0 {text} *")
+
+    def word(self, axis, value):
+        return f"{axis}{self.operand(value)}"
+
+    def function(self, name, value):
+        a, how, b = value
+        k = " +-*".index(how)
+        self.block(f"D0{k} {name} P01 {self.operand(a)} P02 {self.operand(b)}")
+
+    def jump(self, condition, label):
+        a, how, b = condition
+        k = 9 + ["==", "<>", ">", "<"].index(how)
+        self.block(f"D{k:02d} P01 {self.operand(a)} P02 {self.operand(b)} P03 {label}")
+
+    def mark(self, label):
+        self.block(f"G98 L{label}")
+
+    def call(self, label, again):
+        self.block(f"L{label},{again}")
+
+    def do_mode(self, code):
+        self.block(code)
+
+    def do_move(self, code, axes):
+        words = [self.word(axis, value) for axis, value in axes.items()]
+        self.block(" ".join([*([code] if code else []), *words]))
+
+    def do_place(self, at):
+        words = [self.word(axis, value) for axis, value in zip("XYZ", at, strict=True)]
+        self.block("G90 G00 " + " ".join(words))
+
+    def file(self, programs):
+        self.write("%MAIN G71 *")
+        self.block("G17 G90 G40 G01 F500")
+        self.programs(programs)
+        self.write("N99999 %MAIN G71 *")
+        return "\n".join(self.lines).encode() + b"\n"
+
+
 class TooLongError(Exception):
     """A loop of thousands of lines."""
 
@@ -339,8 +535,8 @@ class TooLongError(Exception):
 class Control:
     """Runs structures; every pass over a line that moves is noted."""
 
-    def __init__(self, programs, places, hidden, siemens):
-        self.programs, self.places, self.siemens = programs, places, siemens
+    def __init__(self, programs, places, hidden, dialect):
+        self.programs, self.places, self.dialect = programs, places, dialect
         self.shared = dict(zip(HIDDEN, hidden, strict=True))
         self.local = {}
         self.at, self.motion, self.incremental = [0.0] * 3, "G0", False
@@ -355,8 +551,13 @@ class Control:
             return (self.local if self.is_local(operand) else self.shared).get(operand, 0.0)
         return operand
 
+    @property
+    def labels(self):
+        """Subprograms are parts of the one program, and share its parameters."""
+        return self.dialect in ("klartext", "heidenhain-iso")
+
     def is_local(self, name):
-        return name == "b" or (name == "c" and self.inside)
+        return not self.labels and (name == "b" or (name == "c" and self.inside))
 
     def holds(self, condition):
         a, how, b = condition
@@ -373,13 +574,15 @@ class Control:
         kind, *rest = statement
         before = tuple(self.at)
         if kind == "mode":
-            self.incremental = rest[0] == "G91"
+            self.incremental = rest[0] == "G91" and self.dialect != "klartext"
         elif kind == "place":
             self.incremental, self.motion = False, "G0"
             self.at = list(rest[0])
             self.note(statement, before)
         elif kind == "move":
-            self.motion = rest[0] or self.motion
+            spoken = self.dialect == "klartext"
+            self.motion = rest[0] or ("G0" if spoken else self.motion)
+            self.incremental = not rest[0] if spoken else self.incremental
             new = {a: self.value(v) for a, v in rest[1].items()}
             for axis, value in new.items():
                 k = "XYZ".index(axis)
@@ -403,6 +606,8 @@ class Control:
 
     def call(self, name, value, count):
         given = self.value(value)
+        if self.labels:
+            self.shared["c"] = given
         for _ in range(count):
             kept, inside = self.local, self.inside
             self.local, self.inside = {"b": 4.0, "c": given}, True
@@ -431,7 +636,7 @@ def cut(data):
 def judge(programs, writer, dialect, hidden, apart=False):
     """Check both readers; rapids that ran, those that are certain, and those that are confirmed."""
     data = writer.file(programs)
-    control = Control(programs, writer.places, hidden, dialect == "siemens")
+    control = Control(programs, writer.places, hidden, dialect)
     start = STARTS[dialect]
     if apart:
         data, files = cut(data)
@@ -474,7 +679,13 @@ def judge(programs, writer, dialect, hidden, apart=False):
     return data, rapids, alike, confirmed
 
 
-WRITERS = [("siemens", Siemens), ("fanuc", MacroB), ("haas", MacroB)]
+WRITERS = [
+    ("siemens", Siemens),
+    ("fanuc", MacroB),
+    ("haas", MacroB),
+    ("klartext", Klartext),
+    ("heidenhain-iso", DinIso),
+]
 SEEDS = range(30)
 
 
@@ -497,7 +708,7 @@ def test_without_unknown_variables_everything_is_known(dialect, writer):
             assert certain >= alike, data.decode()
 
 
-@pytest.mark.parametrize(("dialect", "writer"), WRITERS)
+@pytest.mark.parametrize(("dialect", "writer"), WRITERS[:3])
 def test_subprograms_in_files_of_their_own_are_followed_like_those_of_the_file(dialect, writer):
     followed = 0
     for seed in SEEDS[:12]:
@@ -515,7 +726,7 @@ def test_subprograms_in_files_of_their_own_are_followed_like_those_of_the_file(d
     assert followed > 8
 
 
-@pytest.mark.parametrize(("dialect", "writer"), WRITERS[:2])
+@pytest.mark.parametrize(("dialect", "writer"), WRITERS[:2] + WRITERS[3:])
 def test_a_wrong_start_or_end_is_noticed_on_every_pass(dialect, writer):
     """What `nc` might get wrong of a variable or of a jump shows as another start or end."""
     noticed = 0
@@ -535,7 +746,7 @@ def test_a_wrong_start_or_end_is_noticed_on_every_pass(dialect, writer):
     assert noticed > 60
 
 
-@pytest.mark.parametrize(("dialect", "writer"), WRITERS[:2])
+@pytest.mark.parametrize(("dialect", "writer"), WRITERS[:2] + WRITERS[3:])
 def test_a_rapid_that_differs_from_pass_to_pass_is_noticed(dialect, writer):
     """Were all passes taken for the first one, the second reading would say so."""
     noticed = 0
@@ -546,7 +757,7 @@ def test_a_rapid_that_differs_from_pass_to_pass_is_noticed(dialect, writer):
         if judged is None:
             continue
         data, rapids, *_ = judged
-        control = Control(drawing, written.places, (0.0, 0.0), dialect == "siemens")
+        control = Control(drawing, written.places, (0.0, 0.0), dialect)
         control.body(drawing[""])
         passes = {}
         for line, before, now, rapid in control.passes:

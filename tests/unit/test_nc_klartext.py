@@ -121,7 +121,7 @@ def test_the_sample_of_another_editor_has_its_two_certain_rapids():
         (["STOP M0", "L X+1 FMAX", "L X+2 FMAX"], [START_UNKNOWN, None]),
         (["CYCL DEF 5.0 CIRCULAR POCKET", "CYCL DEF 5.5 F50 DR-", "L X+1 FMAX"], [None]),
         (["M30", "LBL 1", "L X+1 FMAX", "L X+2 FMAX", "LBL 0"],
-         ["after the end of the program"] * 2),
+         ["inside a subprogram, loop or conditional block"] * 2),
     ],
 )  # fmt: skip
 def test_what_a_rapid_is_left_alone_for(lines, expected):
@@ -145,9 +145,12 @@ def test_nothing_is_rewritten_behind_what_may_turn_the_frame(line):
     assert None not in behind
 
 
-def test_a_repeated_section_is_read_as_if_anything_stood_in_front_of_it():
-    found = reasons("L X+5 FMAX", "LBL 1", "L IX+5 R0 FMAX", "L X+9 FMAX", "L X+8 FMAX", "L F9")
-    assert found == [None, START_UNKNOWN, START_UNKNOWN, None]
+def test_a_section_that_is_repeated_is_certain_where_its_passes_agree():
+    section = ("LBL 1", "L IX+5 R0 FMAX", "L X+9 FMAX", "L X+8 FMAX")
+    assert reasons("L X+5 FMAX", *section, "L F9") == [None] * 4
+    found = reasons("L X+5 FMAX", *section, "CALL LBL 1 REP 2", "L X+7 FMAX", "L F9")
+    differs = "inside a subprogram, loop or conditional block"
+    assert found == [None, differs, differs, None, None]
 
 
 def test_a_line_keeps_its_words_with_their_places():

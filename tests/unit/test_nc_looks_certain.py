@@ -207,13 +207,42 @@ NOT_CERTAIN = {
         "heidenhain-iso", b"N3 G00 X5 G91 Y5*\nN4 G90*\nN5 G00 X9*\n", Reason.START_UNKNOWN
     ),
     "a subprogram of a label": (
-        "heidenhain-iso", b"N3 L1,0*\nN4 G00 X5 Y5 Z5*\nN5 G00 X9*\n", Reason.NOT_UNDERSTOOD
+        "heidenhain-iso", b"N3 L1,0*\nN4 G00 X5 Y5 Z5*\nN5 G00 X9*\n", Reason.NOT_FOLLOWED
     ),
     "so without the comma": (
         "heidenhain-iso", b"N3 L1*\nN4 G00 G40 G90 X5 Y5 Z5*\nN5 G00 X9*\n",
         Reason.NOT_UNDERSTOOD
     ),
-    "a label": ("heidenhain-iso", b"N3 G98 L1*\nN4 G00 G40 X5*\nN5 G00 X9*\n", NO_DISTANCE),
+    "a label to which a jump may lead": (
+        "heidenhain-iso", b"N3 D09 P01 +Q1 P02 +1 P03 1*\nN4 G91*\nN5 G98 L1*\nN6 G00 X9*\n",
+        NO_DISTANCE
+    ),
+    "a label that is called from nobody knows where": (
+        "heidenhain-iso", b"N3 L1,0*\nN4 G98 L1*\nN5 G91 G00 X9*\nN6 G98 L0*\nN7 G00 X9*\n",
+        Reason.NOT_FOLLOWED
+    ),
+    "a label that ends what nobody called": (
+        "heidenhain-iso", b"N3 G98 L1*\nN4 G98 L0*\nN5 G00 G40 X5*\nN6 G00 X9*\n", NO_DISTANCE
+    ),
+    "a label that stands twice": (
+        "klartext", b"LBL 1\nL X+5 FMAX\nLBL 01\nL X+6 FMAX\nCALL LBL 1 REP 2\nL X+7 R0 FMAX\n",
+        Reason.NOT_UNDERSTOOD
+    ),
+    "a parameter that nobody set": ("klartext", b"L X+Q1 FMAX\n", Reason.EXPRESSION),
+    "one that a cycle may set": ("klartext", b"Q100 = 5\nL X+Q100 FMAX\n", Reason.EXPRESSION),
+    "one behind a call of another program": (
+        "klartext", b"Q1 = 5\nCALL PGM X\nL Y+0 Z+0 R0 FMAX\nL X+Q1 FMAX\n", Reason.EXPRESSION
+    ),
+    "one behind a tool change": (
+        "klartext", b"Q1 = 5\nTOOL CALL 2 Z S99\nL Y+0 Z+0 R0 FMAX\nL X+Q1 FMAX\nL X+0 FMAX\n",
+        Reason.START_UNKNOWN
+    ),
+    "a third of a millimetre": ("klartext", b"Q1 = 1 / 3\nL X+Q1 FMAX\n", Reason.EXPRESSION),
+    "a root without brackets": ("klartext", b"Q1 = SQRT 4\nL X+Q1 FMAX\n", Reason.EXPRESSION),
+    "what the control reads into one": (
+        "klartext", b"Q1 = 5\nFN 18: SYSREAD Q1 = ID270 NR1 IDX1\nL X+Q1 FMAX\n",
+        Reason.EXPRESSION
+    ),
     "somebody jogs at G38": ("heidenhain-iso", b"N3 G38*\nN4 G00 X9*\n", Reason.START_UNKNOWN),
     "a way longer by the radius": (
         "heidenhain-iso", b"N3 G01 G43 Z5 F9*\nN4 G40*\nN5 G00 Z9*\n", Reason.START_UNKNOWN
@@ -300,7 +329,15 @@ STILL_CERTAIN = {
         "heidenhain-iso", b"N3 G00 Z-1 M91*\nN4 G00 X5 Z9*\nN5 G00 X9 Z5*\n"
     ),
     "behind a label": (
-        "heidenhain-iso", b"N3 G98 L1*\nN4 G00 G40 G90 X5*\nN5 G00 X9*\n"
+        "heidenhain-iso", b"N3 G98 L1*\nN4 G01 G40 G90 X5 F99*\nN5 G00 X9*\n"
+    ),
+    "a Q parameter": ("klartext", b"FN 1: Q05 = +2 + -0,5\nQL1 = Q5 * 2\nL X+QL1 FMAX\n"),
+    "a Q parameter in DIN/ISO": ("heidenhain-iso", b"N3 D03 Q05 P01 +2 P02 -4*\nN4 G00 X-Q5*\n"),
+    "behind a label that was called": (
+        "klartext", b"L F99\nCALL LBL 1\nL X+5 FMAX\nM30\nLBL 1\nL IY+3 FMAX\nLBL 0\n"
+    ),
+    "behind a part that runs again": (
+        "heidenhain-iso", b"N3 G01 F99*\nN4 G98 L1*\nN5 G91 X+5*\nN6 G90*\nN7 L1,2*\nN8 G00 X9*\n"
     ),
     "behind a cycle called by M99": (
         "heidenhain-iso", b"N3 G00 X5 M99*\nN4 G00 X5 Y5 Z9*\nN5 G00 X9*\n"

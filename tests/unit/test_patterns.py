@@ -17,7 +17,7 @@ import pytest
 
 import gcodejerk
 from gcodejerk.nc import DIALECTS
-from gcodejerk.nc.text import tokenizer
+from gcodejerk.nc.text import careful
 from gcodejerk.rewrite import feed_moves
 from gcodejerk.verification.bytes import allowed, form, modes
 from gcodejerk.verification.cycles import holes as cycles
@@ -241,7 +241,7 @@ PATTERNS = {
     "words of the second reading": lambda line: reading._WORD.fullmatch(line),
     "run": lambda line: Text(DIALECTS["linuxcnc"], False).take_run(line, 0, False),
     "run with decimals": lambda line: Text(DIALECTS["fanuc"], True).take_run(line, 0, True),
-    "first line": lambda line: tokenizer._LEADER.fullmatch(line),
+    "first line": lambda line: careful._LEADER.fullmatch(line),
     "feed moves": lambda line: feed_moves.look(io.BytesIO(line)),
     "moves of a cycle": lambda line: cycles._MOVE.fullmatch(line),
 }

@@ -176,6 +176,8 @@ class Arithmetic:
     """Letters of the arguments of a macro, #1 first; a blank for one that has no letter."""
     feed: frozenset[str] = frozenset()
     """Variables that read the F in force: ``4109``, ``<_feed>``."""
+    q_parameters: bool = False
+    """Variables are Heidenhain's: Q1, QL1, QR1."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ TNC 360 ISO manual, list of G and M functions (p. 2): G38 stops the program, G43
 and shorten a way along an axis; M91 and M92 make the words of their block machine coordinates, M99
 calls a cycle, M89 calls it at every position from there on. What an M function does that is not
 here may last as well (M128), and nothing is rewritten behind one (`unknown_lasts`). ``L1,2`` calls
-a label. What a G91 behind axis words means for those was not looked up.
+a label; D09 to D12 jump to one. What a G91 behind axis words means for those was not looked up.
 """
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import CYCLE_CALL, MACHINE_WORDS, Dialect, grouped
+from gcodejerk.nc.dialects.dialect import CYCLE_CALL, MACHINE_WORDS, Arithmetic, Dialect, grouped
 from gcodejerk.nc.dialects.spelling import Text
 
 _CYCLES = (
@@ -23,6 +23,16 @@ _CYCLES = (
 )
 _FRAMES = (70, 280, 360, 530, 540, 720, 730, 800, 2470)
 
+Q_PARAMETERS = Arithmetic(
+    # iTNC 530 ISO p. 526: multiplication and division before addition and subtraction. The
+    # comparisons are those of the jumps, and no formula of a program holds one.
+    levels=(("*", "/"), ("+", "-"), ("==", "<>", ">", "<")),
+    functions=frozenset(("SQRT", "SIN", "COS", "TAN", "ABS")),
+    brackets="()",
+    compared="digits",
+    chained=False,
+    q_parameters=True,
+)
 HEIDENHAIN_ISO = Dialect(
     name="heidenhain-iso",
     title="Heidenhain iTNC 530, DIN/ISO",
@@ -61,6 +71,8 @@ HEIDENHAIN_ISO = Dialect(
         }
     ),
     defaults={"feed mode": 940, "path": 640},
+    names=dict.fromkeys(("D9", "D10", "D11", "D12"), "label"),
+    arithmetic=Q_PARAMETERS,
     effects={
         **dict.fromkeys((40, 300, 310, 990), "words"),
         **dict.fromkeys(_CYCLES, "words"),

@@ -13,10 +13,12 @@ manual, list of M functions (M3, M4, M8, M13 and M14 act at the beginning of the
 M5, M9 and M30 at its end; M99 calls a cycle); TNC 306 technical manual p. 4-99 (M89). What cycles
 are mere definitions is general knowledge: nothing but the modes is known behind one that moves.
 
-- LBL may be come to from elsewhere, so nothing is known behind it; behind CALL LBL, CALL PGM,
-  PLANE, FUNCTION, TRANS, cycles that turn, mirror or scale, and every M function that is not here
-  (M128, M140; M89, which calls a cycle behind every move from there on), nothing is rewritten
-  (`unknown_lasts`).
+- CALL LBL, its REP and jumps are followed (`gcodejerk.nc.flow.labels`). In a file in which they
+  cannot be, LBL may be come to from elsewhere, so nothing is known behind it, and nothing is
+  rewritten behind CALL LBL.
+- Behind CALL PGM, PLANE, FUNCTION, TRANS, cycles that turn, mirror or scale, and every M function
+  that is not here (M128, M140; M89, which calls a cycle behind every move from there on), nothing is
+  rewritten (`unknown_lasts`).
 - A TOOL CALL changes the frame, and may move. M91 and M92 make the words of their block machine
   coordinates.
 - It is read only: streams go to a CSV table.
@@ -25,6 +27,7 @@ are mere definitions is general knowledge: nothing but the modes is known behind
 from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import Dialect, Effect, grouped
+from gcodejerk.nc.dialects.heidenhain_iso import Q_PARAMETERS
 from gcodejerk.nc.dialects.spelling import Text
 
 _DEFINITIONS = (
@@ -62,7 +65,7 @@ KLARTEXT = Dialect(
         delete="first",
         o_word="error",
         percent="error",
-        variables="none",
+        variables="Q",
         blanks="between",
     ),
     groups=grouped(
@@ -84,6 +87,7 @@ KLARTEXT = Dialect(
     # An I in front of the axis says that a word is an increment; no code does.
     defaults={"distance": 900, "feed mode": 940, "path": 640},
     names=NAMES,
+    arithmetic=Q_PARAMETERS,
     letters="FSTXYZABCUVW",
     units={700: True, 710: False},
     feed_modes={},

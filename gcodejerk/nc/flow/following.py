@@ -25,7 +25,7 @@ from gcodejerk.nc.interpreter.operations import VACANT
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.runner import Runner
 from gcodejerk.nc.interpreter.variables import converted, is_local
-from gcodejerk.nc.text.block import Line
+from gcodejerk.nc.text.block import Block, Line
 
 MOST_STEPS = 50_000
 """Lines that are run more than once, over the whole file."""
@@ -80,6 +80,17 @@ def _heads(script: Script) -> frozenset[int]:
             heads.update(script.numbers.values())
         heads.update(target for target in (op.yes, op.no) if LOST < target <= at)
     return frozenset(heads)
+
+
+def _only_names(block: Block) -> bool:
+    """Whether the first line of a program does no more; ``%PART G71`` of Heidenhain does."""
+    says = any(word.letter == "G" for word in block.words)
+    return block.o_word is not None or (block.percent and not says)
+
+
+def _begins(block: Block) -> bool:
+    """Whether a line says what a subprogram is given."""
+    return any(name.name == "PROC" for name in block.names)
 
 
 class Follower:
@@ -177,9 +188,7 @@ class Follower:
         line, op = self.script.lines[at], self.script.ops.get(at)
         block = line.block
         if op is None:
-            first = at == unit.first and bool(block.o_word is not None or block.percent)
-            proc = bool(self._calls) and any(name.name == "PROC" for name in block.names)
-            if first or proc:
+            if (at == unit.first and _only_names(block)) or (self._calls and _begins(block)):
                 ways.go(at + 1, state)
             else:
                 self._block(unit, at, line, state, ways)
@@ -418,6 +427,8 @@ class Follower:
             ways.returned = state if ways.returned is None else join(ways.returned, state)
         elif self._is_named:
             self._end(state)
+        elif self.runner.dialect.text.variables == "Q":
+            raise NotFollowedError  # an LBL 0 that nobody called
         else:
             self._go(at, unit.first, state, ways)
 

@@ -28,7 +28,7 @@ from gcodejerk.nc.interpreter.named_cycles import certain_call, come_back
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import converted, fills, named_assignment
 from gcodejerk.nc.text.block import Name
-from gcodejerk.nc.text.tokenizer import CHECKSUM
+from gcodejerk.nc.text.careful import CHECKSUM
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 

@@ -35,7 +35,8 @@ _WITH_EXPONENT = re.compile(
     rb"((?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))(?:EX([-+]?[0-9]{1,3}))?(?![A-Z0-9_.])"
 )
 _IDENTIFIER = re.compile(rb"\$?[A-Z_][A-Z0-9_]*")
-_R = re.compile(rb"R[0-9]+")
+_R = re.compile(rb"(R)([0-9]+)")
+_Q = re.compile(rb"(Q[LR]?)([0-9]+)")
 
 
 class NotComputableError(Exception):
@@ -210,8 +211,9 @@ class NamedReader(Reader):
             return float(name == "TRUE")
         if name in self.rules.functions:
             return self.called(name)
-        if _R.fullmatch(match[0]):
-            name = f"R{int(name[1:])}"
+        pattern = _Q if self.rules.q_parameters else _R
+        if parameter := pattern.fullmatch(match[0]):
+            name = f"{parameter[1].decode()}{int(parameter[2])}"
         if self.next() == b"[":
             name = self.indexed(name)
         if self.next() == b"(":

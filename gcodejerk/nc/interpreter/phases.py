@@ -131,7 +131,7 @@ class Phases(Effects):
             state.put("cycle_level", NAN)
         if dialect.length_word in values and "tool length" not in codes.g:
             frames.tool_length(state, 0, values, {}, dialect)
-        if dialect.tool_frame & {"T"} & set(values) and dialect.text.variables == "R":
+        if dialect.tool_frame & {"T"} & set(values) and dialect.text.variables in ("R", "Q"):
             forget_shared(state, dialect.arithmetic)
         if not dialect.tool_frame.isdisjoint(values):
             state.lose("tool")

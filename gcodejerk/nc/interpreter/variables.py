@@ -20,7 +20,10 @@ from gcodejerk.nc.text.cursor import LARGEST
 _INCREMENT_DECIMALS = (3, 4)
 """Of the least increment: 0.001 mm or degrees, 0.0001 inch."""
 _POSITIONS = frozenset("XYZABCUVWIJKR")
-_R_NAME = re.compile(r"R[0-9]+")
+_SHARED = re.compile(r"R[0-9]+")
+"""R parameters of Siemens, which all programs of a control have in common."""
+_OF_PROGRAMS = re.compile(r"Q(?:[0-9]{1,2}|L[0-9]+)")
+"""Those of Heidenhain that no cycle and no function of the control sets (iTNC 530 ISO p. 276)."""
 _SET = re.compile(rb"[ \t]*(?:\[([^\]]*)\])?[ \t]*=(?!=)(.*)", re.DOTALL)
 _FILLS = re.compile(rb"[ \t]*(?:SET|REP)[ \t]*\(", re.IGNORECASE)
 _READ = re.compile(rb"#([0-9]+|<[^<>]*>|[#\[])")
@@ -40,8 +43,10 @@ def is_local(name: str, rules: Arithmetic) -> bool:
     """Whether a variable belongs to one program or subprogram alone."""
     if name.isdigit():
         return 1 <= int(name) <= rules.local
+    if rules.q_parameters:
+        return name.startswith("QL")
     if rules.brackets == "()":
-        return not _R_NAME.fullmatch(name)  # DEF: of the program that declares it
+        return not _SHARED.fullmatch(name)  # DEF: of the program that declares it
     return name.startswith("<") and not name.startswith("<_")
 
 
@@ -49,6 +54,8 @@ def _can_be_known(name: str, rules: Arithmetic) -> bool:
     """Whether what the program sets is what it finds later."""
     if name.isdigit():
         return 1 <= int(name) < rules.system
+    if rules.q_parameters:
+        return _OF_PROGRAMS.fullmatch(name) is not None
     return not (name.startswith("<_") and name[2:-1] in _READ_ONLY)
 
 
@@ -175,8 +182,10 @@ def forget_shared(state: State, rules: Arithmetic) -> None:
 def word_value(word: Word, variables: Mapping[str, float], rules: Arithmetic, inch: bool) -> float:
     """Compute the number of a word; NaN where it is not certain to the last digit that counts."""
     text = word.text[1:] if b"=" not in word.text else word.text.partition(b"=")[2]
-    if word.function:
+    if b"(" in text and word.function:
         text = text.partition(b"(")[2].rstrip(b" \t").removesuffix(b")")
+    elif word.function:
+        text = text[1:]  # IX+Q5 of Klartext
     if not rules.exact and rules.brackets == "[]" and b"ROUND" in text.upper():
         return NAN  # in a word it rounds to the least increment
     value = evaluate(text, variables, rules)

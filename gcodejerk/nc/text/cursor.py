@@ -10,6 +10,7 @@ import re
 
 from gcodejerk.nc.dialects.spelling import Text
 from gcodejerk.nc.text.block import Word
+from gcodejerk.nc.text.q_parameters import VALUE
 
 LARGEST = 1e9
 """Numbers beyond this are not understood: no machine has such an axis."""
@@ -81,6 +82,9 @@ class Cursor:
             if self.text[after : after + 1] in (b"#", b"["):
                 self.at = after
                 byte = self.text[after : after + 1]
+        if self.rules.variables == "Q" and (parameter := VALUE.match(self.text, self.at)):
+            self.at = parameter.end()
+            return None
         if byte in (b"#", b"[") or byte.isalpha():
             if self.rules.variables != "#":
                 raise SyntaxProblem("a number is missing", begin)

@@ -13,12 +13,13 @@ import re
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.text.block import Block, Name, Word
+from gcodejerk.nc.text.q_parameters import formula, klartext_function
 
 _HEAD = re.compile(rb"[ \t]*(/[ \t]*)?(?:([0-9]+)(?:[ \t]+|$))?(/[ \t]*)?")
 _STATEMENTS = (
     *("BEGIN PGM", "END PGM", "BLK FORM", "TOOL CALL", "TOOL DEF", "CYCL CALL"),
-    *("STOP", "LBL", "APPR", "DEP", "RND", "CHF", "CTP", "FCT", "FLT", "FPOL", "CC", "CP", "CR"),
-    *("CT", "LP", "FL", "FC", "C", "L"),
+    *("CALL LBL", "STOP", "LBL", "APPR", "DEP", "RND", "CHF", "CTP", "FCT", "FLT", "FPOL", "CC"),
+    *("CP", "CR", "CT", "LP", "FL", "FC", "C", "L"),
 )
 _STATEMENT = re.compile(
     rb"(?:(CYCL)[ \t]+DEF[ \t]+([0-9]+)(?:\.[0-9]+)?(?![0-9])|(FN)[ \t]*([0-9]+)[ \t]*:|("
@@ -37,6 +38,9 @@ _RADIUS = re.compile(rb"R([0LR])(?![A-Za-z0-9.,+-])", re.IGNORECASE)
 _M = re.compile(rb"M[ \t]*([0-9]{1,3})", re.IGNORECASE)
 _END = re.compile(rb"(?=[ \t;]|$)")
 _ASSIGNED = re.compile(rb"Q[LRS]?[0-9]+[ \t]*=", re.IGNORECASE)
+_STRING = re.compile(rb"QS", re.IGNORECASE)
+_SETTING = frozenset(("FN 18", *(f"FN {n}" for n in (*range(9), 13))))
+"""Functions that set a parameter."""
 _UNITS = re.compile(rb".*[ \t](MM|INCH)[ \t]*", re.IGNORECASE)
 _TOOL = re.compile(rb"[ \t]+(?:([0-9]+)(?:\.[0-9]+)?(?![0-9])|\"[^\"]*\"|Q)", re.IGNORECASE)
 _SIDES = {b"0": 40.0, b"L": 41.0, b"R": 42.0}
@@ -56,6 +60,8 @@ class _Line:
         self.text, self.at, self.dialect = text, 0, dialect
         self.words: list[Word] = []
         self.names: list[Name] = []
+        self.assigns: list[str] = []
+        self.assigned: list[bytes] = []
         self.comments: list[tuple[int, int]] = []
         self.delete = False
 
@@ -109,7 +115,10 @@ class _Line:
     def _rest(self, end: int, goes_on: bool) -> None:
         """Take parameters, or M functions that stand alone; nothing else has no name."""
         if _ASSIGNED.match(self.text, self.at, end):
-            self.names.append(Name("Q", self.text[self.at : end]))
+            said = self.text[self.at : end]
+            self.names.append(Name("Q", said))
+            if not _STRING.match(said):
+                self._assign(formula(said))
         elif goes_on or not _M.match(self.text, self.at, end):
             raise _ProblemError("statement is not known")
         else:
@@ -182,6 +191,8 @@ class _Line:
     def _other(self, name: str, end: int) -> None:
         """Take a statement that the table has by its name."""
         rest = self.text[self.at : end]
+        if name in _SETTING:
+            self._assign(klartext_function(int(name[3:]), rest))
         if name == "TOOL CALL" and (tool := _TOOL.match(self.text, self.at, end)):
             self._word("T", _number(tool[1]), tool.start(), tool.end())
         for match in re.finditer(rb"(?<![A-Za-z0-9])R([0LR])(?![A-Za-z0-9.,+-])", rest):
@@ -194,6 +205,12 @@ class _Line:
             begin = self.at + feed.start()
             self._word("F", _number(feed[2]), begin, self.at + feed.end())
         self.names.append(Name(name, rest))
+
+    def _assign(self, found: tuple[str, bytes] | None) -> None:
+        """Set a parameter; which one, and to what, may not be known."""
+        name, said = found or ("", b"")
+        self.assigns.append(name)
+        self.assigned.append(said)
 
     def _blank(self, end: int) -> bool:
         """Pass over blanks; whether something follows."""
@@ -241,6 +258,8 @@ def parse_klartext(text: bytes, dialect: Dialect) -> Block:
         words=tuple(line.words),
         comments=tuple(line.comments),
         block_delete=line.delete,
+        assigns=tuple(line.assigns),
+        assigned=tuple(line.assigned),
         rest=rest,
         problem=problem,
         column=column,

@@ -30,9 +30,10 @@ from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
 from gcodejerk.verification.second_reading.looking import begins_again, jumps_back
 from gcodejerk.verification.second_reading.reading import Line, Text, pieces
 from gcodejerk.verification.second_reading.routes import LostError, calls, flows
+from gcodejerk.verification.second_reading.stepping import Stepper
 from gcodejerk.verification.second_reading.straight import Column, PlainLines, Straight, follow
 from gcodejerk.verification.second_reading.tracking import Tracker
-from gcodejerk.verification.second_reading.walking import Stepper, Walker, given_up
+from gcodejerk.verification.second_reading.walking import Walker, given_up
 
 MOST_BYTES = 4_000_000
 """Of a file whose flow is followed."""
@@ -262,7 +263,8 @@ def _as_it_flows(
             walked = _walked(whole, stepper, new, rest)
             if walked is not None:
                 return walked
-    return {} if walks else None
+    # what is not followed is read from above, as far as nobody else can come there
+    return {} if walks and dialect.text.variables != "Q" else None
 
 
 def _from_above(

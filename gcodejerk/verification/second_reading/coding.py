@@ -98,6 +98,7 @@ class Codes(Known):
                 self.g["compensation"] = round(number * 10.0)
             elif letter == "T":
                 self.tool = [NAN] * len(AXES)
+                self.forget_shared()  # T may run a cycle of the builder's
             elif letter == "M" and number in (3, 4, 5, 13, 14):
                 self.spindle = None
             elif letter == "M":

@@ -13,7 +13,7 @@ import re
 from collections.abc import Mapping
 from functools import cache
 
-from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect
 from gcodejerk.verification.second_reading.operating import (
     VACANT,
     angle_of,
@@ -357,9 +357,16 @@ class Computer:
 
     def is_local(self, name: str) -> bool:
         """Whether a variable belongs to one program alone."""
-        if self.named:
-            return not (name[:1] == "R" and name[1:].isdigit())
-        return name.isdigit() and int(name) <= self.rules.local
+        return is_local(name, self.rules)
+
+
+def is_local(name: str, rules: Arithmetic) -> bool:
+    """Whether a variable belongs to one program alone."""
+    if name.isdigit():
+        return int(name) <= rules.local
+    if rules.q_parameters:
+        return name.startswith("QL")
+    return rules.brackets == "()" and not (name[:1] == "R" and name[1:].isdigit())
 
 
 def _key(text: bytes) -> str:

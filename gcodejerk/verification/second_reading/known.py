@@ -17,6 +17,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G54_1, G90
 from gcodejerk.units import MM_PER_INCH as INCH
+from gcodejerk.verification.second_reading.computing import is_local
 from gcodejerk.verification.second_reading.reading import NAN
 
 KINDS = {
@@ -224,12 +225,7 @@ class Known:
     def forget_shared(self) -> None:
         """Lose the variables that a program of the builder's can have set."""
         rules = self.dialect.arithmetic
-        self.variables = {
-            name: value
-            for name, value in self.variables.items()
-            if (name.isdigit() and int(name) <= rules.local)
-            or (rules.brackets == "()" and not (name[:1] == "R" and name[1:].isdigit()))
-        }
+        self.variables = {n: v for n, v in self.variables.items() if is_local(n, rules)}
 
     def lose_offsets(self) -> None:
         """Lose what lies between machine and program coordinates."""
@@ -362,7 +358,7 @@ class Known:
 
     def lose_tool(self, *, by_t: bool) -> None:
         """Another tool, or another offset of it; T may run a cycle of the builder's."""
-        if by_t and self.dialect.text.variables == "R":
+        if by_t and self.dialect.text.variables in ("R", "Q"):
             self.forget_shared()
         self.tool = [NAN] * len(AXES)
         self.lose()

@@ -43,6 +43,8 @@ _SETTING = re.compile(rb"#+(?:[0-9]+|<[^<>]*>)=[-+]*(?:#+(?:[0-9]+|<[^<>]*>)|" +
 """An assignment of one operand, behind which words may follow; without blanks."""
 _COMPUTED = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+)?[ \t]*#[ \t]*[#\[].*=")
 _PERCENT = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?%")
+_HEAD_WITH_UNIT = re.compile(rb"(?:N[0-9]+[ \t]*)?%[^ \t]+[ \t]+G[ \t]*(7[01])[ \t\0]*")
+"""``%PART G71`` of Heidenhain."""
 _LEADER = re.compile(rb"%[ \t]*(?:[O:][ \t]*[0-9]{1,8})?[ \t\0]*")
 _DEF = re.compile(
     rb"(?:N[0-9]+[ \t]*)?DEF[ \t]+(?:REAL|INT|BOOL|CHAR|STRING[ \t]*\[[0-9]+\])[ \t]+"
@@ -306,6 +308,8 @@ class Text:
             line.understood = text == b"%" or (rules.percent == "named" and b" " not in text)
             leader = rules.percent == "leader" and _LEADER.fullmatch(text)
             line.understood = line.understood or bool(leader)
+            if rules.variables == "Q" and (unit := _HEAD_WITH_UNIT.fullmatch(text)):
+                line.understood, line.words = True, [("G", float(unit[1]), True)]
         elif rules.o_word != "error" and (match := _O_WORD.match(text)):
             line.flow = match[2].decode()
         elif (rules.hexadecimal and _HEXADECIMAL.search(text)) or is_too_much(text, self.dialect):

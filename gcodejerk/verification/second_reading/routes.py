@@ -17,6 +17,9 @@ _FLOW_NAMED = re.compile(
     rb"(?<![A-Z0-9_])(?:GOTO[FBC]?|FOR|WHILE|LOOP|REPEATB?|IF|PROC)(?![A-Z0-9_])|%_N_",
     re.IGNORECASE,
 )
+_FLOW_LABELLED = re.compile(
+    rb"(?<![A-Z0-9_])(?:LBL(?![A-Z0-9_])|G[ \t]*98(?![0-9.]))", re.IGNORECASE
+)
 _FLOW_MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[", re.IGNORECASE)
 
 
@@ -28,6 +31,8 @@ def flows(data: bytes, dialect: Dialect) -> bool:
     rules = dialect.text
     if rules.names and rules.variables == "R":
         return _FLOW_NAMED.search(data) is not None
+    if rules.variables == "Q":
+        return _FLOW_LABELLED.search(data) is not None
     programs = bool(rules.keywords) and rules.o_word == "program"
     return programs and _FLOW_MACRO.search(data) is not None
 
@@ -61,7 +66,7 @@ class Way:
     """What a line of flow does."""
 
     what: str
-    """``go``, ``then``, ``count``, ``recount``, ``again``, ``call``, ``back``."""
+    """``go``, ``then``, ``count``, ``recount``, ``again``, ``sub``, ``call``, ``back``."""
     test: bytes | None = None
     """Condition; None where there is none."""
     to: int | None = None
@@ -153,6 +158,9 @@ _ARGUMENT = re.compile(rb"([A-Z])([^A-Z]*(?:[A-Z]{2,}\[[^A-Z]*)*)")
 
 class Routes:
     """The ways of a file."""
+
+    by_code = True
+    """Programs have a head, and M codes return from them."""
 
     def __init__(self, lines: list[bytes], dialect: Dialect) -> None:
         """Find them.

@@ -46,7 +46,8 @@ class Tracker(Circling):
         """Execute a line, and tell what it was."""
         if line.percent:
             self._percent(line)
-            return Observation()
+            if not line.words:
+                return Observation()
         if line.flow is not None:
             self._flow(line.flow)
             return Observation()

@@ -14,12 +14,12 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.verification.second_reading.computing import Computer
 from gcodejerk.verification.second_reading.known import NEAR, Observation
+from gcodejerk.verification.second_reading.labelled import LabelledRoutes
 from gcodejerk.verification.second_reading.operating import VACANT
-from gcodejerk.verification.second_reading.reading import NAN, Text
+from gcodejerk.verification.second_reading.reading import NAN
 from gcodejerk.verification.second_reading.routes import LostError, Part, Routes, Way
+from gcodejerk.verification.second_reading.stepping import Stepper
 from gcodejerk.verification.second_reading.tracking import Tracker
 
 MOST = 100_000
@@ -27,58 +27,8 @@ MOST = 100_000
 _DEEPEST = 9
 _RETURNS = re.compile(rb"(?<![A-Z])M[ \t]*0*(?:99|17)(?![0-9])")
 _ALONE = re.compile(rb"[ \t\0]*(?:N[ \t]*[0-9]+)?[ \t\0]*M[ \t]*0*(?:99|17)[ \t\0;]*")
-_DECLARES = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?DEF[ \t]", re.IGNORECASE)
 _NUMBER = re.compile(rb"N?[0-9]+")
 _LABEL = re.compile(rb"([ \t]*(?:N[0-9]+[ \t]*)?)[A-Za-z_][A-Za-z_][A-Za-z0-9_]*[ \t]*:(?!=)")
-
-
-class Stepper:
-    """Reads and runs lines, with what is computed in them."""
-
-    def __init__(self, text: Text, dialect: Dialect) -> None:
-        self.text, self.dialect = text, dialect
-        self.computer = Computer(dialect)
-        self._computes = self.computer.computes
-
-    def step(self, tracker: Tracker, bare: bytes) -> Observation:
-        """Run one line.
-
-        Parameters
-        ----------
-        tracker : Tracker
-            What is known in front of it, and behind it afterwards.
-        bare : bytes
-            Without its end.
-        """
-        text, variables = self.text, tracker.variables
-        named = self.computer.named
-        says = b"=" in bare or _DECLARES.match(bare) is not None if named else b"#" in bare
-        if not self._computes or not (says or b"[" in bare):
-            return tracker.follow(text.read(bare, not tracker.begun))
-        upper = self.upper(bare)
-        settings = self.computer.settings(upper, variables)
-        inch = tracker.unit is not None and tracker.unit != 1.0
-        spelled, relative = self.computer.spelled(upper, variables, inch)
-        line = text.read(spelled, not tracker.begun)
-        line.relative = relative
-        seen = tracker.follow(line)
-        if settings is None:
-            tracker.variables = {}
-            return seen
-        for name, value in settings.items():
-            known = value == value and line.understood
-            if known and (not line.deleted or variables.get(name) == value):
-                tracker.variables[name] = value
-            else:
-                tracker.variables.pop(name, None)
-        if settings and line.words:
-            seen.sure = False
-        return seen
-
-    def upper(self, bare: bytes) -> bytes:
-        """A line without its comments, in upper case."""
-        comments = None if b"\r" in bare else self.text.comments
-        return (bare if comments is None else comments.sub(b"\0", bare)).upper()
 
 
 class Walker:
@@ -86,7 +36,8 @@ class Walker:
 
     def __init__(self, stepper: Stepper, begin: Callable[[], Tracker], lines: list[bytes]) -> None:
         self.stepper, self._begin, self.lines = stepper, begin, lines
-        self.routes = Routes([stepper.upper(line) for line in lines], stepper.dialect)
+        routes = LabelledRoutes if stepper.dialect.text.variables == "Q" else Routes
+        self.routes = routes([stepper.upper(line) for line in lines], stepper.dialect)
         self.seen: dict[int, Observation] = {}
         self._unsaid: list[tuple[int, int]] = []
         """Lines of which nothing is said."""
@@ -169,6 +120,8 @@ class Walker:
             return self._again(part, at, way, state)
         if way.what == "call":
             return self._call(at, way, state)
+        if way.what == "sub":
+            return self._sub(part, at, way, state)
         return self._return(state, back)
 
     def _value(self, text: bytes | None, state: Tracker) -> float:
@@ -260,6 +213,17 @@ class Walker:
         self._calls.pop()
         return [] if current is None else [(at + 1, current)]
 
+    def _sub(self, part: Part, at: int, way: Way, state: Tracker) -> list[tuple[int, Tracker]]:
+        """``CALL LBL 1``."""
+        if way.to is None or way.to < 0:
+            raise LostError
+        self._enter(part)
+        through, back = self._run(part, part.begin, part.end, way.to, state)
+        if through is not None:
+            raise LostError
+        self._calls.pop()
+        return [] if back is None else [(at + 1, back)]
+
     def _enter(self, part: Part) -> None:
         self._calls.append(part)
         if len(self._calls) > _DEEPEST:
@@ -341,7 +305,7 @@ class Walker:
         bare = self.lines[at]
         upper = self.routes.lines[at]
         head = upper.strip(b" \t\0")
-        if at == part.begin and (head[:1] in (b"%", b"O", b":")):
+        if at == part.begin and self.routes.by_code and head[:1] in (b"%", b"O", b":"):
             state.begun = state.started = True
             return [(at + 1, state)]
         if head == b"%":
@@ -355,9 +319,13 @@ class Walker:
         seen = self.stepper.step(state, bare)
         self.lost = self.lost or state.strayed
         self.seen[at] = seen if at not in self.seen else _common(self.seen[at], seen)
-        if not state.ended:
-            return [(at + 1, state)]
-        returns = _RETURNS.search(upper) is not None
+        return self._ended(upper, before, back) if state.ended else [(at + 1, state)]
+
+    def _ended(
+        self, upper: bytes, before: Tracker, back: list[Tracker]
+    ) -> list[tuple[int, Tracker]]:
+        """Go where a block leads that ends its program, from what was known in front of it."""
+        returns = self.routes.by_code and _RETURNS.search(upper) is not None
         if self.routes.named and self._calls and not returns:
             raise LostError  # M2 and M30 of a subprogram go back to its caller on some controls
         if returns and self._calls:
@@ -372,6 +340,8 @@ class Walker:
         """Go back to the caller."""
         if self._calls:
             back.append(state)
+        elif not self.routes.by_code:
+            raise LostError  # an LBL 0 that nobody called
         return []
 
 

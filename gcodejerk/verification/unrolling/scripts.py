@@ -18,8 +18,9 @@ from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.elsewhere import lines_elsewhere
 from gcodejerk.verification.second_reading.reading import Text
 from gcodejerk.verification.second_reading.routes import LostError, Part, Way
+from gcodejerk.verification.second_reading.stepping import Stepper
 from gcodejerk.verification.second_reading.tracking import Tracker
-from gcodejerk.verification.second_reading.walking import Stepper, Walker
+from gcodejerk.verification.second_reading.walking import Walker
 from gcodejerk.verification.unrolling.blocks import StopError
 
 _MARK = b"\xef\xbb\xbf"
