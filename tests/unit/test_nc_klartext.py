@@ -64,6 +64,8 @@ def end(*lines, unit="MM"):
         ("LP PR+5 PA+30", (math.nan,) * 3 + (None,)),
         ("TOOL CALL 3 Z S900", (math.nan,) * 3 + (None,)),
         ("CYCL CALL", (math.nan,) * 3 + (None,)),
+        ("L M140 MB MAX", (math.nan,) * 3 + (None,)),
+        ("L R0 FMAX M140 MB50 F300", (math.nan,) * 3 + (None,)),
         ("L X+3 FMAX M99", (math.nan,) * 3 + (0,)),
         ("CYCL DEF 7.0 DATUM SHIFT", (math.nan,) * 3 + (None,)),
         ("LBL 1", (math.nan,) * 3 + (None,)),
@@ -130,6 +132,12 @@ def test_what_a_rapid_is_left_alone_for(lines, expected):
     assert [None if r == "feed to restore unknown" else r for r in found] == [
         None if r == "feed to restore unknown" else r for r in expected
     ]
+
+
+def test_what_a_retreat_along_the_tool_leaves_is_known_again_when_it_is_stated():
+    found = reasons("L M140 MB MAX", "L X+5 Y+5 R0 FMAX", "L Z+9 FMAX", "L X+6 FMAX", "L F9")
+    assert found == [START_UNKNOWN, START_UNKNOWN, None]
+    assert reasons("L X+5 FMAX M140 MB MAX", "L X+6 Y+6 Z+6 FMAX", "L X+7 FMAX")[-1] is not None
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,11 @@ are mere definitions is general knowledge: nothing but the modes is known behind
   cannot be, LBL may be come to from elsewhere, so nothing is known behind it, and nothing is
   rewritten behind CALL LBL.
 - Behind CALL PGM, PLANE, FUNCTION, TRANS, cycles that turn, mirror or scale, and every M function
-  that is not here (M128, M140; M89, which calls a cycle behind every move from there on), nothing is
+  that is not here (M128; M89, which calls a cycle behind every move from there on), nothing is
   rewritten (`unknown_lasts`).
+- ``L M140 MB MAX`` retreats along the tool's axis, in its block alone (iTNC 530 manuals, chapter of
+  miscellaneous functions; posts in public write it at every tool change): no place is known behind
+  it. With words of axes beside it, it bars what follows, as an M function that is not here.
 - A TOOL CALL changes the frame, and may move. M91 and M92 make the words of their block machine
   coordinates.
 - It is read only: streams go to a CSV table.
@@ -44,7 +47,7 @@ NAMES: dict[str, Effect] = {
     **dict.fromkeys((f"CYCL DEF {n}" for n in _DATUMS), "frames"),
     **dict.fromkeys(("C", "CP", "CR", "CT", "CTP", "LP"), "home"),
     # F of a corner is its own, and which one is in force behind a cycle was not looked up
-    **dict.fromkeys(("TOOL CALL", "CYCL CALL", "RND", "CHF"), "cycle"),
+    **dict.fromkeys(("TOOL CALL", "CYCL CALL", "M140", "RND", "CHF"), "cycle"),
     "M91": "machine",
     # approaches and free contours begin and end cutter compensation by themselves
     **dict.fromkeys(("LBL", "APPR", "DEP", "FL", "FLT", "FC", "FCT", "FPOL"), "label"),

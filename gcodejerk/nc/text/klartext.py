@@ -36,6 +36,12 @@ _FEED = re.compile(
 )
 _RADIUS = re.compile(rb"R([0LR])(?![A-Za-z0-9.,+-])", re.IGNORECASE)
 _M = re.compile(rb"M[ \t]*([0-9]{1,3})", re.IGNORECASE)
+_RETREAT = re.compile(
+    rb"L(?:[ \t]+R0)?(?:[ \t]+FMAX)?[ \t]+M140[ \t]+MB[ \t]*(?:MAX|" + _NUMBER + rb")"
+    rb"(?:[ \t]+F(?:MAX|" + _NUMBER + rb"))?",
+    re.IGNORECASE,
+)
+"""Away along the axis of the tool, as far as it goes, or so far; nothing else moves."""
 _END = re.compile(rb"(?=[ \t;]|$)")
 _ASSIGNED = re.compile(rb"Q[LRS]?[0-9]+[ \t]*=", re.IGNORECASE)
 _STRING = re.compile(rb"QS", re.IGNORECASE)
@@ -90,6 +96,9 @@ class _Line:
         if end == self.at:
             return
         match = _STATEMENT.match(self.text, self.at, end)
+        if not goes_on and _RETREAT.fullmatch(self.text, self.at, end):
+            self.names.append(Name("M140", b""))
+            return
         if match is None:
             self._rest(end, goes_on)
             return

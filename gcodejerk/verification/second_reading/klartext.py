@@ -15,10 +15,14 @@ _FRONT = re.compile(r"\s*(?P<skip>/)?\s*(?P<number>\d+)?(?P<late>\s*/)?(?:\s+|$)
 _CYCLE = re.compile(r"CYCL\s+DEF\s+(\d+)(?:\.\d+)?(?!\d)")
 _FUNCTION = re.compile(r"FN\s*(\d+)\s*:")
 _LINE = re.compile(r"L(?:\s+(.*))?")
-_VALUE = r"(?:[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)|[+-]?Q[LR]?\d+)"
+_PLAIN = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)"
+_VALUE = rf"(?:{_PLAIN}|[+-]?Q[LR]?\d+)"
 _PIECE = re.compile(
     rf"(?P<step>I?)(?P<axis>[XYZABCUVW])(?P<place>{_VALUE})|R(?P<side>[0LR])"
     rf"|F\s*(?P<feed>MAX|AUTO|{_VALUE})|M\s*(?P<m>\d{{1,3}})"
+)
+_AWAY = re.compile(
+    rf"L(\s+R0)?(\s+FMAX)?\s+M140\s+MB\s*(MAX|{_PLAIN})(\s+F(MAX|{_PLAIN}))?", re.ASCII
 )
 _PARAMETER = re.compile(r"Q[LRS]?\d+\s*=")
 _SIDE = re.compile(r"(?<![A-Z0-9])R([0LR])(?![A-Z0-9.,+-])")
@@ -77,6 +81,9 @@ def read_statement(text: bytes, dialect: Dialect) -> Statement:
     if not said:
         return found
     if _PARAMETER.match(said):
+        return found
+    if _AWAY.fullmatch(said) and not goes_on:
+        found.effects.append(dialect.names["M140"])
         return found
     if (straight := _LINE.fullmatch(said)) and not goes_on:
         return _straight(found, straight[1] or "")
