@@ -131,6 +131,11 @@ ODD_WORDS = (
 )
 
 
+@pytest.mark.parametrize("word", [*ODD_WORDS, "X-1234567890", "G0 Y+12345678901234567890"])
+def test_both_ways_agree_on_an_odd_word_at_the_end_of_a_file(word):
+    assert differences(b"G21 G90\n" + word.encode()) == []
+
+
 HEADS = {
     "siemens": ["G710 G90 G94 G17 G40 G64", "F100"],
     "fagor": ["G71 G90 G94 G17 G40", "F100"],
@@ -139,6 +144,7 @@ HEADS = {
     "klipper": ["G90", "G1 X1 F100"],
     "duet": ["G21", "G90", "G94", "G17", "G1 X1 F100"],
     "fanuc-lathe-a": ["G21 G99 G40 F100."],
+    "klartext": ["0 BEGIN PGM PART MM", "1 L X+0 Y+0 Z+0 R0 F100"],
     "fanuc-lathe-b": ["G21 G95 G90 G40 F100."],
 }
 """What a program begins with, so that runs are taken behind it; most: G21 G90 G94 G17 G40."""
@@ -178,6 +184,8 @@ def beginning(dialect):
     axes = "XZ" if language.lathe == "yes" else "XY"
     code = "" if language.modal_motion else "G0 "
     plain = [f"{code}{axes[n % 2]}{n}.5 {axes[1 - n % 2]}{n + 1}." for n in range(26)]
+    if language.text.klartext:
+        return head, [line.replace(code, "L ") + " FMAX" for line in plain]
     return [*head, *([] if code else ["G0 X0. Z0."])], plain
 
 

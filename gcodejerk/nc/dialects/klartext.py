@@ -96,7 +96,6 @@ KLARTEXT = Dialect(
     feed_modes={},
     paths={640: 64},
     modal_motion=False,
-    quick=False,
     tool_frame=frozenset("T"),
     macro_change=True,
     unknown_lasts=True,

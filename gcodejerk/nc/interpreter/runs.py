@@ -49,7 +49,7 @@ def can_run(state: State, dialect: Dialect) -> bool:
         and state.compensation == G40
         and state.distance is not None
         and state.diameter is not None
-        and state.plane in ARC_CENTRES
+        and (state.plane in ARC_CENTRES or dialect.text.klartext)  # whose arcs are no plain lines
         and state.feed_mode is not None
         and (state.unit is not None or not state.lost)
         and state.touched is None

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.text.joints import BLANK, CR, END, LETTERS, OPEN, STAR, find_joints
 from gcodejerk.nc.text.numbers import AROUND, LONGEST, parse_numbers
+from gcodejerk.nc.text.respelling import respelled
 from gcodejerk.nc.text.words import BIT, COMMENT, DOT, SIGN, Joints, Lines
 
 Flags = NDArray[np.bool_]
@@ -59,6 +60,8 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     Lines
         With the words of the plain lines.
     """
+    if dialect.text.klartext:
+        data = respelled(data)
     complete = data.endswith(b"\n")
     # A line feed stands in front of the first line, and one behind the last.
     text = b"\n" * _PAD + data + (b"" if complete else b"\n") + b"\n" + b"0" * AROUND
@@ -146,7 +149,7 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
         long = part & (width > _WHOLE_DIGITS + 1)
         both = width + np.append(width[1:], 0)  # a number with its point, and its letter
         long |= part & _next(dot) & (both > LONGEST + 1)
-        bad |= long | _before(long & sign)
+        bad |= long
     if dialect.text.digits:
         bad |= _many_digits(joints, width, dialect.text.digits)
     if dialect.whole_numbers == "machine":
