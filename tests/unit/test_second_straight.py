@@ -28,16 +28,33 @@ ODD = [
 ]  # fmt: skip
 
 
+STATEMENTS = [
+    *("3 L X%+.3f Y%-.3f R0 FMAX", "L  Z%+.2f FMAX", "12 L Z%+.1f F%d", "L X%+.1f R0", "L Y5 F%d"),
+    *("7 L  X%+.1f  Y%.2f  Z%+.3f", " 8  L X+.5 FMAX ", "L Z5. F1.5"),
+]
+ODD_STATEMENTS = [
+    *("L FMAX", "L X%+.1f RL", "L X%+.1f R0", "L IX%+.1f FMAX", "L X+Q1 FMAX", "L X+1,5", "L F%d"),
+    *("L Y%+.1f X%+.1f FMAX", "L X%+.1f F300 FMAX", "L X%+.1f FMAX M8", "L X%+.1f FMAX M91", "L"),
+    *("l x%+.1f fmax", "/ L X%+.1f", "L X%+.1f FMAX ;x", "L X%+.1f A+5 FMAX", "L X+1Y+2", "LBL 1"),
+    *("TOOL CALL 5 Z S100", "L Z%+.1f R0 FMAX", "Q1 = %d", "CC X+1 Y+2", "C X+1 Y+2 DR+", "*", ""),
+    *("L M140 MB MAX", "L X%+.1f FMAX F5", "L X%+.1f R0 R0", "L X%+.1f ~", "L X%+.1f F-5", "9"),
+]
+
+
 def filled(form, rng):
     return form % tuple(rng.uniform(1, 90) for _ in range(form.count("%")))
 
 
-def drawn(rng, odd):
+def drawn(rng, odd, klartext=False):
     lines = ["G90 G94 G17 G40 G49", "G21", "G0 X0. Y0. Z5.", "F100."]
+    plain_forms, odd_forms = PLAIN, ODD
+    if klartext:
+        lines = ["0 BEGIN PGM PART MM", "1 L X+0 Y+0 Z+5 R0 F100"]
+        plain_forms, odd_forms = STATEMENTS, ODD_STATEMENTS
     for _ in range(60):
-        form = rng.choice(ODD) if rng.random() < odd else rng.choice(PLAIN)
+        form = rng.choice(odd_forms if rng.random() < odd else plain_forms)
         lines += [filled(form, rng)]
-        lines += [filled(rng.choice(PLAIN), rng) for _ in range(rng.choice((0, 10)))]
+        lines += [filled(rng.choice(plain_forms), rng) for _ in range(rng.choice((0, 10)))]
     return "\n".join([*lines, ""]).encode()
 
 
@@ -53,11 +70,11 @@ def same(a, b):
     return repr(a) == repr(b)
 
 
-@pytest.mark.parametrize("name", ["linuxcnc", "grbl", "fanuc", "haas", "mach"])
+@pytest.mark.parametrize("name", ["linuxcnc", "grbl", "fanuc", "haas", "mach", "klartext"])
 def test_lines_taken_at_once_do_what_they_do_one_by_one(name):
     rng, taken = random.Random(name), 0
     for odd in (0.0, 0.1, 0.4):
-        data = drawn(rng, odd)
+        data = drawn(rng, odd, name == "klartext")
         stepper, plain, tracker = readers(name)
         at = 0
         while at < len(data):

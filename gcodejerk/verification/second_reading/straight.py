@@ -33,6 +33,8 @@ _BLANK = rb"[ \t]*"
 _FEED_LINES = 15
 """Lines without a G0 behind one that has it; more of them are a run (`Text.take_run`)."""
 _NUMBERS_ONLY = bytes(32 if chr(c) in "GNXYZF\r\n\t" else c for c in range(256))
+_FRONT = re.compile(rb"^[ \t]*(?:[0-9]+[ \t]+)?L", re.MULTILINE)
+"""What stands in front of the words of a line in Klartext."""
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 
 
@@ -76,14 +78,7 @@ class PlainLines:
         number = _POINTED if decimals_matter else _NUMBER
         if dialect.text.digits:
             number = number.replace(b"[0-9]+", b"[0-9]{1,4}", 1)
-        words = b"".join(
-            rb"(?:%c" % letter + number + _BLANK + rb")?" for letter in PLAIN_AXES.encode()
-        )
-        block = rb"(?=[XYZ])" + words + rb"(?:F" + _NUMBER + _BLANK + rb")?\r?\n"
-        begin = _BLANK + rb"(?:N[0-9]{1,9}" + _BLANK + rb")?"
-        rapid = begin + rb"G0?0(?![0-9.])" + _BLANK + block
-        other = begin + rb"(?:G0?1(?![0-9.])" + _BLANK + rb")?" + block
-        group = rb"(?:%s(?:%s){0,%d})" % (rapid, other, _FEED_LINES)
+        group = _statement(number) if dialect.text.klartext else _blocks(number)
         self.pattern = re.compile(group + rb"{2,%d}" % MOST_LINES)
         self.possible = self._possible()
 
@@ -94,9 +89,8 @@ class PlainLines:
         letters = {*PLAIN_AXES, "F"}
         taken = {*dialect.increments, *dialect.calls, *dialect.tool_frame, dialect.length_word}
         return (
-            dialect.modal_motion
+            (dialect.modal_motion or rules.klartext)
             and not dialect.one_command
-            and not rules.klartext
             and not dialect.lengths_only
             and not dialect.apart
             and dialect.rapid == 0
@@ -156,13 +150,20 @@ class PlainLines:
             return None
         if self.dialect.arcs_refused and NO_FEED.search(text):
             return None
+        if rules.klartext:
+            text = _FRONT.sub(b"", text).replace(b"R0", b"").replace(b"FMAX", b"G0")
+            characters = np.frombuffer(text, dtype=np.uint8)
+            ends = np.flatnonzero(characters == 10)
         begins = np.flatnonzero(characters >= ord("A"))
         # The words of a line are some of N, G, X, Y, Z, F; each has one number.
         numbers = np.fromstring(text.translate(_NUMBERS_ONLY).decode("ascii"), sep=" ")
         assert len(numbers) == len(begins)
         letters, line = characters[begins], np.searchsorted(ends, begins)
         lines = _Lines(len(ends), letters, line, numbers)
-        g = lines.last("G", 0.0 if tracker.g.get("motion") == 0 else 1.0)
+        if rules.klartext:
+            g = np.where(lines.named("G"), 0.0, 1.0)  # FMAX is for its own line
+        else:
+            g = lines.last("G", 0.0 if tracker.g.get("motion") == 0 else 1.0)
         feed_words = np.flatnonzero(letters == ord("F"))
         points = np.searchsorted(
             np.flatnonzero(characters == ord(".")), np.append(begins, len(text))
@@ -187,6 +188,29 @@ class PlainLines:
             feeds=bool(len(feed_words)),
         )
         return run, match.end()
+
+
+def _words(number: bytes, blank: bytes) -> bytes:
+    """Words of axes in their order, each as `blank` lets it stand."""
+    return b"".join(blank % (b"%c" % letter + number) for letter in PLAIN_AXES.encode())
+
+
+def _blocks(number: bytes) -> bytes:
+    """A line that states G0, and feed moves behind it."""
+    block = rb"(?=[XYZ])" + _words(number, rb"(?:%s" + _BLANK + rb")?")
+    block += rb"(?:F" + _NUMBER + _BLANK + rb")?\r?\n"
+    begin = _BLANK + rb"(?:N[0-9]{1,9}" + _BLANK + rb")?"
+    rapid = begin + rb"G0?0(?![0-9.])" + _BLANK + block
+    other = begin + rb"(?:G0?1(?![0-9.])" + _BLANK + rb")?" + block
+    return rb"(?:%s(?:%s){0,%d})" % (rapid, other, _FEED_LINES)
+
+
+def _statement(number: bytes) -> bytes:
+    """A line of Klartext: ``12 L X+5 Y+2 R0 FMAX``; R0 says nothing where it is in force."""
+    begin = _BLANK + rb"(?:[0-9]{1,9}[ \t]+)?L(?=[ \t]+[XYZ])"
+    words = _words(number, rb"(?:[ \t]+%s(?=[ \t\r\n]))?")
+    feed = rb"(?:[ \t]+F(?:MAX|[0-9]{1,6}(?:\.[0-9]{0,6})?)(?=[ \t\r\n]))?"
+    return rb"(?:" + begin + words + rb"(?:[ \t]+R0(?=[ \t\r\n]))?" + feed + _BLANK + rb"\r?\n)"
 
 
 def follow(tracker: Tracker, run: Straight) -> None:
