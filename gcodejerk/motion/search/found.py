@@ -13,7 +13,7 @@ from gcodejerk.motion.search.blocks import Blocks
 from gcodejerk.motion.search.looked_at import Flags, LookedAt
 from gcodejerk.motion.search.socp import Solution
 
-GUARDED, KEPT = 0.998, 1.008
+GUARDED, KEPT = 0.98, 1.005
 """Share of what guarded frequencies may keep that is designed for; and where they are found to keep
 it: between the frequencies that are looked at it is a little more."""
 

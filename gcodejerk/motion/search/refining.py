@@ -23,7 +23,7 @@ import numpy as np
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.blocks import Blocks
 from gcodejerk.motion.search.cutting import Cutting
-from gcodejerk.motion.search.found import KEPT, Found
+from gcodejerk.motion.search.found import Found
 from gcodejerk.motion.search.looked_at import Index, LookedAt
 from gcodejerk.motion.search.prices import priced_knots
 from gcodejerk.motion.search.socp import Problem
@@ -39,6 +39,9 @@ LITTLE, NOTHING = 3e-3, 1e-4
 ROUGH, NEARLY = 0.15, 0.2
 """Blocks that are refined need the least of theirs to this share only; and where planes say that
 what is allowed is within reach, so much of it may be unknown."""
+CUT = 0.99
+"""A guarded frequency is cut where it keeps more than so much of what it may: what is interpolated
+is wrong by less than the rest."""
 FAR = 100.0
 """Nothing is known while a guarded frequency keeps more than so many times what it may."""
 USED = 0.995
@@ -260,5 +263,5 @@ class _Sought:
 
     def _cut(self, left: Array, most: float) -> bool:
         """Cut what is left with more, or guarded with more than it may; whether any was."""
-        missing = self.looked_at.exceeded(left, np.where(self.modes, most, KEPT))
+        missing = self.looked_at.exceeded(left, np.where(self.modes, most, CUT))
         return self.cutting.cut(missing[self.blocks.owner])
