@@ -30,14 +30,16 @@ CEILING = 0.25
 """Highest guarded frequency, times the interval: above it, four commands a period shape little."""
 WINDOW = 0.15
 """Part of a frequency on each side of it in which today's largest response is its envelope."""
-FINE, MOST = 0.15, 800
+FINE, MOST = 0.15, 8000
 """Distance of frequencies, times the half of a duration, at which a response is looked at [rad],
 and how many at most: a ramp of a second has more than it can be designed for."""
+WIDEST = 1.5
+"""Nothing more is kept back for frequencies farther apart than so much. [rad]"""
 GAP, BETWEEN = 1.5, 4
 """Frequencies farther apart than so many times the usual have something else between them; into how
 many parts the others are cut in search of a narrow."""
-FEWEST = 200
-"""Frequencies at which an envelope is looked at, at least."""
+SAMPLED, FEWEST = 0.1, 200
+"""The same distance for the envelope of today's, and how many frequencies at least."""
 
 
 def guarded_frequencies(poles: Complex, band: float, interval: float, duration: float) -> Array:
@@ -93,15 +95,17 @@ def envelope(today: Profiles, omega: Array) -> Array:
     if not len(omega):
         return np.zeros(0)
     halves = split_at_peak(today)
-    ends = np.column_stack([omega * (1.0 - WINDOW), omega * (1.0 + WINDOW)])
-    low, high = ends[0, 0], ends[-1, 1]
+    low, high = omega[0] * (1.0 - WINDOW), omega[-1] * (1.0 + WINDOW)
     longest = max(float(half.total[0]) for half in halves)
-    count = max(int(np.ceil(0.5 * (high - low) * longest / FINE)), FEWEST)
-    every = np.union1d(np.linspace(low, high, count), ends)
+    count = max(int(np.ceil(0.5 * (high - low) * longest / SAMPLED)), FEWEST)
+    every = np.linspace(low, high, count)
     response = np.add(*(undamped_response(half, every) for half in halves))
-    index = np.searchsorted(every, ends)
-    index[:, 1] = np.minimum(index[:, 1] + 1, len(every) - 1)
-    largest: Array = np.maximum.reduceat(response, index.ravel())[::2]
+    # The largest within the window, or at its ends, which lie between these frequencies.
+    ends = np.column_stack([omega * (1.0 - WINDOW), omega * (1.0 + WINDOW)])
+    beside = np.interp(ends, every, response).max(axis=1)
+    within = np.searchsorted(every, ends).ravel()
+    inside = np.maximum.reduceat(np.append(response, 0.0), within)[::2]
+    largest: Array = np.where(within[1::2] > within[::2], np.maximum(inside, beside), beside)
     return largest
 
 
@@ -128,9 +132,8 @@ def with_narrows(today: Profiles, omega: Array) -> tuple[Array, Array]:
     if len(omega) < 2:
         return omega, envelope(today, omega)
     apart = np.diff(omega)
-    close = np.flatnonzero(
-        apart < GAP * np.median(apart)
-    )  # what lies between others is not guarded
+    # What lies between others is not guarded.
+    close = np.flatnonzero(apart < GAP * np.median(apart))
     shares = np.arange(1, BETWEEN) / BETWEEN
     between = omega[close, np.newaxis] + shares * apart[close, np.newaxis]
     every = np.union1d(omega, between)
@@ -139,6 +142,18 @@ def with_narrows(today: Profiles, omega: Array) -> tuple[Array, Array]:
     narrow = (bound < sides[:-2]) & (bound < sides[2:])
     kept = np.isin(every, omega) | narrow
     return every[kept], bound[kept]
+
+
+def share_between(omega: Array, duration: float) -> float:
+    """What frequencies may keep, of what those between them may: a response has its peaks there.
+
+    Of what lasts some time the response between two frequencies is at most the larger of theirs
+    over the cosine of half their distance, times the half of the duration.
+    """
+    if len(omega) < 2:
+        return 1.0
+    apart = 0.5 * duration * float(np.median(np.diff(omega)))
+    return float(np.cos(0.5 * min(apart, WIDEST)))
 
 
 def undamped_response(profile: Profiles, omega: Array) -> Array:

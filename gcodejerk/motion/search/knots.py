@@ -2,7 +2,8 @@
 
 Short moves have a jerk of their own in every interval. In long ones most of the optimal jerk is
 zero, in cruise and at constant acceleration: a first programme with long blocks shows where it is
-not, and only there are the blocks cut into single intervals. This module owns where knots are.
+not, and only there are the blocks cut. This module owns where knots are at first, and where no
+programme by planes says what they are worth (`prices`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ CRUISE_BLOCKS = 16
 MOST_REFINED, MOST_GUARDED = 1000, 110
 """Blocks of a refined programme at most, and of one with guarded frequencies, which are many: those
 of longer moves stay long."""
+FEW_BLOCKS = 30
+"""The same in the first programme of several."""
 MOST_FINE = 500
 """Moves with a cruise of at most so many intervals have a jerk in each, without a guard."""
 RAMP = 2.0
@@ -63,6 +66,42 @@ def first_knots(count: int, ramp: int, guarded: bool) -> Index:
         cruise = np.linspace(half, count // 2, CRUISE_BLOCKS // 2 + 1).astype(np.int64)
     first = np.union1d(first, cruise)
     return np.union1d(first, count - first)
+
+
+def coarse_knots(move: Move, ramp: int) -> Index:
+    """Ends of the blocks of the first programme of several: few, and those of today's rapid.
+
+    With them, what today's rapid does is nearly one of the profiles: one is within the limits.
+    """
+    count = move.count
+    if count <= FULL_INTERVALS:
+        return np.arange(count + 1)
+    half = ramp or count // 2
+    block = max(BLOCK, -(-half // FEW_BLOCKS))
+    cruise = np.linspace(half, count // 2, CRUISE_BLOCKS // 2 + 1).astype(np.int64)
+    knots = np.concatenate([np.arange(0, half + 1, block), cruise])
+    if move.today is not None:
+        knots = np.concatenate([knots, _todays(move, count)])
+    return np.union1d(knots, count - knots)
+
+
+def coarse_ramp(move: Move, ramp: int) -> Index:
+    """The same for a ramp of so many intervals."""
+    block = max(BLOCK, -(-ramp // FEW_BLOCKS))
+    knots = np.append(np.arange(0, ramp, block), ramp)
+    if move.today is not None:
+        todays = _todays(move, move.count)
+        knots = np.union1d(knots, todays[todays < ramp])
+    return knots
+
+
+def _todays(move: Move, count: int) -> Index:
+    """Ends of intervals around the moments at which the jerk of today's rapid changes."""
+    assert move.today is not None
+    moments = move.today.step_times() / float(move.today.total[0]) * count
+    before = np.floor(moments + 1e-9).astype(np.int64)
+    todays: Index = np.clip(np.concatenate([before, before + 1]), 0, count)
+    return todays
 
 
 def most_blocks(move: Move) -> int:

@@ -60,13 +60,15 @@ class Problem:
         Ends of the blocks of constant jerk, from 0 to T_SUM. [intervals]
     velocity, acceleration, jerk : float
         Limits, times T_SUM, T_SUM^2 and T_SUM^3 over the length. [-]
-    rows : ndarray, shape (r, k)
+    rows : ndarray, shape (n, k)
         What a unit jerk in each block leaves: displacements, real and imaginary part or what else
         squares add up of, each over a measure that is common to all. [-]
     group : ndarray of int, shape (r,)
         Rows of the same group, side by side, count together: the root of their squares' sum.
     cap : ndarray, shape (g,)
         What a group may leave; NaN: it is of those whose largest is made least. [-]
+    near, share : ndarray of int and of float, shape (r, 4), optional
+        What counts are sums of four `rows` each, times these; without them, the rows themselves.
     mirrored : bool
         The acceleration is odd about the middle; so must the knots be.
     cruise : bool
@@ -80,8 +82,20 @@ class Problem:
     rows: Array
     group: Index
     cap: Array
+    near: Index | None = None
+    share: Array | None = None
     mirrored: bool = False
     cruise: bool = False
+
+    def seen(self, rows: Array) -> Array:
+        """What counts of what `rows` say, shape (n, ...), for each row of a group, (r, ...)."""
+        if self.near is None or self.share is None:
+            return rows
+        share = self.share if rows.ndim == 1 else self.share[..., np.newaxis]
+        seen: Array = share[:, 0] * rows[self.near[:, 0]]
+        for k in range(1, self.near.shape[1]):
+            seen += share[:, k] * rows[self.near[:, k]]
+        return seen
 
     @property
     def fast(self) -> bool:
@@ -199,7 +213,7 @@ def _solve_once(
     from scipy import sparse
 
     unknowns = Unknowns(problem)
-    response = unknowns.responses()
+    response = problem.seen(unknowns.responses())
     rows = _Rows()
     unknowns.motion(rows)
     if allowed is None:
@@ -247,7 +261,7 @@ def _solve_once(
 
 def residuals(problem: Problem, jerk: Array) -> Array:
     """What each group is left with by a jerk in each block, shape (g,) [-]."""
-    return grouped(np.abs(problem.rows @ jerk), problem.group)
+    return grouped(np.abs(problem.seen(problem.rows @ jerk)), problem.group)
 
 
 class _Rows:
@@ -364,7 +378,7 @@ class Unknowns:
         return bool(control.min() >= -small and control.max() <= self.problem.velocity + small)
 
     def responses(self, unit: float = 1.0) -> Array:
-        """The rows of the problem for each unknown acceleration of that size, (r, len(a))."""
+        """The rows of the problem for each unknown acceleration of that size, (n, len(a))."""
         # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
         per_time = unit / self.h
         response: Array = self.problem.rows[:, :-1] * per_time[:-1]
@@ -388,7 +402,8 @@ class Unknowns:
         jerk = np.diff(self.accelerations(x)) / self.h
         # Rest and length: what a jerk does to acceleration, velocity and position at the end.
         ends = np.stack(_moments(self.h))
-        correction = self._correction(jerk, np.concatenate([ends, problem.rows]) if null else ends)
+        exact = np.concatenate([ends, problem.seen(problem.rows)]) if null else ends
+        correction = self._correction(jerk, exact)
         if np.abs(correction).max() > MARGIN * problem.jerk:
             # Nulls at frequencies side by side are nearly the same equation: not to the last digit.
             correction = self._correction(jerk, ends)
