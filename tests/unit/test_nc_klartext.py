@@ -141,6 +141,17 @@ def test_what_a_retreat_along_the_tool_leaves_is_known_again_when_it_is_stated()
 
 
 @pytest.mark.parametrize(
+    "line", ["/ CALL LBL 5", "/ CALL LBL 5 REP 2", "/ FN 9: IF +1 EQU +1 GOTO LBL 5"]
+)
+def test_flow_that_the_operator_may_skip_is_not_followed(line):
+    found = reasons(line, "L X+9 R0 FMAX", "M30", "LBL 5", "L X+20 FMAX", "L X+30 FMAX", "LBL 0")
+    assert None not in found
+    back = reasons("L X+1 FMAX", "LBL 5", "L X+9 FMAX", "L X+8 R0 FMAX", line, "L X+7 FMAX")
+    assert back[0] is None
+    assert None not in back[1:2] + back[3:]
+
+
+@pytest.mark.parametrize(
     "line",
     ["CALL LBL 1", "CALL LBL 1 REP 3", "CALL PGM SUB", "PLANE SPATIAL SPA0 SPB0 SPC0 STAY", "M128",
      "L X+1 FMAX M140 MB MAX", "CYCL DEF 10.0 ROTATION", "CYCL DEF 8.0 MIRROR",

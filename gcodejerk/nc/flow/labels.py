@@ -8,7 +8,7 @@ what their authors say of them (``REP 3/3`` and ``REP 3``: four passes in all; s
 M30). That D09 to D12 take operands as D00 to D05 do (TNC 360 ISO manual p. 7-5) and then the label,
 and that the 0 of ``L1,0`` is a call, is general knowledge.
 
-Rule: what is not written so, has words beside it, or stands where the sources do not say what
+Rule: what is not written so, has words or a ``/`` beside it, or stands where the sources do not say what
 happens (an LBL 0 that nobody called, a part that begins behind its REP), is not followed
 (`NotFollowedError`): then nothing of the file is.
 """
@@ -82,11 +82,13 @@ class _Compiler:
         """What a line does; None for a block."""
         block = self.lines[at].block
         label = self._label(block)
-        if label is not None:
-            if block.block_delete:
-                raise NotFollowedError
-            return Op("return") if label == _END else Op("jump", None, at + 1, at + 1)
-        return self._named(at, block) if self.klartext else self._coded(at, block)
+        if label is None:
+            op = self._named(at, block) if self.klartext else self._coded(at, block)
+        else:
+            op = Op("return") if label == _END else Op("jump", None, at + 1, at + 1)
+        if op is not None and block.block_delete:
+            raise NotFollowedError
+        return op
 
     def _label(self, block: Block) -> bytes | None:
         """The label that a line is; None for another line."""

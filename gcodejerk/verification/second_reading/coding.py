@@ -113,6 +113,7 @@ class Codes(Known):
         unit, feed_unit = self.unit, self.feed_unit
         self.forget()
         self.unit, self.feed_unit = unit, feed_unit
+        self.ended = False
 
     def end_elsewhere(self, line: Line, block: Sorted) -> Observation | None:
         """A block that did not end where its words say, if that is so."""
