@@ -8,8 +8,8 @@ what their authors say of them (``REP 3/3`` and ``REP 3``: four passes in all; s
 M30). That D09 to D12 take operands as D00 to D05 do (TNC 360 ISO manual p. 7-5) and then the label,
 and that the 0 of ``L1,0`` is a call, is general knowledge.
 
-Rule: what is not written so, has words or a ``/`` beside it, or stands where the sources do not say what
-happens (an LBL 0 that nobody called, a part that begins behind its REP), is not followed
+Rule: what is not written so, has words or a ``/`` beside it, or stands where the sources do not say
+what happens (an LBL 0 that nobody called, a part that begins behind its REP), is not followed
 (`NotFollowedError`): then nothing of the file is.
 """
 
