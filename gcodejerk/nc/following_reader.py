@@ -28,31 +28,37 @@ from gcodejerk.start import Start
 MOST_BYTES = 4_000_000
 """Of a file that is followed; a larger one is read line after line."""
 _NAMED = re.compile(
-    rb"(?<![A-Z0-9_])(?:GOTO[FBC]?|FOR|WHILE|LOOP|REPEATB?|IF|PROC)(?![A-Z0-9_])|%_N_",
-    re.IGNORECASE,
+    rb"(?<![A-Z0-9_])(?:GOTO[FBC]?|FOR|WHILE|LOOP|REPEATB?|IF|PROC)(?![A-Z0-9_])|%_N_"
 )
+_NAMES = (b"GOTO", b"FOR", b"WHILE", b"LOOP", b"REPEAT", b"IF", b"PROC", b"%_N_")
+"""One of them stands where it matches: to look for texts is ten times as quick."""
 _BY_NUMBER = re.compile(
     rb"(?<![A-Z0-9_])REPEATB?[ \t]+(?:[A-Z_][A-Z0-9_]*[ \t]+)?N?[0-9]+(?![A-Z0-9_=])", re.IGNORECASE
 )
 """``REPEATB N10``: of a stream only its first block bears the number."""
-_LABELS = re.compile(rb"(?<![A-Z0-9_])(?:LBL(?![A-Z0-9_])|G[ \t]*98(?![0-9.]))", re.IGNORECASE)
-_MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[", re.IGNORECASE)
+_LABEL = re.compile(rb"(?<![A-Z0-9_])LBL(?![A-Z0-9_])")
+_G98 = re.compile(rb"G[ \t]*98(?![0-9.])")
+_MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[")
 
 
 def worth_following(file: BinaryIO, dialect: Dialect) -> bool:
     """Whether a file has flow that can be followed; it stands where it stood."""
+    names: tuple[bytes, ...] = (b"",)
     if dialect.text.variables == "R" and dialect.text.names:
-        pattern = _NAMED
+        pattern, names = _NAMED, _NAMES
     elif dialect.text.keywords and dialect.text.o_word == "program":
         pattern = _MACRO
     elif dialect.text.variables == "Q":
-        pattern = _LABELS
+        pattern, names = (_LABEL, (b"LBL",)) if dialect.text.klartext else (_G98, names)
     else:
         return False
     begin = file.tell()
     data = file.read(MOST_BYTES + 1)
     file.seek(begin)
-    return len(data) <= MOST_BYTES and pattern.search(data) is not None
+    if len(data) > MOST_BYTES:
+        return False
+    said = data.upper()
+    return any(name in said for name in names) and pattern.search(said) is not None
 
 
 class FollowingReader(Reader):

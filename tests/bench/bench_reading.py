@@ -3,8 +3,9 @@
     python tests/bench/bench_reading.py [--megabytes 10] [--memory]
 
 The finishing program is three-axis, modal words omitted, with a retract and an approach every 200
-lines; the printed part is Marlin's, with extrusion. The plain tracker does the least that finds the
-rapids: a regular expression over each line, G0 to G3, G90, G91 and the last X, Y, Z. `--memory`
+lines; in Klartext each line has its number; the printed part is Marlin's, with extrusion. The plain
+tracker does the least that finds the rapids: a regular expression over each line, G0 to G3 or FMAX,
+G90, G91 and the last X, Y, Z. `--memory`
 reads 100 MB in a fresh process and prints its largest resident size.
 """
 
@@ -35,6 +36,17 @@ def finishing_program(lines):
         else:
             rows.append(b"X%.3fY%.3fZ%.3f" % (a, b, c))
     return b"\n".join([*rows, b"M5", b"M30", b""])
+
+
+def klartext_program(lines):
+    """The same in Klartext, as posts write it."""
+    rows = [b"0 BEGIN PGM PART MM", b"1 L X+0 Y+0 Z+50 R0 FMAX M3", b"2 L F2400"]
+    for line in finishing_program(lines).split(b"\n")[4:-3]:
+        fast = line.startswith(b"G0")
+        words = re.findall(rb"[XYZ][-0-9.]+", line)
+        said = b"".join(b"  " + re.sub(rb"([XYZ])([0-9])", rb"\1+\2", word) for word in words)
+        rows.append(b"%d L" % len(rows) + said + (b" FMAX" if fast else b""))
+    return b"\n".join([*rows, b"%d M30" % len(rows), b"%d END PGM PART MM" % (len(rows) + 1), b""])
 
 
 def drilling_program(lines):
@@ -77,6 +89,8 @@ def plain_tracker(data):
     motion, incremental, position, rapids = 1, False, {}, []
     for number, line in enumerate(io.BytesIO(data), 1):
         start = None
+        if b" L " in line:
+            motion = 0 if b"FMAX" in line else 1
         for letter, text in WORD.findall(line):
             value = float(text)
             if letter == b"G":
@@ -106,6 +120,7 @@ def main():
     makers = {
         "3-axis finishing": (finishing_program, "linuxcnc"),
         "commented drilling": (drilling_program, "linuxcnc"),
+        "Klartext finishing": (klartext_program, "klartext"),
         "printed part": (printed_part, "marlin"),
     }
     for name, (make, dialect) in makers.items():

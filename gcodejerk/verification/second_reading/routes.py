@@ -13,14 +13,13 @@ from dataclasses import dataclass, field
 
 from gcodejerk.nc.dialects.dialect import Dialect
 
-_FLOW_NAMED = re.compile(
-    rb"(?<![A-Z0-9_])(?:GOTO[FBC]?|FOR|WHILE|LOOP|REPEATB?|IF|PROC)(?![A-Z0-9_])|%_N_",
-    re.IGNORECASE,
+_FLOW_NAMED = (b"GOTO", b"FOR", b"WHILE", b"LOOP", b"REPEAT", b"IF", b"PROC")
+_FLOW_WORD = re.compile(
+    rb"(?<![A-Z0-9_])(?:GOTO[FBC]?|FOR|WHILE|LOOP|REPEATB?|IF|PROC)(?![A-Z0-9_])"
 )
-_FLOW_LABELLED = re.compile(
-    rb"(?<![A-Z0-9_])(?:LBL(?![A-Z0-9_])|G[ \t]*98(?![0-9.]))", re.IGNORECASE
-)
-_FLOW_MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[", re.IGNORECASE)
+_FLOW_LABELLED = re.compile(rb"LBL(?![A-Z0-9_])(?<![A-Z0-9_]LBL)")
+_FLOW_CODED = re.compile(rb"G[ \t]*98(?![0-9.])")
+_FLOW_MACRO = re.compile(rb"GOTO|WHILE|DO[ \t]*[0-9]|G[ \t]*65(?![0-9.])|IF[ \t]*\[")
 
 
 _CALLS = re.compile(rb"M[ \t]*0*98(?![0-9])", re.IGNORECASE)
@@ -28,11 +27,13 @@ _CALLS = re.compile(rb"M[ \t]*0*98(?![0-9])", re.IGNORECASE)
 
 def flows(data: bytes, dialect: Dialect) -> bool:
     """Whether a file holds flow that is followed here."""
-    rules = dialect.text
+    rules, data = dialect.text, data.upper()
     if rules.names and rules.variables == "R":
-        return _FLOW_NAMED.search(data) is not None
+        if b"%_N_" in data:
+            return True
+        return any(word in data for word in _FLOW_NAMED) and _FLOW_WORD.search(data) is not None
     if rules.variables == "Q":
-        return _FLOW_LABELLED.search(data) is not None
+        return (_FLOW_LABELLED if rules.klartext else _FLOW_CODED).search(data) is not None
     programs = bool(rules.keywords) and rules.o_word == "program"
     return programs and _FLOW_MACRO.search(data) is not None
 
