@@ -114,7 +114,7 @@ SEEN = set()
 
 
 @given(program=programs())
-@settings(max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def check(tmp_path, program):
     file = io.BytesIO(program.encode())
     first = begins_again(file, "", LINUXCNC)
