@@ -193,6 +193,8 @@ class Stuck:
         )  # fmt: skip
         self.pipe = open("stuck.nc", "wb")  # noqa: SIM115 - returns when the other end is open
         self.until(lambda: Path("out/a.nc").exists() and (jobs == 1 or Path("out/b.ngc").exists()))
+        # A signal between the look for signals and the call that waits is seen when that is over.
+        time.sleep(0.3)
 
     @staticmethod
     def until(condition):
