@@ -193,7 +193,7 @@ class Stuck:
         )  # fmt: skip
         self.pipe = open("stuck.nc", "wb")  # noqa: SIM115 - returns when the other end is open
         self.until(lambda: Path("out/a.nc").exists() and (jobs == 1 or Path("out/b.ngc").exists()))
-        # A signal between the look for signals and the call that waits is seen when that is over.
+        # A run that was asked to end at once went on waiting, once; why is not known.
         time.sleep(0.3)
 
     @staticmethod
