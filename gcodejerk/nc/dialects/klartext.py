@@ -19,10 +19,10 @@ are mere definitions is general knowledge: nothing but the modes is known behind
 - Behind CALL PGM, PLANE, FUNCTION, TRANS, cycles that turn, mirror or scale, and every M function
   that is not here (M128; M89, which calls a cycle behind every move from there on), nothing is
   rewritten (`unknown_lasts`).
-- ``L M140 MB MAX`` retreats along the tool's axis: no place is known behind it. That it lasts for its
-  block alone is general knowledge; programs in public (of posts that write it at every tool change)
-  cut behind it without another word. With words of axes beside it, it bars what follows, as an M
-  function that is not here.
+- ``L M140 MB MAX`` retreats along the tool's axis: no place is known behind it. That it lasts for
+  its block alone is general knowledge; programs in public (of posts that write it at every tool
+  change) cut behind it without another word. With words of axes beside it, it bars what follows, as
+  an M function that is not here.
 - A TOOL CALL changes the frame, and may move. M91 and M92 make the words of their block machine
   coordinates.
 - It is read only: streams go to a CSV table.
