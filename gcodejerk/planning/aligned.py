@@ -121,34 +121,34 @@ def _knots(moves: StraightMoves, stride: int, *, calm: bool) -> tuple[Counts, ND
     With `calm` blocks are longer where a slow start is delicate.
     """
     interval, machine = moves.sampler.interval, moves.sampler.plans.machine
-    brake = moves.most / USED
     ahead = int(LOOK_AHEAD * machine.controller_options.optimization_depth)
-    rows = np.arange(len(moves.count))
-    knots = np.zeros((len(rows), 1), dtype=np.int64)
-    enough = np.zeros(len(rows), dtype=np.bool_)
-    worst = np.full(len(rows), np.inf)
-    for periods in range(stride, max(stride, int(LONGEST / interval)) + 1):
+    knots = np.zeros((len(moves.count), 1), dtype=np.int64)
+    enough = np.zeros(len(knots), dtype=np.bool_)
+    worst = np.full(len(knots), np.inf)
+    strides = np.arange(stride, max(stride, int(LONGEST / interval)) + 1)
+    # The first will do for most moves; for those left all others are looked at at once.
+    for periods in (strides[:1], strides[1:]):
         left = np.flatnonzero(~enough | (worst > 0.0))
-        if not len(left):
+        some = moves.take(np.tile(left, len(periods)))
+        if not len(some.count):
             break
-        some = moves.take(left)
-        part, far = aligned_knots(
-            some.count, periods, ahead, some.way, some.speed, brake[left], interval
-        )
-        bad = np.zeros(len(left))
+        brake = some.most / USED
+        each = np.repeat(periods, len(left))
+        part, far = aligned_knots(some.count, each, ahead, some.way, some.speed, brake, interval)
+        bad = np.zeros(len(each))
         if calm:
             # Longer blocks make a slow start less delicate: calm with all that the control may be
             # set to, or with what it has to be, or as calm as may be.
             at = some.at(some.speed, part)
-            shift, least = (early_shift(part, at, a, interval) for a in (some.full, brake[left]))
+            shift, least = (early_shift(part, at, a, interval) for a in (some.full, brake))
             bad = np.where(shift < SHIFT, 0.0, np.where(least < SHIFT, 1.0, 2.0 + least))
-        taken = left[(far & (bad < worst[left])) | ~enough[left]]
-        chosen = np.isin(left, taken)
         width = max(knots.shape[1], part.shape[1])
         knots = np.pad(knots, ((0, 0), (width - knots.shape[1], 0)))
-        knots[taken] = 0
-        knots[taken, width - part.shape[1] :] = part[chosen]
-        enough[taken], worst[taken] = far[chosen], bad[chosen]
+        part = np.pad(part, ((0, 0), (width - part.shape[1], 0)))
+        for rows in np.arange(len(each)).reshape(len(periods), -1):
+            better = (far[rows] & (bad[rows] < worst[left])) | ~enough[left]
+            taken, chosen = left[better], rows[better]
+            knots[taken], enough[taken], worst[taken] = part[chosen], far[chosen], bad[chosen]
     return knots, enough
 
 

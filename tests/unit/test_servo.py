@@ -1,8 +1,11 @@
 """Blocks on servo periods: their ends, the speeds fitted to them, and LinuxCNC's filter."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from gcodejerk import Machine, find_machine
 from gcodejerk.motion import mode_poles
 from gcodejerk.motion.servo.knots import aligned_knots, block_kinds, early_shift, passed
 from gcodejerk.motion.servo.speed_fit import (
@@ -10,12 +13,15 @@ from gcodejerk.motion.servo.speed_fit import (
     EVEN,
     FASTER,
     SLOWER,
+    STEPS,
     Wanted,
+    _Fit,
     fit_speeds,
     response_rows,
     solve_tridiagonal,
 )
 from gcodejerk.motion.servo.spline_filter import filter_gain, filtered, unfiltered
+from gcodejerk.rewrite.pipeline import process
 
 DT = 0.001
 
@@ -173,6 +179,76 @@ def test_in_some_of_these_fits_limits_hold():
         even = np.isclose(change, 0.0, atol=1e-5)
         held.append(bool((even | np.isclose(np.abs(change), 0.32 * h, atol=1e-5)).any()))
     assert any(held)
+
+
+def cruise(count, stride=2):
+    """A move that gets to its limit of speed within a fifth of its time, and stays there."""
+    knots = np.unique(np.r_[0, 3 : count - 3 : stride, count])[np.newaxis]
+    t = np.arange(count + 1) / count
+    shape = np.sin(np.pi / 2 * np.clip(np.minimum(t, 1.0 - t) / 0.2, 0.0, 1.0)) ** 2
+    shape /= 0.5 * (shape[1:] + shape[:-1]).mean()
+    at = shape[knots]
+    poles = mode_poles(np.array([20.0, 43.0]), 0.02)
+    kind = np.sign(np.round(np.diff(at), 9)).astype(np.int64)
+    return Wanted(
+        knots=knots,
+        speeds=(0.5 * (shape[1:] + shape[:-1]))[np.newaxis],
+        length=np.array([0.5 * (shape[1:] + shape[:-1]).mean() + 1e-7]),
+        end_speed=np.array([1e-4]),
+        acceleration=np.array([1.02 * np.diff(shape).max()]),
+        least=np.array([1e-4]),
+        most=np.array([(1.0 - 2e-5) * shape.max()]),
+        kind=kind,
+        poles=poles,
+        response=np.einsum("bkm,bk->bm", response_rows(knots, poles, DT), at),
+        weight=np.array([[1e5, 1e5]]),
+        rise=np.diff(at),
+        stiffness=25.0,
+        interval=DT,
+    )
+
+
+def together(moves):
+    """Moves as rows, aligned at their end."""
+
+    def aligned(name):
+        columns = [getattr(move, name) for move in moves]
+        width = max(column.shape[1] for column in columns)
+        return np.concatenate([np.pad(c, ((0, 0), (width - c.shape[1], 0))) for c in columns])
+
+    alone = ("length", "end_speed", "acceleration", "least", "most", "response", "weight")
+    return replace(
+        moves[0],
+        **{name: aligned(name) for name in ("knots", "speeds", "kind", "rise")},
+        **{name: np.concatenate([getattr(move, name) for move in moves]) for name in alone},
+    )
+
+
+def test_moves_are_fitted_as_alone_whatever_is_beside_them():
+    counts = np.random.default_rng(4).permutation(np.r_[20:60, 300:330, 700:704])
+    moves = [cruise(int(count)) for count in counts]
+    found = fit_speeds(together(moves))
+    for row, move in zip(found, moves, strict=True):
+        alone = fit_speeds(move)[0]
+        assert (row[: len(row) - len(alone)] == 0.0).all()
+        np.testing.assert_allclose(row[len(row) - len(alone) :], alone, rtol=0, atol=1e-4)
+
+
+def test_a_long_cruise_at_the_limit_is_settled_soon(monkeypatch):
+    steps = []
+    step = _Fit._step
+    monkeypatch.setattr(
+        _Fit, "_step", lambda self, rows, *limits: steps.append(rows) or step(self, rows, *limits)
+    )
+    router = Machine.load(find_machine("router"))
+    for here, there in (
+        ("X-35.1 Y-26.2 Z-58.4", "X-133.7 Y-23 Z-182.1"),
+        ("X-188.8 Y-84.2 Z-27.1", "X-181.3 Y-79.2 Z-198.1"),
+        ("X-38.3 Y-156.4 Z-120.3", "X-35.5 Y-181.3 Z-4.8"),
+    ):
+        steps.clear()
+        process(f"G21 G90 G94 G17 G40 G49 G64\nG0 {here}\nG0 {there}\nM2\n".encode(), router)
+        assert 0 < len(steps) < STEPS / 2
 
 
 def test_a_knot_slower_than_both_its_neighbours_gets_an_even_block():

@@ -26,7 +26,13 @@ DIP = 0.005
 
 
 def aligned_knots(
-    count: Counts, stride: int, ahead: int, way: Array, speed: Array, brake: Array, interval: float
+    count: Counts,
+    stride: Counts | int,
+    ahead: int,
+    way: Array,
+    speed: Array,
+    brake: Array,
+    interval: float,
 ) -> tuple[Counts, NDArray[np.bool_]]:
     """Ends of the blocks of moves, whole periods, aligned at the last.
 
@@ -38,7 +44,7 @@ def aligned_knots(
     ----------
     count : ndarray of int, shape (b,)
         Duration of each move. [intervals]
-    stride : int
+    stride : ndarray of int, shape (b,), or int
         Periods of a block, at least 2.
     ahead : int
         Blocks that the planner looks ahead.
@@ -66,8 +72,8 @@ def aligned_knots(
            [ 0,  3,  5,  7,  9, 12]])
     """
     rows = np.arange(len(count))
-    longest = max(stride, int(LONGEST / interval))
-    end = max(END_PERIODS, stride)
+    longest = np.maximum(stride, int(LONGEST / interval))
+    end = np.maximum(END_PERIODS, stride)
     last = way.shape[1] - 1
     over = np.maximum(count - 2 * end, 0) % stride
     enough = np.ones(len(count), dtype=np.bool_)
@@ -76,12 +82,13 @@ def aligned_knots(
     needed = 0.5 * speed**2 / brake[:, np.newaxis]
     while (left < count).any():
         to = way[rows, last - columns[max(len(columns) - ahead, 0)]]
-        size = np.full(len(count), longest)
+        size = np.broadcast_to(longest, count.shape).copy()
         short = np.ones(len(count), dtype=np.bool_)
-        for periods in range(stride, longest + 1):
+        for more in range(int((longest - stride).max(initial=0)) + 1):
+            periods = np.minimum(stride + more, longest)
             at = last - np.minimum(left + periods, count)
             reached = needed[rows, at] <= (to - way[rows, at]) * (1.0 + 1e-6) + CREEP * interval
-            size[short & reached] = periods
+            size = np.where(short & reached, periods, size)
             short &= ~reached
             if not short.any():
                 break

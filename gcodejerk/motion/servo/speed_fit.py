@@ -12,7 +12,7 @@ penalties of their violation, far stiffer than the rest, so that the sum is conv
 quadratic: which limits hold is found by Newton's method (O. Mangasarian, Optimization Methods and
 Software 17, 2002), one solution a step, all moves at once. Each is a symmetric tridiagonal system
 for each move, as speeds touch their neighbours only, and a small dense one for the rows.
-`scipy.optimize.lsq_linear` gives the same one move at a time (`tests/unit/test_speed_fit.py`).
+`scipy.optimize.lsq_linear` gives the same one move at a time (`tests/unit/test_servo.py`).
 
 Speeds are in units of each move's mean speed, times in intervals.
 """
@@ -35,10 +35,15 @@ LENGTH_WEIGHT = 1e10
 """The same of the length."""
 CELLS = 1 << 21
 """Numbers of right sides that are worked on at a time: 16 MB."""
+ALIKE, FEW = 0.8, 32
+"""Moves are worked on together whose knots are so many of the most there, and so many moves at
+least."""
 STEPS, HALVINGS = 40, 10
 """Of Newton's method, at most; nearly all moves need less than ten, and whole steps."""
 SETTLED = 1e-9
 """Share of the sum that a shortened step has to gain for another one."""
+NOTHING = 1e-13
+"""The same of a whole step: what is just at its limit is held by one step and not by the next."""
 
 FASTER, SLOWER, EVEN, ANY = 1, -1, 0, 2
 """What a block may be."""
@@ -94,11 +99,20 @@ class Wanted:
     stiffness: float
     interval: float
 
-    def take(self, rows: slice) -> Wanted:
-        """Some of the moves."""
+    def take(self, rows: NDArray[np.int64]) -> Wanted:
+        """Some of the moves, without columns that are empty for all of them."""
         whole = ("poles", "stiffness", "interval")
         columns = (field.name for field in fields(self) if field.name not in whole)
-        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
+        part = replace(self, **{name: getattr(self, name)[rows] for name in columns})
+        blocks = int(np.count_nonzero(part.knots, axis=1).max(initial=0))
+        # A row may begin with knots at 0: the last of these is the move's start.
+        known, longest = self.knots.shape[1], self.speeds.shape[1]
+        first, early = known - 1 - blocks, longest - int(part.knots[:, -1].max(initial=0))
+        return replace(
+            part,
+            knots=part.knots[:, first:], rise=part.rise[:, first:], kind=part.kind[:, first:],
+            speeds=part.speeds[:, early:],
+        )  # fmt: skip
 
 
 def fit_speeds(wanted: Wanted) -> Array:
@@ -114,12 +128,18 @@ def fit_speeds(wanted: Wanted) -> Array:
     ndarray, shape (n, k)
         [of the mean]
     """
-    size = max(1, CELLS // (wanted.knots.shape[1] * (2 * len(wanted.poles) + 2)))
-    parts = [
-        _Fit(wanted.take(slice(begin, begin + size))).solve()
-        for begin in range(0, len(wanted.knots), size)
-    ]
-    return np.concatenate(parts) if parts else np.zeros(wanted.knots.shape)
+    out = np.zeros(wanted.knots.shape)
+    count = np.count_nonzero(wanted.knots, axis=1)
+    order, end = np.argsort(-count, kind="stable"), 0
+    while end < len(order):
+        most = int(count[order[end]]) + 1
+        alike = int(np.count_nonzero(count[order] >= ALIKE * (most - 1)))
+        size = max(1, CELLS // (most * (2 * len(wanted.poles) + 2)))
+        # A few more knots cost less than another pass for a few moves.
+        begin, end = end, min(max(alike, end + FEW), end + size, len(order))
+        rows = order[begin:end]
+        out[rows, -most:] = _Fit(wanted.take(rows)).solve()
+    return out
 
 
 class _Fit:
@@ -216,9 +236,10 @@ class _Fit:
                 reached[longer] = self._value(rows, out[rows] + part * (there - out[left])[longer])
             out[left] += share[:, np.newaxis] * (there - out[left])
             same = self._same(left, out[left], blocks, points) & (share == 1.0)
-            gained = value[left] - reached > SETTLED * np.abs(value[left])
+            least = np.where(share == 1.0, NOTHING, SETTLED) * np.abs(value[left])
+            gained = value[left] - reached > least
             value[left] = reached
-            left = left[~same & (gained | (share == 1.0))]
+            left = left[~same & gained]
             if not len(left):
                 break
         return out
