@@ -28,11 +28,15 @@ def _exit(number: int, frame: object) -> None:
 
 def _ask_again(unraisable: sys.UnraisableHookArgs) -> None:
     """Python drops what is raised within a destructor or a callback, an exit too, and says so."""
-    if not isinstance(unraisable.exc_value, SystemExit):
+    error = unraisable.exc_value
+    if isinstance(error, KeyboardInterrupt):  # SIGINT, which Python itself answers
+        number = int(signal.SIGINT)
+    elif isinstance(error, SystemExit):
+        number = int(error.code or 0) - 128
+        exit_on(number)
+    else:
         sys.__unraisablehook__(unraisable)
         return
-    number = int(unraisable.exc_value.code or 0) - 128
-    exit_on(number)
     again = threading.Timer(AGAIN, os.kill, (os.getpid(), number))
     again.daemon = True
     again.start()

@@ -193,7 +193,7 @@ class Stuck:
         )  # fmt: skip
         self.pipe = open("stuck.nc", "wb")  # noqa: SIM115 - returns when the other end is open
         self.until(lambda: Path("out/a.nc").exists() and (jobs == 1 or Path("out/b.ngc").exists()))
-        # A run that was asked to end at once went on waiting, once; why is not known.
+        # Behind Python's last look before the read that waits, a signal is seen with the next one.
         time.sleep(0.3)
 
     @staticmethod

@@ -1,5 +1,6 @@
 """A signal ends a process in order, wherever Python is when it comes."""
 
+import signal
 import subprocess
 import sys
 
@@ -45,6 +46,16 @@ finally:
 def test_a_signal_ends_the_process_and_what_is_registered_is_put_away(code):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (143, "put away\n", "")
+
+
+def test_an_interrupt_that_python_drops_comes_again():
+    code = IN_A_DESTRUCTOR.replace("os.getpid(), signal.SIGTERM", "os.getpid(), signal.SIGINT")
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=20
+    )
+    assert done.returncode == -signal.SIGINT
+    assert done.stdout == "put away\n"
+    assert "ignored" not in done.stderr
 
 
 def test_other_errors_that_nobody_can_raise_are_told_as_before():
