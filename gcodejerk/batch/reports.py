@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 from gcodejerk.machine import Machine
-from gcodejerk.planning.designs import known_limits
+from gcodejerk.planning.bounds import known_limits
 from gcodejerk.report.columns import FEW, write_rapids
 from gcodejerk.report.records import Record, dump, process_record
 from gcodejerk.report.tuning_record import settings_record

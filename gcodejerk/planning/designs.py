@@ -16,7 +16,6 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.errors import PlanError
 from gcodejerk.motion import (
     Objective,
     Profiles,
@@ -29,13 +28,10 @@ from gcodejerk.motion.search.cascade import design_cascade, leading_periods
 from gcodejerk.motion.search.conditions import design_condition
 from gcodejerk.motion.search.guard import keeps_guard
 from gcodejerk.motion.search.ramps import design_symmetric
-from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.motion.search.unit_move import Move, Optimum, optimum_profiles
-from gcodejerk.planning.optima import Progress, Question, answers
-from gcodejerk.planning.plans import Plans, same_rows
+from gcodejerk.planning.optima import Question, answers
 from gcodejerk.planning.task import Task, worst_in_band
 from gcodejerk.spread import here
-from gcodejerk.storage import gathered
 
 ALLOWED = 0.97
 """Share of the tolerance that a profile may use; rounding to the resolution needs some, too."""
@@ -47,8 +43,6 @@ MOST_REMEMBERED = 50_000
 NEXT_TO_NOTHING, SETTLED = 0.01, 0.1
 """A residual does not matter below this share of what today's rapid leaves, or below this one of
 the tolerance, whichever is more; but what can be settled on arrival, is."""
-NOTHING = 1e-3
-"""A bound is 0 where no more than this share of today's residual can be left over the band."""
 AT_ONCE = 128
 """Moves that are searched together, by whoever has time."""
 COARSE = 24
@@ -186,7 +180,7 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     rows = np.nonzero(task.objective.weights.any(axis=1))[0]
     today = worst_in_band(task, task.conventional)
     slack = np.maximum(NEXT_TO_NOTHING * today, SETTLED * task.tolerance)
-    questions = [_question(task, k, float(today[k]), slack=float(slack[k])) for k in rows]
+    questions = [question_of(task, k, float(today[k]), slack=float(slack[k])) for k in rows]
     profiles, worst = _answered(task, rows, answers(questions, task.progress), profiles, worst)
     found = np.isfinite(worst)
     worst[found] = worst_in_band(task.take(found), profiles.take(found))
@@ -253,7 +247,7 @@ def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Profiles, Array, N
     worst = np.where(worst <= final.tolerance, worst, np.inf)
     # Within the tolerance all are equal: the smoothest is taken.
     rows = np.nonzero(possible & task.objective.weights.any(axis=1))[0]
-    questions = [_question(final, k, float(reference[k]), task.tolerance) for k in rows]
+    questions = [question_of(final, k, float(reference[k]), task.tolerance) for k in rows]
     return *_answered(final, rows, answers(questions, task.progress), profiles, worst), high
 
 
@@ -262,103 +256,27 @@ def _quiet(task: Task, reference: Array) -> tuple[Profiles, Array]:
     profiles, worst = symmetric(task)
     worst = np.where(worst <= task.tolerance, worst, np.inf)
     rows = np.nonzero(~np.isfinite(worst))[0]
-    questions = [_question(task, k, float(reference[k]), task.tolerance) for k in rows]
+    questions = [question_of(task, k, float(reference[k]), task.tolerance) for k in rows]
     return _answered(task, rows, answers(questions, task.progress), profiles, worst)
 
 
-def bounds(task: Task) -> Array:
-    """The least residual that any profile within the limits leaves over the task's band.
-
-    Parameters
-    ----------
-    task : Task
-        The moves; with a band of 0, at the modes' own frequencies.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        NaN where no profile on the grid keeps the limits. [mm]
-
-    Raises
-    ------
-    PlanError
-        scipy, clarabel or daqp is not installed.
-    """
-    least = np.where(task.objective.weights.any(axis=1), np.nan, 0.0)
-    rows = np.nonzero(np.isnan(least))[0]
-    reference = task.objective.of(task.conventional)
-    if task.band:
-        # Over a band there is no null, but where next to nothing can be left it is soon found.
-        rows = rows[reference[rows] > 0.0]
-        nothing = [_question(task, k, float(reference[k]), NOTHING * reference[k]) for k in rows]
-        possible = np.array([x is not None for x in answers(nothing, task.progress)], dtype=bool)
-        least[rows[possible]] = 0.0
-        rows = np.nonzero(np.isnan(least))[0]
-    found = answers([_question(task, k, float(reference[k])) for k in rows], task.progress)
-    for k, optimum in zip(rows, found, strict=True):
-        least[k] = np.nan if optimum is None else optimum.worst
-    return least
-
-
-def least_residuals(plans: Plans, progress: Progress | None = None, band: float = 0.0) -> Array:
-    """How still the tool could be at best after each planned move, in the time that it has.
-
-    Parameters
-    ----------
-    plans : Plans
-        n moves.
-    progress : callable, optional
-        See `Progress`.
-    band : float, optional
-        Relative error of the modes' frequencies; their own by default. [-]
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Largest residual displacement over the modes, and over the band; NaN where a move is
-        not planned or no profile on the grid keeps the limits. Of axes that move each on its own, a
-        mode that several of them excite is left out: they might cancel each other. [mm]
-
-    Raises
-    ------
-    PlanError
-        scipy, clarabel or daqp is not installed.
-    """
-    task = Task.of(plans.machine, plans.modes, plans.share, plans.profile_counts, progress)
-    excited = np.zeros((len(plans), len(plans.modes.poles)), dtype=np.int64)
-    np.add.at(excited, plans.move, task.objective.weights > 0.0)
-    weights = np.where(excited[plans.move] > 1, 0.0, task.objective.weights)
-    task = replace(task, objective=replace(task.objective, weights=weights), band=band)
-    least = np.where(plans.planned, 0.0, np.nan)
-    with np.errstate(invalid="ignore"):
-        np.maximum.at(least, plans.move, bounds(task))
-    return least
-
-
-def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0.0) -> Array | None:
-    """The same for reports: None where the solver is not installed, since all else is known."""
-    try:
-        require_solver()
-    except PlanError:
-        return None
-    if plans.machine.positioning != "linear":
-        return least_residuals(plans, progress, band)
-    first, like = same_rows(plans.displacement, plans.counts, plans.reason)
-    return gathered(least_residuals(plans.repeated(first), progress, band), like)
-
-
-def _question(
+def question_of(
     task: Task, row: np.intp, reference: float, allowed: float = 0.0, slack: float = 0.0
 ) -> Question:
     """What is asked about one of the moves; only where there is slack does it have a guard."""
+    move = move_of(task, row, task.guard if slack else 0.0)
+    return Question(move, reference, allowed, slack, task.tolerance if slack else 0.0)
+
+
+def move_of(task: Task, row: np.intp, guard: float = 0.0) -> Move:
+    """One of the moves as the search for its optimum gets it."""
     V, A, J = (float(limit[row]) for limit in task.limits)
     objective = task.objective
     today = task.conventional.take(slice(row, row + 1))
-    move = Move(
+    return Move(
         int(task.counts[row]), V, A, J, objective.poles, objective.weights[row], objective.group,
-        task.band, task.interval, today, task.guard if slack else 0.0,
+        task.band, task.interval, today, guard,
     )  # fmt: skip
-    return Question(move, reference, allowed, slack, task.tolerance if slack else 0.0)
 
 
 def _answered(

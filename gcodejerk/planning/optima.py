@@ -31,6 +31,7 @@ from gcodejerk._version import __version__
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.search.optimal import least_residual, near_least, smoothest_within
 from gcodejerk.motion.search.socp import require_solver
+from gcodejerk.motion.search.together import least_together
 from gcodejerk.motion.search.unit_move import Move, Optimum, optimum_profiles
 from gcodejerk.planning.solution_cache import cache_file, read_solutions, write_solutions
 
@@ -68,6 +69,12 @@ class Question:
         one that leaves least. [mm]
     settled : float
         But of those that leave no more than this, if there are any. [mm]
+    beside : tuple of Move
+        Moves that begin with it and excite modes of the same machine: what all leave together is
+        to be least, which needs `until` and something `allowed`.
+    until : int
+        Above 0: what rings then, at the last arrival, is what counts, and weights are signed.
+        [intervals]
     """
 
     move: Move
@@ -75,25 +82,37 @@ class Question:
     allowed: float = 0.0
     slack: float = 0.0
     settled: float = 0.0
+    beside: tuple[Move, ...] = ()
+    until: int = 0
 
-    def key(self) -> tuple[bytes, float]:
-        """A digest that equal problems share, and the weight [mm] that solutions are scaled by."""
-        move = self.move
-        scale = float(move.weights.max(initial=0.0)) or 1.0
-        T = move.count * move.interval
-        limits = (move.velocity * T, move.acceleration * T**2, move.jerk * T**3)
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """All that move."""
+        return (self.move, *self.beside)
+
+    @property
+    def scale(self) -> float:
+        """The largest weight [mm], by which solutions are scaled."""
+        largest = max(float(np.abs(move.weights).max(initial=0.0)) for move in self.moves)
+        return largest or 1.0
+
+    def key(self) -> bytes:
+        """A digest that equal problems share."""
+        scale = self.scale
         measures = (self.reference, self.allowed, self.slack, self.settled)
-        numbers = np.concatenate(
-            [
-                [move.count, *limits, *(measure / scale for measure in measures)],
-                [move.band, move.interval, move.guard],
+        numbers = [np.array([*(measure / scale for measure in measures), self.until])]
+        for move in self.moves:
+            T = move.count * move.interval
+            limits = (move.velocity * T, move.acceleration * T**2, move.jerk * T**3)
+            numbers += [
+                np.array([move.count, *limits, move.band, move.interval, move.guard]),
                 move.poles.real * T, move.poles.imag * T, move.weights / scale, move.group,
                 *_columns(move.today, T),
-            ]
-        )  # fmt: skip
+            ]  # fmt: skip
         # Rounded: the same move computed in another order is the same problem.
-        text = ",".join([__version__, str(GENERATION), *(f"{x:.10g}" for x in numbers)])
-        return hashlib.blake2b(text.encode(), digest_size=16).digest(), scale
+        digits = (f"{x:.10g}" for x in np.concatenate(numbers))
+        text = ",".join([__version__, str(GENERATION), *digits])
+        return hashlib.blake2b(text.encode(), digest_size=16).digest()
 
 
 def _columns(today: Profiles | None, T: float) -> list[Array]:
@@ -120,7 +139,7 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     Returns
     -------
     list of Optimum or None
-        n answers; None where no profile keeps the limits.
+        n answers, that of its own move for each; None where no profile keeps the limits.
 
     Raises
     ------
@@ -129,7 +148,7 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     """
     require_solver()
     keys = [question.key() for question in questions]
-    distinct = {key: question for (key, _), question in zip(keys, questions, strict=True)}
+    distinct = dict(zip(keys, questions, strict=True))
     file = cache_file()
     found: dict[bytes, Optimum | None] = {}
     kept = read_solutions(list(distinct), file)
@@ -149,9 +168,9 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
             if progress is not None:
                 progress(done, len(distinct))
     out: list[Optimum | None] = []
-    for key, scale in keys:
+    for key, question in zip(keys, questions, strict=True):
         own = found[key]
-        out.append(None if own is None else replace(own, worst=own.worst * scale))
+        out.append(None if own is None else replace(own, worst=own.worst * question.scale))
     return out
 
 
@@ -208,17 +227,20 @@ def _answer(question: Question) -> Optimum | None:
 
 def _solved(question: Question) -> Optimum | None:
     """The same with as many threads as there are."""
-    move = question.move
-    scale = float(move.weights.max(initial=0.0)) or 1.0
-    unit = replace(move, weights=move.weights / scale)
-    reference = question.reference / scale
-    if question.allowed:
+    scale, found = question.scale, None
+    moves = [replace(move, weights=move.weights / scale) for move in question.moves]
+    unit, reference = moves[0], question.reference / scale
+    if question.until:
+        all_found = least_together(moves, question.until, reference, question.allowed / scale)
+        if all_found is not None and _holding(all_found, moves).all():
+            found = all_found[0]
+    elif question.allowed:
         found = smoothest_within(unit, question.allowed / scale)
     elif question.slack:
         found = near_least(unit, question.slack / scale, question.settled / scale, reference)
     else:
         found = least_residual(unit, reference)
-    return found if found is not None and _holding([found], [move])[0] else None
+    return found if found is not None and _holding([found], [unit])[0] else None
 
 
 def _holding(optima: list[Optimum], moves: list[Move]) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcodejerk.axes import AXES
-from gcodejerk.planning.designs import known_limits
+from gcodejerk.planning.bounds import known_limits
 from gcodejerk.planning.independent_axes import dogleg_notes, path_deviation
 from gcodejerk.planning.move import Plan
 from gcodejerk.report.records import Record, Records, number, report_head, scaled

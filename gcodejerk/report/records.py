@@ -292,7 +292,7 @@ def process_record(
     blocks : list of str
         Text of each rapid's block.
     limit : ndarray, shape (n,), optional
-        From `designs.least_residuals`; unknown by default. [mm]
+        From `bounds.least_residuals`; unknown by default. [mm]
 
     Returns
     -------

@@ -28,7 +28,8 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.motion.shapers import SHAPERS, shaped_profile
 from gcodejerk.planning.arrival import arrival_response, worst_in_bands
-from gcodejerk.planning.designs import condition1, condition2, known_limits
+from gcodejerk.planning.bounds import known_limits
+from gcodejerk.planning.designs import condition1, condition2
 from gcodejerk.planning.move import check_time, displacement_row
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plan import plan_moves

@@ -19,7 +19,7 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import read_program
 from gcodejerk.parameters import joined_moves, program_moves, tune
 from gcodejerk.parameters.search import needs
-from gcodejerk.planning.designs import known_limits
+from gcodejerk.planning.bounds import known_limits
 from gcodejerk.planning.plan import plan_moves
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import mode_poles, profiles_response
 from gcodejerk.motion.search.optimal import least_residual
 from gcodejerk.motion.search.unit_move import Move
-from gcodejerk.planning.designs import bounds, known_limits, least_residuals
+from gcodejerk.planning.bounds import bounds, known_limits, least_residuals
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import PROFILES, plan_moves
 from gcodejerk.planning.plans import Modes
@@ -185,7 +185,7 @@ def test_without_the_solver_a_bound_is_unknown_and_the_plan_is_not(monkeypatch):
     def missing():
         raise PlanError("no solver", "install it")
 
-    monkeypatch.setattr("gcodejerk.planning.designs.require_solver", missing)
+    monkeypatch.setattr("gcodejerk.planning.bounds.require_solver", missing)
     plan = plan_move({"Z": 1.0}, VMC)
     assert known_limits(plan.plans) is None
     assert move_record(plan)["rapids"][0]["limit"] is None

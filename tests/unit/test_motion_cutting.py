@@ -5,12 +5,14 @@ import numpy as np
 import pytest
 from test_motion_guard import MS, drawn, today_of
 
+from gcodejerk.motion import grouped
 from gcodejerk.motion.search import optimal
 from gcodejerk.motion.search.blocks import Blocks
 from gcodejerk.motion.search.cutting import Cutting
 from gcodejerk.motion.search.looked_at import LookedAt
 from gcodejerk.motion.search.optimal import least_residual, near_least
-from gcodejerk.motion.search.socp import Problem, residuals, solve
+from gcodejerk.motion.search.programme import Problem
+from gcodejerk.motion.search.socp import solve
 
 ENOUGH, CLOSE, NOTHING, KEPT, EXPECTED, WEIGHT = 80, 3e-3, 1e-4, 3e-4, 0.015, 1e-6
 
@@ -28,6 +30,11 @@ def problem_of(move, knots=None, cap=None, velocity=None):
         blocks.rows, blocks.cone, np.where((own == 1) & (cap is not None), cap or 0.0, np.nan),
         blocks.near, blocks.share, blocks.mirrored,
     )  # fmt: skip
+
+
+def left_by(problem, jerk):
+    """What each group is left with by a jerk in each block."""
+    return grouped(np.abs(problem.seen(problem.rows @ jerk)), problem.group)
 
 
 def by_planes(problem, allowed, smooth, cutting=None):
@@ -66,7 +73,7 @@ def test_the_least_by_planes_is_that_of_the_cones():
         solution = cutting.solution()
         assert cutting.expected == pytest.approx(cones.worst, rel=EXPECTED, abs=2 * NOTHING)
         assert solution.worst == pytest.approx(cones.worst, rel=2 * CLOSE, abs=2 * NOTHING)
-        assert solution.worst == pytest.approx(residuals(problem, solution.jerk).max())
+        assert solution.worst == pytest.approx(left_by(problem, solution.jerk).max())
         assert keeps_limits(problem, solution.jerk)
 
 
@@ -93,7 +100,7 @@ def test_what_has_a_cap_keeps_it():
         problem = problem_of(move, cap=1.05 * least + 0.01)
         cones = solve(problem, 0.0, 1e-9)
         cutting = by_planes(problem, 0.0, False)
-        left = residuals(problem, cutting.solution().jerk)
+        left = left_by(problem, cutting.solution().jerk)
         has = ~np.isnan(problem.cap)
         assert np.all(left[has] <= problem.cap[has] * (1.0 + 2 * KEPT))
         assert left[~has].max() == pytest.approx(cones.worst, rel=2 * CLOSE, abs=2 * NOTHING)

@@ -89,7 +89,7 @@ def tampered(value):
 
 def test_a_solution_from_the_disk_that_is_none_is_solved_again(solved):
     good = answers([question()])[0]
-    key = question().key()[0]
+    key = question().key()
     value = read_solutions([key], cache_file())[key]
     for count, wrong in enumerate(tampered(value), 2):
         write_solutions({key: wrong}, cache_file())

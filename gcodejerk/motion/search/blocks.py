@@ -27,6 +27,8 @@ import numpy as np
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex, grouped
 from gcodejerk.motion.search.looked_at import Flags, Index, LookedAt
+from gcodejerk.motion.search.programme import Problem
+from gcodejerk.motion.search.unit_move import Move
 
 AT_ONCE = 64
 """Poles whose responses are computed together."""
@@ -126,7 +128,7 @@ class Blocks:
     ringing : tuple of Ringing
         What the rows are made of, those of each stretch of the move behind those of the other.
     mirrored, cruise : bool
-        As of `socp.Problem`.
+        As of `programme.Problem`.
     """
 
     knots: Index
@@ -156,6 +158,15 @@ class Blocks:
         parts = 1 if mirrored else 2
         between = _between(looked_at, [looked_at.weights], parts, T)
         return cls(knots, ringing.left(knots, parts), *between, (ringing,), mirrored, False)
+
+    @classmethod
+    def until(cls, looked_at: LookedAt, knots: Index, interval: float, ringing: Ringing) -> Blocks:
+        """Blocks of a move that others begin with, and what rings when the last of them has ended.
+
+        `ringing` is that of the one that lasts longest: phases of all are seen from its middle.
+        """
+        between = _between(looked_at, [looked_at.weights], 2, knots[-1] * interval)
+        return cls(knots, ringing.left(knots, 2), *between, (ringing,), False, False)
 
     @classmethod
     def ramps(cls, looked_at: LookedAt, ramp: Index, count: int, interval: float) -> Blocks:
@@ -212,10 +223,36 @@ class Blocks:
             return (sums[0] + sums[0][::-1])[: (len(sums[0]) + 1) // 2]
         return sums[0]
 
+    def problem(self, move: Move, active: Flags, cap: Array) -> Problem:
+        """The programme of a move for these blocks, and for the groups that are active, (g,).
+
+        `cap`, (g,): what each may keep, NaN where it is to be least.
+        """
+        T = move.count * move.interval
+        used = active[self.owner]
+        rows = np.repeat(used, np.diff(self.leads, append=len(self.cone)))
+        return Problem(
+            knots=self.knots,
+            velocity=move.velocity * T,
+            acceleration=move.acceleration * T**2,
+            jerk=min(move.jerk, move.acceleration / move.interval) * T**3,
+            rows=self.rows,
+            group=self.cone[rows],
+            cap=cap[self.owner[used]],
+            near=self.near[rows],
+            share=self.share[rows],
+            mirrored=self.mirrored,
+            cruise=self.cruise,
+        )
+
+    def seen(self, jerk: Array) -> Array:
+        """What a jerk in each block leaves in the rows of all frequencies, shape (r,)."""
+        seen: Array = (self.share * (self.rows @ jerk)[self.near]).sum(axis=1)
+        return seen
+
     def left(self, jerk: Array) -> Array:
         """What each group is left with by a jerk in each block, shape (g,)."""
-        seen = (self.share * (self.rows @ jerk)[self.near]).sum(axis=1)
-        return self.largest(grouped(np.abs(seen), self.cone))
+        return self.largest(grouped(np.abs(self.seen(jerk)), self.cone))
 
 
 def _between(

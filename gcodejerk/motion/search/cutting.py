@@ -32,7 +32,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.motion.search.socp import MARGIN, Index, Problem, Solution, Unknowns, require_solver
+from gcodejerk.motion.search.programme import (
+    MARGIN,
+    Index,
+    Problem,
+    Solution,
+    Unknowns,
+    solutions,
+)
+from gcodejerk.motion.search.socp import require_solver
 
 Flags = NDArray[np.bool_]
 
@@ -294,7 +302,7 @@ class Cutting:
 
     def solution(self) -> Solution:
         """The last solution, mended where it must be exact."""
-        return self.unknowns.solution(self._full(), curved=True, null=False)
+        return solutions([self.unknowns], self._full(), curved=True, null=False)[0]
 
     @property
     def cones(self) -> Index:
@@ -308,7 +316,7 @@ class Cutting:
 
     def _full(self) -> Array:
         """The last solution in the columns of `Unknowns`."""
-        x = np.zeros(self.unknowns.above + 1)
+        x = np.zeros(self.unknowns.end)
         x[self.unknowns.a] = self._unit * self._x
         x[self.unknowns.peak] = np.abs(self._limits[: self._jerks] @ self._x).max()
         return x

@@ -7,11 +7,12 @@ programme knew.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.blocks import Blocks
 from gcodejerk.motion.search.looked_at import Flags, LookedAt
-from gcodejerk.motion.search.socp import Solution
+from gcodejerk.motion.search.programme import Solution
 
 GUARDED, KEPT = 0.98, 1.005
 """Share of what guarded frequencies may keep that is designed for; and where they are found to keep
@@ -68,7 +69,10 @@ class Found:
         return self.excess == 1.0
 
 
-def better(one: Found | None, other: Found | None) -> Found | None:
+Kind = TypeVar("Kind", bound=Found)
+
+
+def better(one: Kind | None, other: Kind | None) -> Kind | None:
     """The one that keeps the guard, or of two that do the one that leaves less."""
     if one is None or other is None:
         return one or other

@@ -14,6 +14,8 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.guard import split_at_peak
 from gcodejerk.motion.search.unit_move import Index, Move
 
+FEWEST_INTERVALS = 3
+"""Two cannot begin and end at rest."""
 FULL_INTERVALS = 128
 """Moves of at most so many intervals have a jerk in each of them."""
 BLOCK = 4

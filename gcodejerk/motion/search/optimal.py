@@ -22,9 +22,11 @@ from __future__ import annotations
 import numpy as np
 
 from gcodejerk.motion.search.blocks import Blocks, Ringing
-from gcodejerk.motion.search.found import GUARDED, KEPT, Found, better
+from gcodejerk.motion.search.exchange import USED, exchanged
+from gcodejerk.motion.search.found import GUARDED, Found, better
 from gcodejerk.motion.search.guard import guarded_frequencies, share_between, with_narrows
 from gcodejerk.motion.search.knots import (
+    FEWEST_INTERVALS,
     MOST_REFINED,
     coarse_knots,
     coarse_ramp,
@@ -35,31 +37,14 @@ from gcodejerk.motion.search.knots import (
     refined_knots,
 )
 from gcodejerk.motion.search.looked_at import Flags, LookedAt
+from gcodejerk.motion.search.programme import Index, Problem
 from gcodejerk.motion.search.refining import Asked, refined, within
-from gcodejerk.motion.search.socp import Index, Problem, smoothest_null, solve
+from gcodejerk.motion.search.socp import smoothest_null, solve
 from gcodejerk.motion.search.unit_move import Move, Optimum
 
-FEWEST_INTERVALS = 3
-"""Two cannot begin and end at rest."""
-ROUNDS = 6
-"""Programmes with cones at most, until no frequency between the points is worse than these."""
-WORSE = 1.012
-"""A frequency is added where the residual is this much above that of the points."""
-USED = 0.985
-"""Share of what is allowed that is designed for: between the points it is larger."""
 NEARLY = 1.5
 """Where a whole move leaves no more than so many times what is allowed, its ramps may leave less:
 their blocks are shorter."""
-JERK_COST = 1e-3
-"""What the full jerk costs beside a residual that matters: so much of that may be lost by it."""
-LEAST_COST = 2e-5
-"""The same where the residual alone counts."""
-LOSS = 3e-3
-"""What the jerk may then cost of the residual at most."""
-CHEAPEST = 1e-9
-"""Below it, the jerk's cost is lost in the solver's rounding."""
-NULL = 1e-6
-"""A residual below this share of the measure is as good as none."""
 
 
 def least_residual(move: Move, reference: float) -> Optimum | None:
@@ -279,22 +264,7 @@ class _Search:
 
     def _problem(self, looked_at: LookedAt, blocks: Blocks, active: Flags) -> Problem:
         """The programme for these blocks and groups of frequencies."""
-        move, T = self.move, self.total
-        used = active[blocks.owner]
-        rows = np.repeat(used, np.diff(blocks.leads, append=len(blocks.cone)))
-        return Problem(
-            knots=blocks.knots,
-            velocity=move.velocity * T,
-            acceleration=move.acceleration * T**2,
-            jerk=min(move.jerk, move.acceleration / move.interval) * T**3,
-            rows=blocks.rows,
-            group=blocks.cone[rows],
-            cap=np.where(looked_at.source[blocks.owner[used]] < 0, GUARDED, np.nan),
-            near=blocks.near[rows],
-            share=blocks.share[rows],
-            mirrored=blocks.mirrored,
-            cruise=blocks.cruise,
-        )
+        return blocks.problem(self.move, active, np.where(looked_at.source < 0, GUARDED, np.nan))
 
     def _exchanged(
         self, looked_at: LookedAt, blocks: Blocks, allowed: float, start: Found | None = None,
@@ -304,31 +274,16 @@ class _Search:
 
         `start`: what was found before, of these blocks or of longer ones. `only`: if it is allowed.
         """
-        active = looked_at.first if start is None else start.active
-        rounds = ROUNDS
-        cost = JERK_COST if allowed else LEAST_COST
-        best: Found | None = None
-        while rounds > 0:
-            rounds -= 1
+
+        def solved(active: Flags, cost: float) -> Found | None:
             problem = self._problem(looked_at, blocks, active)
             solution = solve(problem, USED * allowed, cost, self.curved)
             self.curved |= solution is not None and solution.curved
             if solution is None or (only and solution.worst > allowed):
-                return best
-            # Little jerk has cost at most this; where that is too much, it is made cheaper.
-            paid = cost * (1.0 - solution.peak)
-            if not allowed and paid > LOSS * solution.worst > LOSS * NULL:
-                cost *= 0.02
-                rounds += cost > CHEAPEST
-            found = Found.of(looked_at, blocks, active, solution)
-            best = better(best, found)
-            most = max(WORSE * solution.worst, allowed, NULL)
-            most_each = np.where(looked_at.source < 0, KEPT, most)
-            missing = looked_at.exceeded(found.left, most_each) & ~active
-            if not missing.any():
-                break
-            active = active | missing
-        return best
+                return None
+            return Found.of(looked_at, blocks, active, solution)
+
+        return exchanged(solved, looked_at.first if start is None else start.active, allowed)
 
     def _ramps(self, looked_at: LookedAt, knots: Index) -> Blocks:
         """Blocks of the ramps of a move with a long cruise."""

@@ -26,7 +26,7 @@ from gcodejerk.motion.search.cutting import Cutting
 from gcodejerk.motion.search.found import Found
 from gcodejerk.motion.search.looked_at import Index, LookedAt
 from gcodejerk.motion.search.prices import priced_knots
-from gcodejerk.motion.search.socp import Problem
+from gcodejerk.motion.search.programme import Problem
 
 ROUNDS = 5
 """Programmes of ever shorter blocks at most."""

@@ -1,0 +1,194 @@
+"""What axes that run each on its own can leave at least, against one linear programme of them."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from test_motion_optimal import FACETS, MS, matrices, rows_of
+
+from gcodejerk.axes import AXES
+from gcodejerk.machine import Machine
+from gcodejerk.motion import conventional_profiles, mode_poles
+from gcodejerk.motion.search.optimal import least_residual
+from gcodejerk.motion.search.together import least_together
+from gcodejerk.motion.search.unit_move import Move, optimum_profiles
+from gcodejerk.planning.bounds import least_residuals
+from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.task import worst_at_arrival
+
+
+def rows_until(until, count, frequencies, damping, weights):
+    """What a unit jerk in each interval leaves when the last axis arrives."""
+    poles = mode_poles(frequencies, np.array(damping))
+    later = np.exp(poles * (until - count) * MS)
+    return [
+        row * factor
+        for row, factor in zip(rows_of(count, frequencies, damping, weights), later, strict=True)
+    ]
+
+
+def by_linear_programme(moves, rows):
+    """Least worst sum of residuals: (count, V, A, J) of each move, and its rows of each mode."""
+    counts = [count for count, *_ in moves]
+    width = sum(counts) + 1
+    begins = np.cumsum([0, *counts])
+    unit = max(np.abs(own).max() * J for own, (*_, J) in zip(rows, moves, strict=True))
+    upper, most, equal, ends, bounds = [], [], [], [], []
+    for angle in 2 * np.pi * np.arange(FACETS) / FACETS:
+        for mode in range(len(rows[0])):
+            facet = np.full(width, -1.0)
+            for begin, own, (count, _, _, J) in zip(begins, rows, moves, strict=False):
+                facet[begin : begin + count] = (np.exp(-1j * angle) * own[mode]).real * J / unit
+            upper.append(facet[np.newaxis])
+            most.append([0.0])
+    for begin, (count, V, A, J) in zip(begins, moves, strict=False):
+        a, v, s = (m * J for m in matrices(count))
+        for m, x in ((a, A), (v, V)):
+            for sign in (1, -1):
+                block = np.zeros((count, width))
+                block[:, begin : begin + count] = sign * m / x
+                upper.append(block)
+                most.append(np.ones(count) if m is a or sign == 1 else np.zeros(count))
+        block = np.zeros((3, width))
+        block[:, begin : begin + count] = np.stack([a[-1] / A, v[-1] / V, s[-1]])
+        equal.append(block)
+        ends += [0.0, 0.0, 1.0]
+        bounds += [(-1.0, 1.0)] * count
+    cost = np.zeros(width)
+    cost[-1] = 1.0
+    found = linprog(
+        cost, A_ub=np.vstack(upper), b_ub=np.concatenate(most), A_eq=np.vstack(equal), b_eq=ends,
+        bounds=[*bounds, (0, None)], method="highs",
+    )  # fmt: skip
+    return found.fun * unit if found.status == 0 else None
+
+
+def drawn(count):
+    """Two or three axes, modes that several of them excite in either direction."""
+    rng = np.random.default_rng(11)
+    while count:
+        moves = []
+        for _ in range(rng.integers(2, 4)):
+            A, T = 10 ** rng.uniform(2.5, 4.0), rng.uniform(0.02, 0.05)
+            V, J = A * T * rng.uniform(0.2, 0.6), A / (T * rng.uniform(0.05, 0.25))
+            today = conventional_profiles([V], [A], [J / rng.uniform(1.5, 6)])
+            moves.append((int(np.ceil(today.total[0] / MS)), V, A, J))
+        if not all(14 <= n <= 48 for n, *_ in moves):
+            continue
+        m = rng.integers(1, 3)
+        f, zeta = 10 ** rng.uniform(0.9, 2.0, m), rng.choice([0.0, 0.03, 0.1], m)
+        weights = rng.uniform(-1, 1, (len(moves), m))
+        until = max(n for n, *_ in moves) + int(rng.choice([0, 0, 25]))
+        count -= 1
+        yield moves, f, zeta, weights, until
+
+
+def unit_moves(moves, f, zeta, weights, band=0.0):
+    """The same as the search gets them."""
+    return [
+        Move(n, V, A, J, mode_poles(f, zeta), own, np.arange(len(f)), band, MS)
+        for (n, V, A, J), own in zip(moves, weights, strict=True)
+    ]
+
+
+def left_by(optima, moves, f, zeta, weights, until):
+    """What the optima leave together of each mode, by quadrature."""
+    left = np.zeros(len(f), dtype=complex)
+    for optimum, (count, *_), own in zip(optima, moves, weights, strict=True):
+        jerk = np.repeat(optimum.jerk, np.diff(optimum.knots)) / MS**3
+        left += [row @ jerk for row in rows_until(until, count, f, zeta, own)]
+    return np.abs(left)
+
+
+def test_no_linear_programme_of_all_axes_finds_less_and_none_finds_much_more():
+    above_nothing, cancelled = 0, 0
+    for moves, f, zeta, weights, until in drawn(20):
+        rows = [
+            rows_until(until, n, f, zeta, own) for (n, *_), own in zip(moves, weights, strict=True)
+        ]
+        least = by_linear_programme(moves, rows)
+        optima = least_together(unit_moves(moves, f, zeta, weights), until, 1e-3, 1e-9)
+        assert (optima is None) == (least is None)
+        if optima is None:
+            continue
+        found = left_by(optima, moves, f, zeta, weights, until).max()
+        assert found == pytest.approx(optima[0].worst, rel=1e-6, abs=1e-11)
+        assert optima[0].worst <= least * 1.02 + 1e-8
+        assert optima[0].worst >= least * 0.998 - 1e-8
+        above_nothing += least > 1e-6
+        alone = [
+            least_residual(one, 1e-3).worst for one in unit_moves(moves, f, zeta, np.abs(weights))
+        ]
+        cancelled += optima[0].worst < 0.9 * max(alone)
+    assert above_nothing > 5, "too few of the drawn cases leave anything"
+    assert cancelled > 2, "no axes that cancel what others leave"
+
+
+def test_over_a_band_the_worst_is_that_of_a_dense_scan():
+    band = 0.08
+    for moves, f, zeta, weights, until in drawn(8):
+        optima = least_together(unit_moves(moves, f, zeta, weights, band), until, 1e-3, 1e-7)
+        if optima is None:
+            continue
+        every = np.linspace(1 - band, 1 + band, 33)
+        left = [left_by(optima, moves, f * r, zeta, weights, until).max() for r in every]
+        assert max(left) == pytest.approx(optima[0].worst, rel=0.01, abs=2e-9)
+
+
+MODES = {
+    "an axis that arrives early": [{"X": 1.0}, {"Y": 0.8}],
+    "a mode of both": [{"X": 1.0, "Y": -0.7}],
+    "modes of both and of one": [{"X": 0.4, "Y": 1.0}, {"X": 1.0}],
+}
+AXIS_LIMITS = (
+    "axes:\n"
+    "  X: {rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}, limit: {jerk: 7.0e+5}}\n"
+    "  Y: {rapid: {velocity: 400, acceleration: 3000, jerk: 3.0e+5}, limit: {jerk: 1.0e+6}}\n"
+)
+
+
+def machine_of(modes, band, more=""):
+    """A machine whose X and Y run each on its own."""
+    lines = "".join(
+        f"  - {{frequency: {f}, damping: {zeta}, participation: {participation}}}\n"
+        for f, zeta, participation in zip((19, 41), (0.05, 0.02), modes, strict=False)
+    ).replace("'", "")
+    design = f"design: {{band: {band}{more}}}\n"
+    return Machine.loads(
+        f"positioning: independent\ninterval: 0.001\n{design}modes:\n{lines}{AXIS_LIMITS}"
+    )
+
+
+@pytest.mark.parametrize("kind", MODES)
+@pytest.mark.parametrize("band", [0.0, 0.05])
+def test_no_profile_leaves_less_at_the_last_arrival_than_is_stated(kind, band):
+    machine = machine_of(MODES[kind], band)
+    rng = np.random.default_rng(5)
+    displacement = np.zeros((10, len(AXES)))
+    displacement[:, :2] = 10 ** rng.uniform(-1, 2, (10, 2)) * rng.choice([-1, 1], (10, 2))
+    stated = 0
+    for profile in ("conventional", "condition3", "cascade", "optimal"):
+        plans = plan_moves(displacement, machine, profile)
+        least = least_residuals(plans, band=band)
+        left = worst_at_arrival(plans.modes, band, plans.move, plans.share, plans.profiles)
+        planned = np.flatnonzero(plans.planned)
+        assert len(planned)
+        # A profile with segments off the grid may gain a little over the best on it.
+        assert (left[planned] >= 0.97 * least[planned] - 1e-6).all(), profile
+        stated += np.count_nonzero(least[planned] > 1e-4)
+    assert stated, "no move with anything to be left"
+
+
+def test_every_axis_arrives_at_rest_within_its_limits():
+    for moves, f, zeta, weights, until in drawn(10):
+        optima = least_together(unit_moves(moves, f, zeta, weights), until, 1e-3, 1e-9)
+        for optimum, (count, V, A, J) in zip(optima or [], moves, strict=False):
+            a, v, s = (m @ np.repeat(optimum.jerk, np.diff(optimum.knots)) / MS**3
+                       for m in matrices(count))  # fmt: skip
+            assert s[-1] == pytest.approx(1.0, abs=1e-9)
+            assert abs(v[-1]) < 1e-9 * V
+            assert abs(a[-1]) < 1e-9 * A
+            profile = optimum_profiles([optimum], MS)
+            assert profile.peak_velocity[0] <= V * (1 + 1e-6)
+            assert profile.least_velocity[0] >= -1e-6 * V
+            assert profile.peak_acceleration[0] <= A * (1 + 1e-6)
+            assert profile.greatest_jerk[0] <= min(J, A / MS) * (1 + 1e-6)
