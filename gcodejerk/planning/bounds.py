@@ -107,9 +107,11 @@ def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0
         require_solver()
     except PlanError:
         return None
+    counts = plans.counts
     if plans.machine.positioning != "linear":
-        return least_residuals(plans, progress, band)
-    first, like = same_rows(plans.displacement, plans.counts, plans.reason)
+        counts = np.zeros(plans.displacement.shape, dtype=np.int64)
+        counts[plans.move, np.argmax(plans.share != 0.0, axis=1)] = plans.profile_counts
+    first, like = same_rows(plans.displacement, counts, plans.reason)
     return gathered(least_residuals(plans.repeated(first), progress, band), like)
 
 
