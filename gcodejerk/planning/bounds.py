@@ -10,19 +10,18 @@ together for axes that excite the same modes, since what one of them leaves may 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
-from gcodejerk.motion import grouped, profiles_response
+from gcodejerk.motion import profiles_response
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.socp import require_solver
-from gcodejerk.planning.designs import move_of, question_of
-from gcodejerk.planning.optima import Progress, Question, answers
+from gcodejerk.planning.designs import question_of
+from gcodejerk.planning.optima import Progress, answers, joint_answers
 from gcodejerk.planning.plans import Plans, same_rows
+from gcodejerk.planning.sharing import joint_question, sharing
 from gcodejerk.planning.task import Task
 from gcodejerk.storage import gathered
 
@@ -90,7 +89,15 @@ def least_residuals(plans: Plans, progress: Progress | None = None, band: float 
     """
     task = Task.of(plans.machine, plans.modes, plans.share, plans.profile_counts, progress)
     task = replace(task, band=band)
-    sets = list(_not_alone(plans))
+    # An axis that arrives early is judged later, too, where its vibration decays until then.
+    excited = np.abs(plans.share) @ np.abs(plans.modes.participation).T > 0.0
+    damped = (excited & (plans.modes.poles.real < 0.0)).any(axis=1)
+    waits = damped & (plans.profile_counts < plans.counts[plans.move])
+    sets = [
+        rows
+        for rows in sharing(plans.modes, plans.move, plans.share)
+        if len(rows) > 1 or waits[rows[0]]
+    ]
     alone = np.ones(len(task), dtype=bool)
     alone[list(itertools.chain.from_iterable(sets))] = False
     least = np.where(plans.planned, 0.0, np.nan)
@@ -115,46 +122,21 @@ def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0
     return gathered(least_residuals(plans.repeated(first), progress, band), like)
 
 
-def _not_alone(plans: Plans) -> Iterator[list[int]]:
-    """Profiles, as rows, that excite modes of each other, or whose vibration decays for a while."""
-    excited = np.abs(plans.share) @ np.abs(plans.modes.participation).T > 0.0
-    damped = (excited & (plans.modes.poles.real < 0.0)).any(axis=1)
-    waits = damped & (plans.profile_counts < plans.counts[plans.move])
-    ends = np.searchsorted(plans.move, np.arange(len(plans) + 1))
-    for move in np.flatnonzero(np.diff(ends) > 1):
-        sets: list[tuple[list[int], NDArray[np.bool_]]] = []
-        for row in range(ends[move], ends[move + 1]):
-            rows, modes = [row], excited[row]
-            for other in [other for other in sets if (other[1] & modes).any()]:
-                sets.remove(other)
-                rows, modes = other[0] + rows, other[1] | modes
-            sets.append((rows, modes))
-        yield from (rows for rows, _ in sets if len(rows) > 1 or waits[rows[0]])
-
-
 def _joint_bounds(plans: Plans, task: Task, sets: list[list[int]]) -> Array:
     """The least that profiles which begin together leave at the last arrival, for each set [mm]."""
-    questions = [_joint_question(plans, task, rows) for rows in sets]
+    modes, nothing = plans.modes, NOTHING if task.band else NULL
+    until, weights = plans.counts[plans.move], plans.share @ modes.participation.T
+    questions = []
+    for rows in sets:
+        # The measure of what is small: what today's profiles leave in the worst phase.
+        own, last = task.take(np.array(rows)), int(until[rows[0]])
+        decay = np.exp(np.multiply.outer((last - own.counts) * task.interval, modes.poles.real))
+        response = profiles_response(own.conventional, modes.poles) / modes.poles.imag
+        each = np.abs(response * weights[rows]) * decay
+        today = max(float(modes.grouped(each.sum(axis=0)).max()), float(np.finfo(float).tiny))
+        questions.append(joint_question(task, rows, weights[rows], last, today, nothing * today))
     least = np.full(len(sets), np.nan)
-    for k, optimum in enumerate(answers(questions, task.progress)):
-        if optimum is not None:
-            least[k] = optimum.worst if optimum.worst > questions[k].allowed else 0.0
+    for k, found in enumerate(joint_answers(questions, task.progress)):
+        if found is not None:
+            least[k] = found[0].worst if found[0].worst > questions[k].allowed else 0.0
     return least
-
-
-def _joint_question(plans: Plans, task: Task, rows: list[int]) -> Question:
-    """What is asked about profiles that begin together."""
-    modes, own = plans.modes, task.take(np.array(rows))
-    weights = plans.share[rows] @ modes.participation.T
-    until = plans.counts[plans.move[rows[0]]]
-    # The measure of what is small: what today's profiles leave in the worst phase.
-    decay = np.exp(np.multiply.outer((until - own.counts) * task.interval, modes.poles.real))
-    each = np.abs(profiles_response(own.conventional, modes.poles) / modes.poles.imag * weights)
-    today = float(grouped((each * decay).sum(axis=0), modes.group).max())
-    reference = max(today, float(np.finfo(float).tiny))
-    first, *beside = (
-        replace(move_of(task, np.intp(row)), weights=signed)
-        for row, signed in zip(rows, weights, strict=True)
-    )
-    allowed = (NOTHING if task.band else NULL) * reference
-    return Question(first, reference, allowed, beside=tuple(beside), until=int(until))

@@ -179,7 +179,7 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     profiles, worst = task.conventional, np.full(len(task), np.inf)
     rows = np.nonzero(task.objective.weights.any(axis=1))[0]
     today = worst_in_band(task, task.conventional)
-    slack = np.maximum(NEXT_TO_NOTHING * today, SETTLED * task.tolerance)
+    slack = slack_of(task, today)
     questions = [question_of(task, k, float(today[k]), slack=float(slack[k])) for k in rows]
     profiles, worst = _answered(task, rows, answers(questions, task.progress), profiles, worst)
     found = np.isfinite(worst)
@@ -198,6 +198,12 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
         profiles = profiles.replaced(index[better], others.take(better))
         worst[index[better]] = residual[better]
     return profiles, worst
+
+
+def slack_of(task: Task, today: Array) -> Array:
+    """What may be left above the least, for less jerk, beside what today's rapid leaves [mm]."""
+    slack: Array = np.maximum(NEXT_TO_NOTHING * today, SETTLED * task.tolerance)
+    return slack
 
 
 def _guarding(task: Task, profiles: Profiles) -> NDArray[np.bool_]:

@@ -44,7 +44,7 @@ ARRIVED = 1e-9
 """Error of the end, for the unit length."""
 FEW = 16
 """Fewer problems than this are solved in this process."""
-GENERATION = 6
+GENERATION = 7
 """Counted on whenever the solver answers otherwise: answers of before are not taken."""
 NONE = b"none"
 """In the cache: the problem has no solution."""
@@ -70,11 +70,10 @@ class Question:
     settled : float
         But of those that leave no more than this, if there are any. [mm]
     beside : tuple of Move
-        Moves that begin with it and excite modes of the same machine: what all leave together is
-        to be least, which needs `until` and something `allowed`.
+        Moves that begin with it: what all leave together is asked about.
     until : int
-        Above 0: what rings then, at the last arrival, is what counts, and weights are signed.
-        [intervals]
+        Above 0: what rings then, at the last arrival, is what counts, and weights are signed;
+        nothing that is `allowed` is to be smooth. [intervals]
     """
 
     move: Move
@@ -126,7 +125,17 @@ Progress = Callable[[int, int], None]
 """Called with the number of problems that are solved, and of all."""
 
 
+Answer = list[Optimum] | None
+"""An optimum for each move of a question; None where no profiles keep the limits."""
+
+
 def answers(questions: list[Question], progress: Progress | None = None) -> list[Optimum | None]:
+    """The same as `joint_answers`, of questions about one move each."""
+    every = joint_answers(questions, progress)
+    return [None if found is None else found[0] for found in every]
+
+
+def joint_answers(questions: list[Question], progress: Progress | None = None) -> list[Answer]:
     """Solve problems, each distinct one once.
 
     Parameters
@@ -138,8 +147,8 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
 
     Returns
     -------
-    list of Optimum or None
-        n answers, that of its own move for each; None where no profile keeps the limits.
+    list of Answer
+        n answers.
 
     Raises
     ------
@@ -150,12 +159,12 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
     keys = [question.key() for question in questions]
     distinct = dict(zip(keys, questions, strict=True))
     file = cache_file()
-    found: dict[bytes, Optimum | None] = {}
+    found: dict[bytes, Answer] = {}
     kept = read_solutions(list(distinct), file)
     # That there is no solution is worth knowing, too; were it wrong, a move would lose, not break.
     found.update((key, None) for key, value in kept.items() if value == NONE)
     known = {key: _decoded(value) for key, value in kept.items() if value != NONE}
-    good = _holding(list(known.values()), [distinct[key].move for key in known])
+    good = _answering(list(known.values()), [distinct[key] for key in known])
     found.update((key, known[key]) for key, holds in zip(known, good, strict=True) if holds)
     missing = [key for key in distinct if key not in found]
     done = len(found)
@@ -167,15 +176,16 @@ def answers(questions: list[Question], progress: Progress | None = None) -> list
             done += len(part)
             if progress is not None:
                 progress(done, len(distinct))
-    out: list[Optimum | None] = []
+    out: list[Answer] = []
     for key, question in zip(keys, questions, strict=True):
-        own = found[key]
-        out.append(None if own is None else replace(own, worst=own.worst * question.scale))
+        own, scale = found[key], question.scale
+        whole = own and [replace(optimum, worst=optimum.worst * scale) for optimum in own]
+        out.append(whole)
     return out
 
 
 @contextmanager
-def _workers(problems: int) -> Iterator[Callable[[list[Question]], Iterator[Optimum | None]]]:
+def _workers(problems: int) -> Iterator[Callable[[list[Question]], Iterator[Answer]]]:
     """What solves problems one by one: all cores where that pays, this process otherwise.
 
     The solver keeps Python's lock, so threads would not help. Processes are forked: other ways of
@@ -217,7 +227,7 @@ def _linear_algebra() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _answer(question: Question) -> Optimum | None:
+def _answer(question: Question) -> Answer:
     """Solve one problem, for a largest weight of 1."""
     # The matrices are small: several threads, and one set for each process, only wait for each
     # other.
@@ -225,26 +235,43 @@ def _answer(question: Question) -> Optimum | None:
         return _solved(question)
 
 
-def _solved(question: Question) -> Optimum | None:
+def _solved(question: Question) -> Answer:
     """The same with as many threads as there are."""
-    scale, found = question.scale, None
+    scale = question.scale
     moves = [replace(move, weights=move.weights / scale) for move in question.moves]
-    unit, reference = moves[0], question.reference / scale
+    reference, allowed, slack, settled = (
+        size / scale
+        for size in (question.reference, question.allowed, question.slack, question.settled)
+    )
+    found: Answer = None
     if question.until:
-        all_found = least_together(moves, question.until, reference, question.allowed / scale)
-        if all_found is not None and _holding(all_found, moves).all():
-            found = all_found[0]
-    elif question.allowed:
-        found = smoothest_within(unit, question.allowed / scale)
-    elif question.slack:
-        found = near_least(unit, question.slack / scale, question.settled / scale, reference)
+        found = least_together(moves, question.until, reference, allowed, slack, settled)
     else:
-        found = least_residual(unit, reference)
-    return found if found is not None and _holding([found], [unit])[0] else None
+        if allowed:
+            one = smoothest_within(moves[0], allowed)
+        elif slack:
+            one = near_least(moves[0], slack, settled, reference)
+        else:
+            one = least_residual(moves[0], reference)
+        found = None if one is None else [one]
+    return found if found is not None and _answering([found], [question])[0] else None
+
+
+def _answering(solved: list[list[Optimum]], questions: list[Question]) -> list[bool]:
+    """Whether solutions are profiles of all moves of their questions, and of no more."""
+    whole = [len(x) == len(q.moves) for x, q in zip(solved, questions, strict=True)]
+    chosen = list(itertools.compress(zip(solved, questions, strict=True), whole))
+    optima = [optimum for found, _ in chosen for optimum in found]
+    moves = [move for _, question in chosen for move in question.moves]
+    each = iter(_holding(optima, moves).tolist())
+    return [
+        as_many and all(list(itertools.islice(each, len(question.moves))))
+        for as_many, question in zip(whole, questions, strict=True)
+    ]
 
 
 def _holding(optima: list[Optimum], moves: list[Move]) -> NDArray[np.bool_]:
-    """Whether solutions are profiles of these moves: their grid, their end, limits, no way back."""
+    """Whether optima are profiles of these moves: their grid, their end, limits, no way back."""
     sound = np.array([_sound(o, move) for o, move in zip(optima, moves, strict=True)], dtype=bool)
     rows = np.nonzero(sound)[0]
     if not len(rows):
@@ -283,18 +310,24 @@ def _sound(optimum: Optimum, move: Move) -> bool:
     )
 
 
-def _encoded(optimum: Optimum | None) -> bytes:
-    """A solution as bytes."""
-    if optimum is None:
+def _encoded(answer: Answer) -> bytes:
+    """A solution as bytes: of each move how many blocks, what is left, knots and jerks."""
+    if answer is None:
         return NONE
-    numbers: Array = np.concatenate([[optimum.worst], optimum.knots, optimum.jerk])
+    numbers: Array = np.concatenate(
+        [[len(x.jerk), x.worst, *x.knots, *x.jerk] for x in answer], dtype=np.float64
+    )
     return numbers.astype("<f8").tobytes()
 
 
-def _decoded(value: bytes) -> Optimum:
+def _decoded(value: bytes) -> list[Optimum]:
     """A solution from bytes; where they are something else it does not hold."""
     numbers: NDArray[np.float64] = np.frombuffer(value[: len(value) // 8 * 8], "<f8")
-    middle = len(numbers) // 2 + 1
-    with np.errstate(invalid="ignore"):
-        knots = numbers[1:middle].astype(np.int64)
-    return Optimum(knots, numbers[middle:], float(numbers[0]) if len(numbers) else np.nan)
+    optima: list[Optimum] = []
+    while len(numbers) and 0 < numbers[0] < len(numbers):
+        middle = int(numbers[0]) + 3
+        own, numbers = numbers[: 2 * middle - 3], numbers[2 * middle - 3 :]
+        with np.errstate(invalid="ignore"):
+            knots = own[2:middle].astype(np.int64)
+        optima.append(Optimum(knots, own[middle:], float(own[1])))
+    return optima

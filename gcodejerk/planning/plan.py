@@ -32,6 +32,7 @@ from gcodejerk.planning.designs import DESIGNS, shortest
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.refusals import limit_error, time_error
+from gcodejerk.planning.sharing import joint_optima
 from gcodejerk.planning.task import Task, worst_at_arrival, worst_in_band
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.spread import Spread, here
@@ -316,6 +317,11 @@ class _Planner:
                 keeps = useless & fits & (alone | in_time)
                 profiles = profiles.replaced(keeps, self.conventional.take(keeps))
                 worst, reference = self._at_arrival(profiles, worst)
+                if self.profile == "optimal":
+                    profiles, worst = joint_optima(
+                        self.task.after(counts), self.modes, self.move, self.share, profiles,
+                        worst, reference,
+                    )  # fmt: skip
                 useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
             self._rule_out_profiles(useless, Reason.NOT_BETTER)
             self.judged = worst, reference

@@ -1,13 +1,22 @@
 """What axes that run each on its own can leave at least, against one linear programme of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from scipy.signal import cont2discrete
+from test_motion_guard import acceleration, oscillator
 from test_motion_optimal import FACETS, MS, matrices, rows_of
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion import conventional_profiles, mode_poles
+from gcodejerk.motion.search.guard import (
+    guarded_frequencies,
+    split_at_peak,
+    undamped_response,
+)
 from gcodejerk.motion.search.optimal import least_residual
 from gcodejerk.motion.search.together import least_together
 from gcodejerk.motion.search.unit_move import Move, optimum_profiles
@@ -141,20 +150,21 @@ MODES = {
 }
 AXIS_LIMITS = (
     "axes:\n"
-    "  X: {rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}, limit: {jerk: 7.0e+5}}\n"
-    "  Y: {rapid: {velocity: 400, acceleration: 3000, jerk: 3.0e+5}, limit: {jerk: 1.0e+6}}\n"
+    "  X: {{rapid: {{velocity: 600, acceleration: 5000, jerk: 5.0e+5}}, limit: {{jerk: {0}e+5}}}}\n"
+    "  Y: {{rapid: {{velocity: 400, acceleration: 3000, jerk: 3.0e+5}}, limit: {{jerk: {1}e+6}}}}\n"
 )
 
 
-def machine_of(modes, band, more=""):
+def machine_of(modes, band, jerk=(7.0, 1.0)):
     """A machine whose X and Y run each on its own."""
     lines = "".join(
         f"  - {{frequency: {f}, damping: {zeta}, participation: {participation}}}\n"
         for f, zeta, participation in zip((19, 41), (0.05, 0.02), modes, strict=False)
     ).replace("'", "")
-    design = f"design: {{band: {band}{more}}}\n"
+    design = f"design: {{band: {band}}}\n"
     return Machine.loads(
-        f"positioning: independent\ninterval: 0.001\n{design}modes:\n{lines}{AXIS_LIMITS}"
+        f"positioning: independent\ninterval: 0.001\n{design}modes:\n{lines}"
+        + AXIS_LIMITS.format(*jerk)
     )
 
 
@@ -192,3 +202,87 @@ def test_every_axis_arrives_at_rest_within_its_limits():
             assert profile.least_velocity[0] >= -1e-6 * V
             assert profile.peak_acceleration[0] <= A * (1 + 1e-6)
             assert profile.greatest_jerk[0] <= min(J, A / MS) * (1 + 1e-6)
+
+
+def test_every_axis_keeps_its_own_guard():
+    # Of modes that nobody named nobody knows how axes add up: each keeps to its own rapid of today.
+    gained, broken = 0, 0
+    for moves, f, zeta, weights, until in drawn(10):
+        todays = [conventional_profiles([V], [A], [J]).general() for _, V, A, J in moves]
+        counts = [int(np.ceil(today.total[0] / MS - 1e-6)) for today in todays]
+        until = max(until, *counts)
+        guarded = [
+            replace(move, count=n, jerk=8 * move.jerk, today=today, guard=1.0)
+            for move, n, today in zip(
+                unit_moves(moves, f, zeta, weights, 0.05), counts, todays, strict=True
+            )
+        ]
+        reference = 1e-3
+        optima = least_together(guarded, until, reference, 1e-5, 1e-5, 1e-5)
+        free = least_together(
+            [replace(m, guard=0.0) for m in guarded], until, reference, 1e-5, 1e-5, 1e-5
+        )
+        if optima is None:
+            continue
+        # Slack and tolerances of the search beside it.
+        assert free[0].worst <= optima[0].worst * 1.02 + 2e-5
+        for move, own, loose, signed in zip(guarded, optima, free, weights, strict=True):
+            omega = guarded_frequencies(move.poles[signed != 0.0], 0.05, MS, move.count * MS)
+            for w in omega[:: max(1, len(omega) // 12)]:
+                near = np.linspace(0.85 * w, 1.15 * w, 201)
+                halves = split_at_peak(move.today)
+                most = sum(undamped_response(half, near) for half in halves).max()
+                kept, unguarded = (
+                    oscillator(w, acceleration(optimum_profiles([x], MS), 1e4)[1], 1e-4)
+                    for x in (own, loose)
+                )
+                assert kept <= 1.02 * most
+                broken += unguarded > 1.05 * most
+        gained += 1
+    assert gained > 4, "too few of the drawn cases have a guarded optimum"
+    assert broken > 10, "no guard that costs anything"
+
+
+def test_axes_that_share_a_mode_are_designed_together(monkeypatch):
+    machine = machine_of(MODES["a mode of both"], 0.05, (40.0, 3.0))
+    rng = np.random.default_rng(8)
+    displacement = np.zeros((6, len(AXES)))
+    displacement[:, :2] = 10 ** rng.uniform(-0.5, 1, (6, 2)) * rng.choice([-1, 1], (6, 2))
+    together = plan_moves(displacement, machine, "optimal")
+    monkeypatch.setattr("gcodejerk.planning.plan.joint_optima", lambda *given: (given[4], given[5]))
+    apart = plan_moves(displacement, machine, "optimal")
+    assert together.planned.all()
+    np.testing.assert_array_equal(together.counts, apart.counts)
+    left = {}
+    for name, plans in (("together", together), ("apart", apart)):
+        band = [0.95, 0.975, 1.0, 1.025, 1.05]
+        left[name] = np.full(len(displacement), np.nan)
+        left[name][np.unique(plans.move)] = [
+            max(left_at_arrival(plans, move, scale) for scale in band)
+            for move in np.unique(plans.move)
+        ]
+    known = np.isfinite(left["apart"])
+    assert np.all(left["together"][known] <= left["apart"][known] * 1.01 + 1e-6)
+    assert np.median(left["together"][known] / left["apart"][known]) < 0.5
+    np.testing.assert_allclose(
+        left["together"], together.worst_in_band, rtol=0.03, atol=1e-6
+    )  # fmt: skip
+
+
+def left_at_arrival(plans, move, scale):
+    """What a move leaves of the one mode when its last axis has arrived, by integration."""
+    rows = plans.profiles_of(move)
+    dt, total = 1e-5, plans.counts[move] * MS
+    a = np.zeros(round(total / dt))
+    for row in rows:
+        own = acceleration(plans.profiles.take(np.array([row])), 1 / dt)[1]
+        a[: len(own)] += own * float(plans.share[row] @ plans.modes.participation[0])
+    pole = plans.modes.poles[0] * scale
+    # x'' + 2 zeta w x' + w^2 x = -a, by its own exponential.
+    omega = abs(pole)
+    system = np.array([[0.0, 1.0], [-(omega**2), 2 * pole.real]]), np.array([[0.0], [-1.0]])
+    step, push, *_ = cont2discrete((*system, np.eye(2), np.zeros((2, 1))), dt)
+    state = np.zeros(2)
+    for value in a:
+        state = step @ state + push[:, 0] * value
+    return float(abs(state[1] - np.conj(pole) * state[0]) / pole.imag)

@@ -78,12 +78,12 @@ def tampered(value):
     yield value[:5]
     yield b""
     yield np.full(len(numbers), np.nan).tobytes()
-    for k in (1, 3, len(numbers) - 2):
+    for k in (0, 2, 4, len(numbers) - 2):
         wrong = numbers.copy()
         wrong[k] = 1.5 * wrong[k] + 1.0
         yield wrong.tobytes()
     faster = numbers.copy()
-    faster[len(numbers) // 2 + 1 :] *= 1.01
+    faster[int(numbers[0]) + 3 :] *= 1.01
     yield faster.tobytes()
 
 
@@ -137,8 +137,8 @@ def test_many_problems_are_solved_by_several_processes_alike(monkeypatch):
     for a, b, q in zip(together, alone, questions, strict=True):
         assert (a is None) == (b is None)
         if a is not None:
-            np.testing.assert_allclose(a.jerk, b.jerk)
-            assert a.worst == pytest.approx(b.worst * float(q.move.weights[0]))
+            np.testing.assert_allclose(a.jerk, b[0].jerk)
+            assert a.worst == pytest.approx(b[0].worst * float(q.move.weights[0]))
 
 
 def test_what_the_limits_do_not_allow_has_no_answer():

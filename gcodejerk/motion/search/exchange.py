@@ -32,7 +32,10 @@ NULL = 1e-6
 
 
 def exchanged(
-    solved: Callable[[Flags, float], Kind | None], active: Flags, allowed: float
+    solved: Callable[[Flags, float], Kind | None],
+    active: Flags,
+    allowed: float,
+    rounds: int = ROUNDS,
 ) -> Kind | None:
     """The least residual, frequencies added until none between is worse.
 
@@ -45,13 +48,14 @@ def exchanged(
         The groups that the first programme knows.
     allowed : float
         Residual that costs nothing, over the measure. [-]
+    rounds : int, optional
+        Programmes at most.
 
     Returns
     -------
     Found or None
         The best of what was found.
     """
-    rounds = ROUNDS
     cost = JERK_COST if allowed else LEAST_COST
     best: Kind | None = None
     while rounds > 0:

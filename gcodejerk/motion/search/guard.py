@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.residual import Complex
+from gcodejerk.motion.search.unit_move import Move
 
 ABOVE, BELOW = 1.3, 5.0
 """Guarded is from so many times the frequency of a mode to so many times it."""
@@ -142,6 +143,30 @@ def with_narrows(today: Profiles, omega: Array) -> tuple[Array, Array]:
     narrow = (bound < sides[:-2]) & (bound < sides[2:])
     kept = np.isin(every, omega) | narrow
     return every[kept], bound[kept]
+
+
+def guarded_response(move: Move, poles: Complex, duration: float) -> tuple[Array, Array] | None:
+    """The frequencies that are guarded of a move, and the response that each of them may keep.
+
+    Parameters
+    ----------
+    move : Move
+        Its guard is 0, and nothing guarded, where anything may be left.
+    poles : ndarray of complex
+        Of the modes that it excites. [rad/s]
+    duration : float
+        Of the move, or of the part of it that is designed. [s]
+
+    Returns
+    -------
+    omega, allowed : ndarray, shape (k,), or None
+        [rad/s] and [1/s]
+    """
+    if move.today is None or not move.guard:
+        return None
+    omega = guarded_frequencies(poles, move.band, move.interval, duration)
+    omega, bound = with_narrows(move.today, omega)
+    return omega, move.guard * bound * share_between(omega, duration)
 
 
 def share_between(omega: Array, duration: float) -> float:

@@ -75,7 +75,8 @@ class LookedAt:
         """Modes over a relative band, for profiles (or ramps) of some duration [s].
 
         `weights`, shape (m,), are over the measure; groups of several modes, which are spectra,
-        have no band. `guarded`: frequencies [rad/s] and the response that each may keep [1/s].
+        have no band. `guarded`: frequencies [rad/s] and the response that each may keep [1/s],
+        ascending, or one such stretch behind another.
         """
         single = np.bincount(group, minlength=1)[group] == 1
         half = 0.5 * band * np.abs(poles) * duration
@@ -136,7 +137,8 @@ def _nodes(
     near, share = np.zeros((len(poles), 4), dtype=np.int64), np.zeros((len(poles), 4))
     near[:modes], share[:modes, 0] = np.arange(modes)[:, np.newaxis], 1.0
     nodes, total = [poles[:modes]], modes
-    gaps = np.flatnonzero(0.5 * duration * np.diff(size[modes:]) > BREAK)
+    apart = 0.5 * duration * np.diff(size[modes:])
+    gaps = np.flatnonzero((apart > BREAK) | (apart < 0.0))
     begins = modes + np.concatenate([[0], gaps + 1, [len(poles) - modes]])
     for begin, end in itertools.pairwise(begins if modes < len(poles) else []):
         some = slice(begin, end)

@@ -24,7 +24,7 @@ import numpy as np
 from gcodejerk.motion.search.blocks import Blocks, Ringing
 from gcodejerk.motion.search.exchange import USED, exchanged
 from gcodejerk.motion.search.found import GUARDED, Found, better
-from gcodejerk.motion.search.guard import guarded_frequencies, share_between, with_narrows
+from gcodejerk.motion.search.guard import guarded_response
 from gcodejerk.motion.search.knots import (
     FEWEST_INTERVALS,
     MOST_REFINED,
@@ -255,11 +255,7 @@ class _Search:
     def _looked_at(self, intervals: int) -> LookedAt:
         """The frequencies that count for a profile, or a ramp, of so many intervals."""
         move, duration = self.move, intervals * self.move.interval
-        guarded = None
-        if move.today is not None and move.guard:
-            omega = guarded_frequencies(self.poles, move.band, move.interval, duration)
-            omega, bound = with_narrows(move.today, omega)
-            guarded = omega, move.guard * bound * share_between(omega, duration)
+        guarded = guarded_response(move, self.poles, duration)
         return LookedAt.of(self.poles, self.weights, self.group, move.band, duration, guarded)
 
     def _problem(self, looked_at: LookedAt, blocks: Blocks, active: Flags) -> Problem:

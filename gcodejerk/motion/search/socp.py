@@ -184,7 +184,9 @@ def _solve_once(
             else:
                 rows.add([], cap)
             own = _condensed(response[part])
-            rows.dense(own, columns)
+            # A guarded frequency is one of one move: the others' columns are empty.
+            used = own.any(axis=0)
+            rows.dense(own[:, used], columns[used])
             cones.append(clarabel.SecondOrderConeT(1 + len(own)))
     width = above + (allowed is not None)
     matrix, bound = rows.assembled(width)

@@ -1,4 +1,4 @@
-"""The least that moves leave which begin together: axes that run each on its own.
+"""The optimum of moves that begin together: axes that run each on its own.
 
 The vibration of an axis that arrives early decays until the last one stops, and where several axes
 excite the same mode, what one leaves can cancel what another does. So what no profiles can undercut
@@ -17,30 +17,40 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import grouped
 from gcodejerk.motion.search.blocks import Blocks, Ringing
 from gcodejerk.motion.search.exchange import USED, exchanged
-from gcodejerk.motion.search.found import Found, better
+from gcodejerk.motion.search.found import GUARDED, Found, better
+from gcodejerk.motion.search.guard import guarded_response
 from gcodejerk.motion.search.knots import (
     FEWEST_INTERVALS,
     MOST_REFINED,
+    coarse_knots,
     first_knots,
     ramp_intervals,
     refined_knots,
 )
 from gcodejerk.motion.search.looked_at import Flags, LookedAt
 from gcodejerk.motion.search.programme import Index, Solution
+from gcodejerk.motion.search.refining import Asked
 from gcodejerk.motion.search.socp import solve_together
 from gcodejerk.motion.search.unit_move import Move, Optimum
 
+MOST_GUARDED = 220
+"""Blocks of all moves together at most, where frequencies are guarded."""
+ROUNDS = 10
+"""Programmes at most, until all frequencies keep what they may: each move has its own."""
+
 
 def least_together(
-    moves: Sequence[Move], until: int, reference: float, allowed: float
-) -> list[Optimum] | None:
+    moves: Sequence[Move], until: int, reference: float, allowed: float, slack: float = 0.0,
+    settled: float = 0.0,
+) -> list[Optimum] | None:  # fmt: skip
     """The profiles that together leave the least worst residual over the band.
 
     Parameters
     ----------
     moves : sequence of Move
         They begin together. Poles, groups, band and interval are those of all; weights have the
-        sign of what adds up; there is no guard.
+        sign of what adds up. Each keeps its own guard, for who knows what adds up of modes that
+        nobody named.
     until : int
         When it is judged: at the last arrival, of these moves or of one that excites none of their
         modes. [intervals]
@@ -48,12 +58,14 @@ def least_together(
         Residual of the controller's own profiles, the measure for what is small, above 0. [mm]
     allowed : float
         A residual that is as good as none, above 0. [mm]
+    slack, settled : float, optional
+        As of `near_least`: what may be left above the least, for less peak jerk. [mm]
 
     Returns
     -------
     list of Optimum or None
         One for each move, its `worst` that of all; None where no profiles on the grid keep the
-        limits.
+        limits and the guards.
 
     Raises
     ------
@@ -62,23 +74,31 @@ def least_together(
     """
     if min(move.count for move in moves) < FEWEST_INTERVALS:
         return None
-    search = _Search(moves, until, reference, allowed / reference)
-    knots = [first_knots(move.count, ramp_intervals(move), False) for move in moves]
-    found = search.least(knots)
-    if found is not None and found.worst > search.allowed:
-        most = MOST_REFINED // len(moves)
-        finer = [
-            refined_knots(own, solution.jerk, False, max(most, len(own)))
-            for own, solution in zip(knots, found.solutions, strict=True)
-        ]
-        if any(len(cut) > len(own) for cut, own in zip(finer, knots, strict=True)):
-            found = better(found, search.least(finer, found.active))
-    if found is None:
+    asked = Asked(allowed / reference, settled / reference, slack / reference, today=1.0)
+    search = _Search(moves, until, reference)
+    found = search.least([_first_knots(move) for move in moves], asked.allowed)
+    # Shorter blocks cannot gain more than there is.
+    if found is not None and not found.meets(max(asked.allowed, asked.slack)):
+        finer = search.finer(found)
+        found = better(found, search.least(finer, asked.allowed, found)) if finer else found
+    if found is None or not found.guards:
         return None
+    if found.worst > asked.allowed and asked.slack:
+        enough = found.worst + asked.given(found.worst)
+        if found.worst <= USED * asked.settled:
+            enough = min(enough, asked.settled)
+        smooth = search.least([own.knots for own in found.every], enough, found)
+        found = smooth if smooth is not None and smooth.meets(enough) else found
     return [
         Optimum(blocks.knots, solution.jerk / move.count**3, found.worst * reference)
         for move, blocks, solution in zip(moves, found.every, found.solutions, strict=True)
     ]
+
+
+def _first_knots(move: Move) -> Index:
+    """Ends of the first blocks of a move; where frequencies are guarded, which are many, few."""
+    ramp = ramp_intervals(move)
+    return coarse_knots(move, ramp) if move.guard else first_knots(move.count, ramp, False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,35 +112,48 @@ class _Found(Found):
 class _Search:
     """The moves, and the frequencies that they share."""
 
-    def __init__(self, moves: Sequence[Move], until: int, reference: float, allowed: float) -> None:
-        self.moves, self.allowed = moves, allowed
+    def __init__(self, moves: Sequence[Move], until: int, reference: float) -> None:
+        self.moves = moves
         weights: Array = np.stack([move.weights for move in moves]) / reference
         used = weights.any(axis=0)
         _, group = np.unique(moves[0].group[used], return_inverse=True)
         poles, band, interval = moves[0].poles[used], moves[0].band, moves[0].interval
-        # The same frequencies for all, each move with its own weights.
-        self.looked_at = [
-            LookedAt.of(poles, own[used], group, band, until * interval) for own in weights
+        # The same frequencies for all: every move has its own weights, and its own guard.
+        guards = [
+            guarded_response(move, move.poles[move.weights != 0.0], move.count * interval)
+            or (np.zeros(0), np.zeros(0))
+            for move in moves
         ]
+        omega, allowed = (np.concatenate(part) for part in zip(*guards, strict=True))
+        guarded = np.repeat(np.arange(len(moves)), [len(own) for own, _ in guards])
+        self.looked_at = [
+            LookedAt.of(
+                poles, own[used], group, band, until * interval,
+                (omega, np.where(guarded == k, allowed, np.inf)),
+            )
+            for k, own in enumerate(weights)
+        ]  # fmt: skip
+        self.cap = np.where(self.looked_at[0].source < 0, GUARDED, np.nan)
         self.ringing = Ringing.of(self.looked_at[0], 0, until, until, interval)
         self.curved = False
 
-    def least(self, knots: list[Index], active: Flags | None = None) -> _Found | None:
-        """The least residual for these blocks, from the frequencies that are active."""
+    def least(
+        self, knots: list[Index], allowed: float, start: _Found | None = None
+    ) -> _Found | None:
+        """The least residual for these blocks, from the frequencies that were active."""
         blocks = [
             Blocks.until(looked_at, own, move.interval, self.ringing)
             for looked_at, own, move in zip(self.looked_at, knots, self.moves, strict=True)
         ]
         first = self.looked_at[0]
-        free = np.full(len(first.first), np.nan)
 
         def solved(active: Flags, cost: float) -> _Found | None:
             problems = [
-                own.problem(move, active, free)
+                own.problem(move, active, self.cap)
                 for own, move in zip(blocks, self.moves, strict=True)
             ]
             cost /= len(problems)
-            solutions = solve_together(problems, USED * self.allowed, cost, self.curved)
+            solutions = solve_together(problems, USED * allowed, cost, self.curved)
             if solutions is None:
                 return None
             self.curved |= solutions[0].curved
@@ -132,4 +165,16 @@ class _Search:
             usual = replace(solutions[0], peak=peak)
             return _Found(first, blocks[0], active, usual, left, blocks, solutions)
 
-        return exchanged(solved, first.first if active is None else active, self.allowed)
+        active = first.first if start is None else start.active
+        return exchanged(solved, active, allowed, ROUNDS)
+
+    def finer(self, found: _Found) -> list[Index] | None:
+        """Ends of shorter blocks where the jerk acts; None where there are none."""
+        knots = [own.knots for own in found.every]
+        guarded = any(move.guard for move in self.moves)
+        most = (MOST_GUARDED if guarded else MOST_REFINED) // len(self.moves)
+        cut = [
+            refined_knots(own, solution.jerk, False, max(most, len(own)))
+            for own, solution in zip(knots, found.solutions, strict=True)
+        ]
+        return cut if sum(map(len, cut)) > sum(map(len, knots)) else None
