@@ -216,7 +216,8 @@ def _segments(segments: Sequence[Record]) -> str:
     """Durations of the segments; how many there are where they are many."""
     times = [s["duration"] * MS_PER_S for s in segments]
     if len(times) > MOST_SEGMENTS:
-        return f"{len(times)} of {min(times):.4g} to {max(times):.4g}"
+        shortest, longest = f"{min(times):.4g}", f"{max(times):.4g}"
+        return f"{len(times)} of {shortest}" + f" to {longest}" * (longest != shortest)
     return " / ".join(f"{t:.4g}" for t in times)
 
 

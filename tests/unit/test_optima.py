@@ -10,7 +10,7 @@ from gcodejerk.errors import PlanError
 from gcodejerk.motion import mode_poles
 from gcodejerk.motion.search.unit_move import Move, optimum_profiles
 from gcodejerk.planning import optima
-from gcodejerk.planning.optima import Question, answers
+from gcodejerk.planning.optima import Question, answers, joint_answers
 from gcodejerk.planning.solution_cache import VARIABLE, cache_file, read_solutions, write_solutions
 
 MS = 0.001
@@ -96,6 +96,40 @@ def test_a_solution_from_the_disk_that_is_none_is_solved_again(solved):
         again = answers([question()])[0]
         assert len(solved) == count
         np.testing.assert_allclose(again.jerk, good.jerk)
+
+
+def joint_question(count=40):
+    """Two axes that excite one mode against each other, the second one shorter."""
+    first, second = question(1.0, count).move, question(0.5, count - 6).move
+    return Question(
+        first, 0.5, 1e-4, beside=(replace(second, weights=-second.weights),),
+        until=count,
+    )  # fmt: skip
+
+
+def test_joint_solutions_are_read_again_and_none_is_taken_for_another(solved):
+    first = joint_answers([joint_question(), joint_question(42), joint_question()])
+    assert len(solved) == 2
+    again = joint_answers([joint_question(42), joint_question()])
+    assert len(solved) == 2
+    for a, b in ((first[1], again[0]), (first[0], again[1]), (first[2], again[1])):
+        assert len(a) == len(b) == 2
+        for one, other in zip(a, b, strict=True):
+            np.testing.assert_array_equal(one.knots, other.knots)
+            np.testing.assert_array_equal(one.jerk, other.jerk)
+            assert one.worst == other.worst == a[0].worst
+    assert [optimum.knots[-1] for optimum in first[1]] == [42, 36]
+    # One of the two by itself, both in the wrong order, and a third one.
+    key = joint_question().key()
+    value = read_solutions([key], cache_file())[key]
+    half = 8 * (2 * len(first[0][0].jerk) + 3)
+    for count, wrong in enumerate(
+        (value[:half], value[half:] + value[:half], value + value[half:], value[:-8]), 3
+    ):
+        write_solutions({key: wrong}, cache_file())
+        (mended,) = joint_answers([joint_question()])
+        assert len(solved) == count
+        np.testing.assert_allclose(mended[1].jerk, first[0][1].jerk)
 
 
 @pytest.mark.parametrize("limit", ["velocity", "acceleration", "jerk"])
