@@ -72,8 +72,9 @@ class Question:
     beside : tuple of Move
         Moves that begin with it: what all leave together is asked about.
     until : int
-        Above 0: what rings then, at the last arrival, is what counts, and weights are signed;
-        nothing that is `allowed` is to be smooth. [intervals]
+        Above 0: what rings then, at the last arrival, is what counts, and weights are signed. What
+        is `allowed` is then as good as none, and no smoothest profile is sought for it.
+        [intervals]
     """
 
     move: Move
@@ -324,10 +325,10 @@ def _decoded(value: bytes) -> list[Optimum]:
     """A solution from bytes; where they are something else it does not hold."""
     numbers: NDArray[np.float64] = np.frombuffer(value[: len(value) // 8 * 8], "<f8")
     optima: list[Optimum] = []
-    while len(numbers) and 0 < numbers[0] < len(numbers):
+    while len(numbers) and 1.0 <= numbers[0] <= 0.5 * (len(numbers) - 3):
         middle = int(numbers[0]) + 3
         own, numbers = numbers[: 2 * middle - 3], numbers[2 * middle - 3 :]
         with np.errstate(invalid="ignore"):
             knots = own[2:middle].astype(np.int64)
         optima.append(Optimum(knots, own[middle:], float(own[1])))
-    return optima
+    return [] if len(numbers) else optima

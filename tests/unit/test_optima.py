@@ -76,6 +76,8 @@ def tampered(value):
     numbers = np.frombuffer(value, "<f8").copy()
     yield value[:-8]
     yield value[:5]
+    yield np.array([0.5]).tobytes()
+    yield value + np.zeros(1).tobytes()
     yield b""
     yield np.full(len(numbers), np.nan).tobytes()
     for k in (0, 2, 4, len(numbers) - 2):
