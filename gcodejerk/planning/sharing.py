@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from gcodejerk.motion import Profiles
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.search.together import OFF
 from gcodejerk.motion.search.unit_move import optimum_profiles
 from gcodejerk.planning.designs import move_of, slack_of
 from gcodejerk.planning.optima import Question, joint_answers
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.task import Task, worst_at_arrival
 
-LONGEST = 500
-"""Intervals of moves whose axes are designed together at most: longer ones would take seconds each,
+LONGEST = 400
+"""Intervals of all axes that are designed together, at most: longer ones would take seconds each,
 and have time enough for each axis by itself."""
 
 
@@ -118,8 +119,12 @@ def joint_optima(
     slack = slack_of(task, today)
     last = np.zeros(int(move.max(initial=-1)) + 1, dtype=np.int64)
     np.maximum.at(last, move, task.counts)
-    worth = np.isfinite(left) & (left > slack) & (last[move] <= LONGEST)
-    sets = [rows for rows in sharing(modes, move, share) if len(rows) > 1 and worth[rows].all()]
+    worth = np.isfinite(left) & (left > slack)
+    sets = [
+        rows
+        for rows in sharing(modes, move, share)
+        if len(rows) > 1 and worth[rows].all() and task.counts[rows].sum() <= LONGEST
+    ]
     weights = share @ modes.participation.T
     questions = []
     for rows in sets:
@@ -135,9 +140,12 @@ def joint_optima(
     joint = profiles.replaced(index, optimum_profiles(optima, task.interval))
     concerned = np.isin(move, move[index])
     _, own = np.unique(move[concerned], return_inverse=True)
-    less = np.full(len(left), np.inf)
-    less[concerned] = worst_at_arrival(
-        modes, task.band, own, share[concerned], joint.take(concerned)
-    )[own]
-    better = less < left
-    return profiles.replaced(better, joint.take(better)), np.where(better, less, left)
+    # What cancels has to be worth it where the modes are not excited as the file says, too.
+    less, before, now = (
+        worst_at_arrival(modes, task.band, own, share[concerned], of.take(concerned), off)[own]
+        for of, off in ((joint, OFF), (profiles, OFF), (joint, 0.0))
+    )
+    better, after = concerned.copy(), left.copy()
+    better[concerned] = (less < before) & (now < left[concerned])
+    after[better] = now[better[concerned]]
+    return profiles.replaced(better, joint.take(better)), after

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +26,13 @@ from gcodejerk.motion import (
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
 from gcodejerk.motion.search.rows import parts
+from gcodejerk.motion.search.together import mixed_signs
 from gcodejerk.planning.conventional import conventional_limits, todays_profiles, unit_limits
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import Modes
 from gcodejerk.spread import Spread, here
+
+Kind = TypeVar("Kind", np.complex128, np.float64)
 
 AT_ONCE = 1 << 18
 """Residuals, of moves at frequencies, that are judged at a time: some 12 MB."""
@@ -235,8 +239,9 @@ def worst_in_band(task: Task, profiles: Profiles) -> Array:
 
 
 def worst_at_arrival(
-    modes: Modes, band: float, move: NDArray[np.int64], share: Array, profiles: Profiles
-) -> Array:
+    modes: Modes, band: float, move: NDArray[np.int64], share: Array, profiles: Profiles,
+    off: float = 0.0,
+) -> Array:  # fmt: skip
     """The same for moves of several profiles: what is left when the last of them has ended.
 
     Parameters
@@ -251,6 +256,9 @@ def worst_at_arrival(
         Displacement of each axis that the profile carries. [mm] or [deg]
     profiles : Profiles
         l unit profiles; those of a move begin together.
+    off : float, optional
+        How much some of them may excite a mode more, and others less, than stated: what they
+        leave together is the largest of all that. [-]
 
     Returns
     -------
@@ -271,8 +279,24 @@ def worst_at_arrival(
             left = arrival[move[index]] - profiles.total[index]
             each = profiles_response(profiles.take(index), around.poles)
             each *= np.exp(around.poles * left[:, np.newaxis]) * (share[index] @ around.weights)
-            response = np.zeros((len(chosen), len(around.poles)), dtype=np.complex128)
-            np.add.at(response, np.searchsorted(chosen, move[index]), each)
-            displacement = np.abs(response) / around.poles.imag
+            row = np.searchsorted(chosen, move[index])
+            largest = np.abs(_summed(each, row, len(chosen)))
+            if off:
+                excites = 1.0 * (each != 0.0)
+                several = _summed(excites, row, len(chosen))
+                place = np.arange(len(row)) - np.searchsorted(row, row)
+                for signs in mixed_signs(int(place.max(initial=0)) + 1):
+                    sign = np.array(signs)[place, np.newaxis]
+                    scaled = np.abs(_summed(each * (1.0 + off * sign), row, len(chosen)))
+                    mixed = np.abs(_summed(excites * sign, row, len(chosen))) < several
+                    largest = np.where(mixed, np.maximum(largest, scaled), largest)
+            displacement = largest / around.poles.imag
             worst[chosen] = grouped(displacement, around.group).max(axis=1, initial=0.0)
     return worst
+
+
+def _summed(each: NDArray[Kind], row: NDArray[np.intp], count: int) -> NDArray[Kind]:
+    """Sums of rows that belong to each of so many."""
+    out = np.zeros((count, each.shape[1]), dtype=each.dtype)
+    np.add.at(out, row, each)
+    return out

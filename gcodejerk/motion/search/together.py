@@ -8,6 +8,7 @@ programme: each move has its own limits and its own blocks of jerk, and their ro
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -33,6 +34,8 @@ from gcodejerk.motion.search.refining import Asked
 from gcodejerk.motion.search.socp import solve_together
 from gcodejerk.motion.search.unit_move import Move, Optimum
 
+OFF = 0.2
+"""Relative error of how strongly each move excites a mode, to which what cancels is robust."""
 MOST_GUARDED = 220
 """Blocks of all moves together at most, where frequencies are guarded."""
 ROUNDS = 10
@@ -44,6 +47,10 @@ def least_together(
     settled: float = 0.0,
 ) -> list[Optimum] | None:  # fmt: skip
     """The profiles that together leave the least worst residual over the band.
+
+    What cancels does so only as far as it is known how strongly each move excites a mode: where
+    there is slack, which is where profiles are designed, that may be wrong by `OFF` for each of
+    them.
 
     Parameters
     ----------
@@ -64,8 +71,8 @@ def least_together(
     Returns
     -------
     list of Optimum or None
-        One for each move, its `worst` that of all; None where no profiles on the grid keep the
-        limits and the guards.
+        One for each move, its `worst` that of all, with what may be wrong; None where no profiles
+        on the grid keep the limits and the guards.
 
     Raises
     ------
@@ -75,7 +82,7 @@ def least_together(
     if min(move.count for move in moves) < FEWEST_INTERVALS:
         return None
     asked = Asked(allowed / reference, settled / reference, slack / reference, today=1.0)
-    search = _Search(moves, until, reference)
+    search = _Search(moves, until, reference, OFF if slack else 0.0)
     found = search.least([_first_knots(move) for move in moves], asked.allowed)
     # Shorter blocks cannot gain more than there is.
     if found is not None and not found.meets(max(asked.allowed, asked.slack)):
@@ -101,6 +108,44 @@ def _first_knots(move: Move) -> Index:
     return coarse_knots(move, ramp) if move.guard else first_knots(move.count, ramp, False)
 
 
+def mixed_signs(count: int) -> list[tuple[int, ...]]:
+    """All ways to give so many numbers signs that are not all the same."""
+    signs = itertools.product((1, -1), repeat=count)
+    return [own for own in signs if len(set(own)) > 1]
+
+
+def _scaled(weights: Array, off: float) -> tuple[Index, Array, Index]:
+    """Every mode, and those that several moves excite also with weights that are wrong by `off`.
+
+    Of what adds up the largest is at such corners; who is wrong alike for all is nothing new.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (r, m)
+        Of r moves.
+    off : float
+        Relative error. [-]
+
+    Returns
+    -------
+    mode : ndarray of int, shape (q,)
+    factor : ndarray, shape (r, q)
+        By which the weights of each are multiplied.
+    which : ndarray of int, shape (q,)
+        Counts those of one mode.
+    """
+    modes, factors, which = [], [], []
+    for mode in np.flatnonzero(weights.any(axis=0)).tolist():
+        moving = np.flatnonzero(weights[:, mode])
+        for k, signs in enumerate([(0,) * len(moving), *(mixed_signs(len(moving)) if off else [])]):
+            factor = np.ones(len(weights))
+            factor[moving] += off * np.array(signs)
+            modes.append(mode)
+            factors.append(factor)
+            which.append(k)
+    return np.array(modes), np.stack(factors, axis=1), np.array(which)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found(Found):
     """What was found for several moves: the blocks and the solution of each."""
@@ -112,12 +157,13 @@ class _Found(Found):
 class _Search:
     """The moves, and the frequencies that they share."""
 
-    def __init__(self, moves: Sequence[Move], until: int, reference: float) -> None:
+    def __init__(self, moves: Sequence[Move], until: int, reference: float, off: float) -> None:
         self.moves = moves
         weights: Array = np.stack([move.weights for move in moves]) / reference
-        used = weights.any(axis=0)
-        _, group = np.unique(moves[0].group[used], return_inverse=True)
-        poles, band, interval = moves[0].poles[used], moves[0].band, moves[0].interval
+        mode, factor, which = _scaled(weights, off)
+        _, group = np.unique([moves[0].group[mode], which], axis=1, return_inverse=True)
+        group, weights = group.reshape(-1), weights[:, mode] * factor
+        poles, band, interval = moves[0].poles[mode], moves[0].band, moves[0].interval
         # The same frequencies for all: every move has its own weights, and its own guard.
         guards = [
             guarded_response(move, move.poles[move.weights != 0.0], move.count * interval)
@@ -128,7 +174,7 @@ class _Search:
         guarded = np.repeat(np.arange(len(moves)), [len(own) for own, _ in guards])
         self.looked_at = [
             LookedAt.of(
-                poles, own[used], group, band, until * interval,
+                poles, own, group, band, until * interval,
                 (omega, np.where(guarded == k, allowed, np.inf)),
             )
             for k, own in enumerate(weights)
