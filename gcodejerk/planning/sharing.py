@@ -128,7 +128,8 @@ def joint_optima(
     weights = share @ modes.participation.T
     questions = []
     for rows in sets:
-        given, most = float(slack[rows[0]]), float(today[rows[0]])
+        given = float(slack[rows[0]])
+        most = max(float(today[rows[0]]), given)  # the measure: never 0
         allowed, until = min(given, 0.5 * task.tolerance), int(last[move[rows[0]]])
         questions.append(joint_question(task, rows, weights[rows], until, most, allowed, given))
     found = joint_answers(questions, task.progress)
