@@ -90,8 +90,7 @@ def least_residuals(plans: Plans, progress: Progress | None = None, band: float 
     task = Task.of(plans.machine, plans.modes, plans.share, plans.profile_counts, progress)
     task = replace(task, band=band)
     # An axis that arrives early is judged later, too, where its vibration decays until then.
-    excited = np.abs(plans.share) @ np.abs(plans.modes.participation).T > 0.0
-    damped = (excited & (plans.modes.poles.real < 0.0)).any(axis=1)
+    damped = (plans.modes.excited(plans.share) & (plans.modes.poles.real < 0.0)).any(axis=1)
     waits = damped & (plans.profile_counts < plans.counts[plans.move])
     sets = [
         rows

@@ -87,6 +87,11 @@ class Modes:
             tuple(labels), tuple(modes), order, participation, np.array(group, dtype=np.int64)
         )
 
+    def excited(self, share: Array) -> NDArray[np.bool_]:
+        """Which modes displacements (n, 9) excite, (n, m); parts that cancel excite them, too."""
+        out: NDArray[np.bool_] = np.abs(share) @ np.abs(self.participation).T > 0.0
+        return out
+
     def grouped(self, amplitude: Array) -> Array:
         """Amplitudes of the entries from those of the oscillators, (..., m) -> (..., g)."""
         return grouped(amplitude, self.group)

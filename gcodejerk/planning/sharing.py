@@ -43,7 +43,7 @@ def sharing(modes: Modes, move: NDArray[np.int64], share: Array) -> list[list[in
     list of list of int
         Rows; every profile of such a move is in one of them.
     """
-    excited = np.abs(share) @ np.abs(modes.participation).T > 0.0
+    excited = modes.excited(share)
     begins = np.flatnonzero(np.diff(move, prepend=-1))
     ends = np.append(begins[1:], len(move))
     several = ends - begins > 1
