@@ -349,3 +349,23 @@ def left_at_arrival(plans, move, scale, factor):
     for value in a:
         state = step @ state + push[:, 0] * value
     return float(abs(state[1] - np.conj(pole) * state[0]) / pole.imag)
+
+
+@pytest.mark.parametrize("band", [0.0, 0.03])
+def test_long_blocks_do_not_hide_that_there_is_a_bound(band):
+    # At nearly the least acceleration that arrives in time no long block fits the turning point.
+    machine = Machine.loads(
+        "positioning: independent\ninterval: 0.002\ndesign: {guard: 0}\nmodes:\n"
+        "  - {frequency: 18.678, damping: 0.0, participation: {Y: 0.244, Z: -0.424}}\naxes:\n"
+        "  Y: {rapid: {velocity: 478.2, acceleration: 4075.8, jerk: 1116226.8}, "
+        "limit: {jerk: 4871764.1}}\n"
+        "  Z: {rapid: {velocity: 94.7, acceleration: 1689.5, jerk: 350313.7}, "
+        "limit: {jerk: 2196670.4}}\n"
+    )
+    displacement = np.zeros((1, len(AXES)))
+    displacement[0, [AXES.index("Y"), AXES.index("Z")]] = 1.14565594, -26.12927806
+    plans = plan_moves(displacement, machine, "condition3")
+    least = least_residuals(plans, band=band)
+    assert np.isfinite(least).all()
+    left = worst_at_arrival(plans.modes, band, plans.move, plans.share, plans.profiles)
+    assert (least <= left).all()

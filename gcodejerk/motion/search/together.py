@@ -84,6 +84,11 @@ def least_together(
     asked = Asked(allowed / reference, settled / reference, slack / reference, today=1.0)
     search = _Search(moves, until, reference, OFF if slack else 0.0)
     found = search.least([_first_knots(move) for move in moves], asked.allowed)
+    if found is None and not any(move.guard for move in moves):
+        # Where a velocity or acceleration is just enough, long blocks can be what is in the way.
+        shortest = [np.arange(move.count + 1) for move in moves]
+        if sum(move.count for move in moves) <= MOST_REFINED:
+            found = search.least(shortest, asked.allowed)
     # Shorter blocks cannot gain more than there is.
     if found is not None and not found.meets(max(asked.allowed, asked.slack)):
         finer = search.finer(found)
