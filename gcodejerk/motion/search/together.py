@@ -83,24 +83,14 @@ def least_together(
         return None
     asked = Asked(allowed / reference, settled / reference, slack / reference, today=1.0)
     search = _Search(moves, until, reference, OFF if slack else 0.0)
-    found = search.least([_first_knots(move) for move in moves], asked.allowed)
-    if found is None and not any(move.guard for move in moves):
-        # Where a velocity or acceleration is just enough, long blocks can be what is in the way.
-        shortest = [np.arange(move.count + 1) for move in moves]
-        if sum(move.count for move in moves) <= MOST_REFINED:
-            found = search.least(shortest, asked.allowed)
+    found = search.first(asked.allowed)
     # Shorter blocks cannot gain more than there is.
     if found is not None and not found.meets(max(asked.allowed, asked.slack)):
         finer = search.finer(found)
         found = better(found, search.least(finer, asked.allowed, found)) if finer else found
     if found is None or not found.guards:
         return None
-    if found.worst > asked.allowed and asked.slack:
-        enough = found.worst + asked.given(found.worst)
-        if found.worst <= USED * asked.settled:
-            enough = min(enough, asked.settled)
-        smooth = search.least([own.knots for own in found.every], enough, found)
-        found = smooth if smooth is not None and smooth.meets(enough) else found
+    found = search.smoother(found, asked)
     return [
         Optimum(blocks.knots, solution.jerk / move.count**3, found.worst * reference)
         for move, blocks, solution in zip(moves, found.every, found.solutions, strict=True)
@@ -188,6 +178,16 @@ class _Search:
         self.ringing = Ringing.of(self.looked_at[0], 0, until, until, interval)
         self.curved = False
 
+    def first(self, allowed: float) -> _Found | None:
+        """The least residual for the first blocks; None where none keep the limits."""
+        found = self.least([_first_knots(move) for move in self.moves], allowed)
+        if found is not None or any(move.guard for move in self.moves):
+            return found
+        # Where a velocity or acceleration is just enough, long blocks can be what is in the way.
+        if sum(move.count for move in self.moves) > MOST_REFINED:
+            return None
+        return self.least([np.arange(move.count + 1) for move in self.moves], allowed)
+
     def least(
         self, knots: list[Index], allowed: float, start: _Found | None = None
     ) -> _Found | None:
@@ -218,6 +218,16 @@ class _Search:
 
         active = first.first if start is None else start.active
         return exchanged(solved, active, allowed, ROUNDS)
+
+    def smoother(self, found: _Found, asked: Asked) -> _Found:
+        """With less peak jerk, for what may be left above the least."""
+        if found.worst <= asked.allowed or not asked.slack:
+            return found
+        enough = found.worst + asked.given(found.worst)
+        if found.worst <= USED * asked.settled:
+            enough = min(enough, asked.settled)
+        smooth = self.least([own.knots for own in found.every], enough, found)
+        return smooth if smooth is not None and smooth.meets(enough) else found
 
     def finer(self, found: _Found) -> list[Index] | None:
         """Ends of shorter blocks where the jerk acts; None where there are none."""
