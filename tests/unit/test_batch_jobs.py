@@ -184,12 +184,14 @@ def test_a_machine_file_in_the_folder_is_found(shop):
 class Stuck:
     """A run with two jobs, one of which waits for what will not come through a pipe."""
 
-    def __init__(self, jobs):
+    def __init__(self, jobs, hang_up=signal.SIG_DFL):
         os.mkfifo("stuck.nc")
         self.run = subprocess.Popen(
             [*COMMAND, "process", "shop/a.nc", "stuck.nc", "shop/b.ngc", "-m", "vmc",
              "--output-dir", "out", "--jobs", str(jobs)],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+            # Who runs the tests behind nohup hands down that hang-ups are ignored.
+            preexec_fn=lambda: signal.signal(signal.SIGHUP, hang_up),
         )  # fmt: skip
         self.pipe = open("stuck.nc", "wb")  # noqa: SIM115 - returns when the other end is open
         self.until(lambda: Path("out/a.nc").exists() and (jobs == 1 or Path("out/b.ngc").exists()))
@@ -244,6 +246,16 @@ def test_asked_to_end_it_ends_quietly_and_leaves_nothing_half_written(shop, jobs
     os.killpg(run.run.pid, number)  # as a terminal does
     assert run.end()[0] == status
     assert files(Path("out")) == (["a.nc"] if jobs == 1 else ["a.nc", "b.ngc"])
+
+
+def test_behind_nohup_it_goes_on(shop):
+    run = Stuck(2, hang_up=signal.SIG_IGN)
+    os.killpg(run.run.pid, signal.SIGHUP)
+    run.pipe.close()
+    status, out, _ = run.end()
+    assert status in (0, 1)  # 128 and more are signals
+    assert out.splitlines()[-1].startswith("3 programs: 4 rapids rewritten")
+    assert files(Path("out")) == ["a.nc", "b.ngc"]
 
 
 @pytest.mark.skipif(not POSTED.is_dir(), reason=f"no {POSTED}: the posted programs are not here")
