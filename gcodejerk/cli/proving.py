@@ -56,7 +56,7 @@ def verify(
     from gcodejerk.verification.bytes.hal import CONTROLLER
     from gcodejerk.verification.proof import beside_of
     from gcodejerk.verification.reported import read_reported
-    from gcodejerk.verification.rows.files import rows_format
+    from gcodejerk.verification.rows.files import rows_format, stated_profile
     from gcodejerk.verification.table import is_table
 
     if original == processed == "-":
@@ -78,6 +78,7 @@ def verify(
         table = named or is_table(other) or rows_format(other) is not None
         if table and front:
             raise typer.BadParameter(in_table)
+        stated = profile or stated_profile(other)
         described, dialect, front = _said(
             other, processed, described, profile, dialect, controller, front
         )
@@ -98,6 +99,7 @@ def verify(
         print(json.dumps(_findings(found, original, processed), indent=1, ensure_ascii=False))
     elif not quiet:
         _tell(found, original, processed, told, most)
+        _tell_assumed(found, processed, described, bool(stated) or not table)
     if not found.ok:
         raise typer.Exit(1)
 
@@ -111,9 +113,10 @@ def _said(
     controller: str | None,
     front: Front,
 ) -> tuple[Machine, str | None, Front]:
-    """The machine, the dialect and what was written out: what users do not say, the stamp does."""
+    """The machine, the dialect and what was written out: what users do not say, the file does."""
     from gcodejerk.rewrite.expanded import Front
     from gcodejerk.verification.bytes.stamp import read_stamp
+    from gcodejerk.verification.rows.files import stated_profile
 
     stamp = read_stamp(other, machine)
     if stamp is not None and not stamp.known:
@@ -127,6 +130,7 @@ def _said(
         profile, dialect = profile or stamp.profile, dialect or stamp.dialect
         front = Front(front.unroll or stamp.unroll, front.cycles or stamp.expand_cycles)
         controller = controller or stamp.controller
+    profile = profile or stated_profile(other)
     if controller is not None:
         machine = replace(machine, controller=controller)
     if profile is not None:
@@ -156,6 +160,18 @@ def _tell(found: Verification, original: str, processed: str, told: str, most: i
             "rapids re-timed and nothing else changed; "
             f"{found.confirmed} of {found.rewritten} confirmed by a second reading"
             + _read_once(found.rewritten - found.confirmed)
+        )
+
+
+def _tell_assumed(found: Verification, processed: str, machine: Machine, stated: bool) -> None:
+    """Say what a duration was judged by, where no profile was stated."""
+    from gcodejerk.verification.findings import Kind
+
+    if not stated and any(one.kind is Kind.TIME for one in found.violations):
+        print(
+            f"{processed}: note: the table does not say with which profile it was made, taken as "
+            f"{machine.design.profile}; repeat the --profile of `process`, if there was one",
+            file=sys.stderr,
         )
 
 

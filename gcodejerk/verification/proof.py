@@ -32,7 +32,7 @@ from gcodejerk.verification.physics.aligned import Reported
 from gcodejerk.verification.physics.alike import Alike
 from gcodejerk.verification.physics.dynamics import check_dynamics
 from gcodejerk.verification.physics.points import Paths, Reader, check_line, check_rapids
-from gcodejerk.verification.rows.files import RowsFile, rows_format
+from gcodejerk.verification.rows.files import RowsFile, rows_format, stated_profile
 from gcodejerk.verification.rows.judge import judge_rows
 from gcodejerk.verification.samples import SampleReader
 from gcodejerk.verification.second_reading.agreement import confirm
@@ -68,7 +68,7 @@ def verify(
         The programs themselves, or the names of their files. A file is read in bounded memory.
     machine : Machine
         What the program was processed for. Profile and controller are those of the stamp, where
-        there is one.
+        there is one; the profile of a file of rows is the one that its head names.
     dialect : str or Dialect, optional
         How the original is written; the stamp's by default, or the machine's.
     controller : str, optional
@@ -104,11 +104,12 @@ def verify(
     with ExitStack() as stack:
         one, other = (stack.enter_context(_opened(given)) for given in (original, processed))
         names = (_name(original, NAMES[0]), _name(processed, NAMES[1]))
-        stamp = read_stamp(other, machine)
-        if stamp is not None and stamp.known and stamp.profile is not None:
-            design = replace(machine.design, profile=stamp.profile)
-            machine = replace(machine, design=design)
+        stamp, profile = read_stamp(other, machine), stated_profile(other)
+        if stamp is not None and stamp.known:
+            profile = stamp.profile
             dialect, controller = dialect or stamp.dialect, controller or stamp.controller
+        if profile is not None:
+            machine = replace(machine, design=replace(machine.design, profile=profile))
         machine = replace(machine, controller=controller or machine.controller)
         samples = None
         if machine.controller == CONTROLLER:

@@ -92,3 +92,32 @@ def test_a_table_is_verified_under_any_name(run, tmp_path):
     (tmp_path / "plate.csv").rename(tmp_path / "plate.points")
     code, out = run("verify", "plate.ngc", "plate.points", "-m", "centre")
     assert (code, "re-timed and nothing else changed" in out) == (0, True), out
+
+
+@pytest.fixture
+def independent(run, tmp_path):
+    """A machine whose rapids of profile `shortest` take another time than by condition3."""
+    described = run("machine", "show", "vmc")[1]
+    (tmp_path / "own.yaml").write_text(
+        described.replace("positioning: linear ", "positioning: independent ")
+    )
+    return "own.yaml"
+
+
+@pytest.mark.parametrize("controller", ["json", "pmac"])
+def test_rows_say_with_which_profile_they_were_made(run, independent, controller):
+    said = ["-m", independent, "--controller", controller]
+    assert run("process", "-q", "plate.ngc", *said, "--profile", "shortest", "-o", "rows")[0] == 0
+    assert run("verify", "plate.ngc", "rows", *said)[0] == 0
+    # The user's own word is taken, whatever the rows say.
+    code, out = run("verify", "plate.ngc", "rows", *said, "--profile", "condition3")
+    assert (code, "moves earlier or later" in out) == (1, True)
+
+
+def test_of_a_table_that_says_no_profile_the_user_is_asked_for_it(run, independent):
+    said = ["-m", independent, "--controller", "csv"]
+    assert run("process", "-q", "plate.ngc", *said, "--profile", "shortest", "-o", "t.csv")[0] == 0
+    code, out = run("verify", "plate.ngc", "t.csv", *said)
+    assert code == 1
+    assert "taken as condition3; repeat the --profile of `process`" in out
+    assert run("verify", "plate.ngc", "t.csv", *said, "--profile", "shortest")[0] == 0

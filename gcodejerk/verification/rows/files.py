@@ -15,6 +15,7 @@ import numpy as np
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
+from gcodejerk.machine.file.table import PROFILES
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.rows.moves import Move, NoRowError, Steps
 from gcodejerk.verification.rows.readers import (
@@ -37,6 +38,9 @@ _TITLED = re.compile(rb"(?://|REM|#|!) gcodejerk \S{1,40} rows for ([a-z0-9]{1,2
 _RECORDS = b"(GCODEJERK "
 _JSON = re.compile(rb'\{"gcodejerk": "[^"]{1,40}", "rows": 1, "controller": "json"')
 _TABLE = re.compile(rb"block,t,([A-Z],[A-Z]_velocity,?)+\r?\n")
+_PROFILE = re.compile(
+    rb'^(?:(?://|REM|#|!) profile: |\{[ -~]{1,4000}? "profile": ")([a-z0-9]{1,20})\b', re.MULTILINE
+)
 _NUMBER = re.compile(r"-?[0-9]{1,12}(?:\.[0-9]{1,15})?|nan")
 _TITLE = re.compile(r"rapid at line ([0-9]{1,12}): .*")
 _LEAVES = re.compile(r"leaves ([0-9.e+-]{1,25}) um, today's rapid [0-9.e+-]{1,25} um")
@@ -63,6 +67,20 @@ def rows_format(file: BinaryIO) -> str | None:
         name = match[1].decode()
         return name if name in TEXTS else None
     return "json" if _JSON.match(head) else "csv" if _TABLE.match(head) else None
+
+
+def stated_profile(file: BinaryIO) -> str | None:
+    """The profile that a file of rows says it was made with; None where it says none.
+
+    Only who reads what was not stated otherwise needs it. The file is left where it was.
+    """
+    if rows_format(file) is None:
+        return None
+    at = file.tell()
+    match = _PROFILE.search(file.read(HEAD))
+    file.seek(at)
+    name = match[1].decode() if match else ""
+    return name if name in PROFILES else None
 
 
 class RowsFile:
