@@ -7,7 +7,9 @@ import pytest
 from scipy.optimize import linprog
 
 from gcodejerk.motion import conventional_profiles, mode_poles, profiles_response
-from gcodejerk.motion.search.optimal import least_residual, smoothest_within
+from gcodejerk.motion.search import optimal
+from gcodejerk.motion.search.knots import refined_knots
+from gcodejerk.motion.search.optimal import least_residual, near_least, smoothest_within
 from gcodejerk.motion.search.unit_move import Move, optimum_profiles
 
 MS = 0.001
@@ -269,3 +271,47 @@ def test_a_long_cruise_may_slow_down_for_a_low_mode():
         count, V, A, J, rows_of(count, [25.0, 60.0], [0.02, 0.02], [L, 0.5 * L])
     )
     assert found.worst == pytest.approx(least, rel=0.015)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.03])
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_move_of_many_seconds_asks_no_programme_that_takes_minutes(damping, smooth, monkeypatch):
+    # Half a metre at 41 mm/s: 900 blocks by 800 frequencies took a minute, and ten of them were
+    # asked for.
+    sizes = []
+    solve = optimal.solve
+
+    def solved(problem, *rest):
+        sizes.append(len(problem.group) * (len(problem.knots) - 1) ** 2)
+        return solve(problem, *rest)
+
+    monkeypatch.setattr(optimal, "solve", solved)
+    L, V, A, J, count, band = 478.6, 41.4, 308.0, 38e3, 11720, 0.05
+    today = conventional_profiles([V / L], [A / L], [J / L]).general()
+    move = replace(
+        move_of(count, V / L, A / L, 46e3 / L, [71.9, 149.1], damping, [157.0, 322.0], band),
+        today=today,
+    )
+    before = worst_of(today, move)
+    found = near_least(move, 0.01 * before, 0.001, before) if smooth else least_residual(move, 1.0)
+    assert max(sizes, default=0) <= optimal.WORK
+    assert worst_of(optimum_profiles([found], MS), move) == pytest.approx(found.worst, rel=0.01)
+    assert found.worst < 0.6 * before
+
+
+def worst_of(profiles, move):
+    """What a profile leaves at frequencies side by side, over the band; by another rule."""
+    relative = np.linspace(1.0 - move.band, 1.0 + move.band, 2001)
+    poles = np.outer(move.poles, relative).ravel()
+    left = np.abs(profiles_response(profiles, poles)[0]) / poles.imag
+    return (left * np.repeat(move.weights, len(relative))).max()
+
+
+@pytest.mark.parametrize("most", range(20, 61))
+def test_a_block_and_its_image_are_cut_both_or_none(most):
+    knots = np.arange(0, 121, 6)
+    jerk = np.abs(np.linspace(-1.0, 1.0, 20)) + 0.1
+    cut = refined_knots(knots, jerk, True, most)
+    assert np.array_equal(cut, 120 - cut[::-1])
+    assert len(cut) - 1 <= most
+    assert len(cut) > 21 or most < 36

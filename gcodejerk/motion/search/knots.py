@@ -142,4 +142,7 @@ def refined_knots(knots: Index, jerk: Array, mirrored: bool, most: int) -> Index
     order = order[size[order] > least]
     gained = np.cumsum(np.diff(knots)[order] - 1)
     cut = order[gained + len(size) <= most]
+    if mirrored:
+        # A block and its image are cut both, or none.
+        cut = np.intersect1d(cut, len(size) - 1 - cut)
     return np.unique(np.concatenate([knots, *(np.arange(knots[k], knots[k + 1]) for k in cut)]))

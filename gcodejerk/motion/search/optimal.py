@@ -45,6 +45,9 @@ from gcodejerk.motion.search.unit_move import Move, Optimum
 NEARLY = 1.5
 """Where a whole move leaves no more than so many times what is allowed, its ramps may leave less:
 their blocks are shorter."""
+WORK = 4e6
+"""Rows of cones times the square of blocks, up to which a programme takes a fifth of a second:
+blocks stay longer beyond, and planes are tried, too."""
 
 
 def least_residual(move: Move, reference: float) -> Optimum | None:
@@ -142,6 +145,7 @@ class _Search:
         # Where one programme had to hold the velocity between its knots, the next will have to.
         self.curved = False
         self.ramp = ramp_intervals(move)
+        self._known: dict[int, LookedAt] = {}
 
     def null(self) -> Found | None:
         """The smoothest exact null: a band of frequencies does not have one, nor has a spectrum."""
@@ -150,7 +154,7 @@ class _Search:
         if move.band or move.guard or not alone or move.count < FEWEST_INTERVALS:
             return None
         looked_at = self._looked_at(move.count)
-        knots = first_knots(move.count, self.ramp, move.guard > 0.0)
+        knots = self._first_knots
         tried = [self._ramps(looked_at, ramp_knots(self.ramp))] if self.ramp else []
         tried.append(self._whole(looked_at, knots))
         if len(knots) <= move.count <= MOST_REFINED:
@@ -162,10 +166,21 @@ class _Search:
         return None
 
     def least(self, asked: Asked) -> Found | None:
-        """What is asked, by planes where frequencies are guarded, and else by cones."""
-        found = None
-        if self.move.guard and self.move.count >= FEWEST_INTERVALS:
-            found = self._by_planes(asked)
+        """What is asked, by planes where frequencies are guarded, and else by cones.
+
+        By both where cones cannot have blocks as short as they ought to be; by planes alone where
+        even their first blocks are too many.
+        """
+        move = self.move
+        if move.count < FEWEST_INTERVALS:
+            return None
+        if (self._looked_at(move.count).source < 0).any():
+            return self._by_planes(asked) or self._by_cones(asked)
+        most = self._most_blocks
+        found = self._by_cones(asked) if len(self._first_knots) <= most + 1 else None
+        enough = found is not None and found.meets(asked.allowed)
+        if most < min(most_blocks(move), move.count) and not enough:
+            found = better(found, self._by_planes(asked))
         return found or self._by_cones(asked)
 
     def optimum(self, found: Found | None) -> Optimum | None:
@@ -178,11 +193,9 @@ class _Search:
     def _by_planes(self, asked: Asked) -> Found | None:
         """The ramps of a move with a long cruise, or the whole move where they do not suffice.
 
-        None where there are no planes to be cut, or the solver gives up.
+        None where the solver gives up.
         """
         move, looked_at = self.move, self._looked_at(self.ramp or self.move.count)
-        if not (looked_at.source < 0).any():
-            return None
         if not self.ramp:
             return self._whole_by_planes(looked_at, asked)
         knots = coarse_ramp(move, self.ramp)
@@ -227,8 +240,6 @@ class _Search:
         """The least residual above what is allowed; blocks are refined until that is met."""
         move = self.move
         best: Found | None = None
-        if move.count < FEWEST_INTERVALS:
-            return best
         if self.ramp and allowed:
             # The phases of a short cruise can be made use of: what is found counts if it is enough.
             looked_at = self._looked_at(self.ramp)
@@ -237,26 +248,43 @@ class _Search:
             if best is not None and best.meets(allowed):
                 return best
         looked_at = self._looked_at(move.count)
-        knots = first_knots(move.count, self.ramp, move.guard > 0.0)
+        knots = self._first_knots
         first = self._exchanged(looked_at, self._whole(looked_at, knots), allowed)
         best = better(best, first)
         if len(knots) > move.count or (best is not None and best.meets(allowed)):
             return best
         if first is not None:
             coarse, jerk = first.blocks, first.solution.jerk
-            cut = refined_knots(coarse.knots, jerk, coarse.mirrored, most_blocks(move))
+            cut = refined_knots(coarse.knots, jerk, coarse.mirrored, self._most_blocks)
+            if len(cut) == len(knots):
+                return best
             finer = self._whole(looked_at, cut)
             return better(best, self._exchanged(looked_at, finer, allowed, first))
-        if move.count > most_blocks(move):
+        if move.count > self._most_blocks:
             return best
         every = self._whole(looked_at, np.arange(move.count + 1))
         return better(best, self._exchanged(looked_at, every, allowed))
 
+    @property
+    def _first_knots(self) -> Index:
+        """Ends of the blocks of a first programme of cones, of the whole move."""
+        return first_knots(self.move.count, self.ramp, self.move.guard > 0.0)
+
+    @property
+    def _most_blocks(self) -> int:
+        """Blocks of a programme of cones at most."""
+        rows = 2 * np.count_nonzero(self._looked_at(self.move.count).first)
+        return min(most_blocks(self.move), int(np.sqrt(WORK / rows)))
+
     def _looked_at(self, intervals: int) -> LookedAt:
         """The frequencies that count for a profile, or a ramp, of so many intervals."""
-        move, duration = self.move, intervals * self.move.interval
-        guarded = guarded_response(move, self.poles, duration)
-        return LookedAt.of(self.poles, self.weights, self.group, move.band, duration, guarded)
+        if intervals not in self._known:
+            move, duration = self.move, intervals * self.move.interval
+            guarded = guarded_response(move, self.poles, duration)
+            self._known[intervals] = LookedAt.of(
+                self.poles, self.weights, self.group, move.band, duration, guarded
+            )
+        return self._known[intervals]
 
     def _problem(self, looked_at: LookedAt, blocks: Blocks, active: Flags) -> Problem:
         """The programme for these blocks and groups of frequencies."""

@@ -25,7 +25,7 @@ from gcodejerk.motion.search.blocks import Blocks
 from gcodejerk.motion.search.cutting import Cutting
 from gcodejerk.motion.search.found import Found
 from gcodejerk.motion.search.looked_at import Index, LookedAt
-from gcodejerk.motion.search.prices import priced_knots
+from gcodejerk.motion.search.prices import Priced, priced_knots
 from gcodejerk.motion.search.programme import Problem
 
 ROUNDS = 5
@@ -123,14 +123,14 @@ def refined(looked_at: LookedAt, programme: Programme, knots: Index, asked: Aske
         told = sought.cutting.told
         if last or sought.smooth:
             break
-        enough = max(ENOUGH * told, OF_SLACK * given) / GAINED
-        priced = priced_knots(sought.blocks, sought.cutting, UNCUT * enough, MOST_BLOCKS)
-        if rough and priced.lost <= enough:
+        enough = max(ENOUGH * told, OF_SLACK * given)
+        priced = sought.priced(enough)
+        if rough and _gained(priced, told) <= enough:
             if not sought.least(asked.allowed, given):
                 return None
             told, rough = sought.cutting.told, 0.0
-            priced = priced_knots(sought.blocks, sought.cutting, UNCUT * enough, MOST_BLOCKS)
-        if not rough and priced.lost <= AGAIN * enough:
+            priced = sought.priced(enough)
+        if not rough and _gained(priced, told) <= AGAIN * enough:
             break
         knots, before = priced.knots, sought.cutting
         sought = _Sought(looked_at, *programme(knots))
@@ -148,6 +148,11 @@ def refined(looked_at: LookedAt, programme: Programme, knots: Index, asked: Aske
     if not missing or not sought.smoothed(asked.settled):
         return found
     return sought.found()
+
+
+def _gained(priced: Priced, told: float) -> float:
+    """What shorter blocks gain at most: no more than there is."""
+    return min(GAINED * priced.lost, told)
 
 
 def within(looked_at: LookedAt, programme: Programme, knots: Index, asked: Asked) -> Found | None:
@@ -180,9 +185,9 @@ def _eased(sought: _Sought, programme: Programme, allowed: float) -> _Sought:
         peak = sought.cutting.peak
         if peak <= SMALL:
             break
-        enough = EASIER * peak / GAINED
-        priced = priced_knots(sought.blocks, sought.cutting, UNCUT * enough, MOST_BLOCKS)
-        if priced.lost <= enough:
+        enough = EASIER * peak
+        priced = sought.priced(enough)
+        if GAINED * priced.lost <= enough:
             break
         finer = _Sought(sought.looked_at, *programme(priced.knots))
         finer.cutting.begin(sought.cutting)
@@ -255,6 +260,11 @@ class _Sought:
             if not self._cut(self.blocks.largest(cutting.left), allowed) and cutting.settled:
                 return True
         return False
+
+    def priced(self, enough: float) -> Priced:
+        """Shorter blocks, where less than enough would be gained by still shorter ones."""
+        most = UNCUT * enough / GAINED
+        return priced_knots(self.blocks, self.cutting, most, MOST_BLOCKS)
 
     def found(self) -> Found:
         """The last solution."""
