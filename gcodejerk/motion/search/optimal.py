@@ -45,9 +45,9 @@ from gcodejerk.motion.search.unit_move import Move, Optimum
 NEARLY = 1.5
 """Where a whole move leaves no more than so many times what is allowed, its ramps may leave less:
 their blocks are shorter."""
-WORK = 4e6
-"""Rows of cones times the square of blocks, up to which a programme takes a fifth of a second:
-blocks stay longer beyond, and planes are tried, too."""
+WORK = 1e7
+"""Rows of cones times the square of blocks, up to which a programme takes a third of a second.
+Where as many blocks as there ought to be are more work, planes are cut."""
 
 
 def least_residual(move: Move, reference: float) -> Optimum | None:
@@ -166,22 +166,17 @@ class _Search:
         return None
 
     def least(self, asked: Asked) -> Found | None:
-        """What is asked, by planes where frequencies are guarded, and else by cones.
+        """What is asked, by planes where frequencies are guarded or cones too many, or by cones.
 
-        By both where cones cannot have blocks as short as they ought to be; by planes alone where
-        even their first blocks are too many.
+        By both, where the least itself is asked for and cones can have their first blocks.
         """
-        move = self.move
+        move, most = self.move, self._most_blocks
         if move.count < FEWEST_INTERVALS:
             return None
-        if (self._looked_at(move.count).source < 0).any():
-            return self._by_planes(asked) or self._by_cones(asked)
-        most = self._most_blocks
-        found = self._by_cones(asked) if len(self._first_knots) <= most + 1 else None
-        enough = found is not None and found.meets(asked.allowed)
-        if most < min(most_blocks(move), move.count) and not enough:
-            found = better(found, self._by_planes(asked))
-        return found or self._by_cones(asked)
+        many = most < min(most_blocks(move), move.count)
+        found = self._by_planes(asked) if many or self._guarded else None
+        exact = many and not (self._guarded or asked.allowed) and len(self._first_knots) <= most
+        return better(found, self._by_cones(asked)) if exact or found is None else found
 
     def optimum(self, found: Found | None) -> Optimum | None:
         """What was found, in the units of the move."""
@@ -207,6 +202,8 @@ class _Search:
 
         found = within(looked_at, programme, knots, asked) if asked.allowed else None
         found = found or self._whole_by_planes(self._looked_at(move.count), asked)
+        if found is None and not self._guarded:
+            found = self._by_cones(asked)
         if found is not None and not asked.allowed < found.worst <= NEARLY * asked.allowed:
             return found
         return better(found, refined(looked_at, programme, knots, asked))
@@ -275,6 +272,11 @@ class _Search:
         """Blocks of a programme of cones at most."""
         rows = 2 * np.count_nonzero(self._looked_at(self.move.count).first)
         return min(most_blocks(self.move), int(np.sqrt(WORK / rows)))
+
+    @property
+    def _guarded(self) -> bool:
+        """Whether frequencies are guarded."""
+        return bool((self._looked_at(self.move.count).source < 0).any())
 
     def _looked_at(self, intervals: int) -> LookedAt:
         """The frequencies that count for a profile, or a ramp, of so many intervals."""
