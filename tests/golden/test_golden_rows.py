@@ -4,12 +4,15 @@ One program and one machine for all; what each controller has to be told is in `
 `pytest --update-golden` writes them anew.
 """
 
+import io
+import re
 from pathlib import Path
 
 import pytest
 import yaml
 
 from gcodejerk import Machine, process, verify
+from gcodejerk.verification.rows.files import stated_profile
 from tests.unit.test_alike import hold_golden, same_arithmetic
 
 HERE = Path(__file__).parent / "rows"
@@ -54,6 +57,16 @@ def test_output_is_the_golden_one(name, request):
         hold_golden(result.output, HERE / f"out.{name}", request)
     assert result.verification.ok
     assert verify(program, result.output, machine).rewritten == result.planned >= 4
+
+
+@pytest.mark.parametrize("name", sorted(set(OPTIONS) - {"csv"}))
+def test_every_file_of_rows_says_its_profile(name):
+    values = yaml.safe_load((HERE / "machine.yaml").read_text())
+    written = (HERE / f"out.{name}").read_bytes()
+    assert stated_profile(io.BytesIO(written)) == Machine.from_dict(values).design.profile
+    other = re.sub(rb"condition3", b"cascade", written, flags=re.IGNORECASE)
+    assert stated_profile(io.BytesIO(other)) == "cascade"
+    assert stated_profile(io.BytesIO(other.replace(b"cascade", b"sinus"))) is None
 
 
 @pytest.mark.parametrize("name", sorted(set(OPTIONS) - {"csv", "json"}))

@@ -39,7 +39,8 @@ _RECORDS = b"(GCODEJERK "
 _JSON = re.compile(rb'\{"gcodejerk": "[^"]{1,40}", "rows": 1, "controller": "json"')
 _TABLE = re.compile(rb"block,t,([A-Z],[A-Z]_velocity,?)+\r?\n")
 _PROFILE = re.compile(
-    rb'^(?:(?://|REM|#|!) profile: |\{[ -~]{1,4000}? "profile": ")([a-z0-9]{1,20})\b', re.MULTILINE
+    rb'^(?:(?:(?://|REM|#|!) |\()profile: |\{[ -~]{1,4000}? "profile": ")([a-z0-9]{1,20})\b',
+    re.MULTILINE | re.IGNORECASE,
 )
 _NUMBER = re.compile(r"-?[0-9]{1,12}(?:\.[0-9]{1,15})?|nan")
 _TITLE = re.compile(r"rapid at line ([0-9]{1,12}): .*")
@@ -79,7 +80,7 @@ def stated_profile(file: BinaryIO) -> str | None:
     at = file.tell()
     match = _PROFILE.search(file.read(HEAD))
     file.seek(at)
-    name = match[1].decode() if match else ""
+    name = match[1].decode().lower() if match else ""
     return name if name in PROFILES else None
 
 
