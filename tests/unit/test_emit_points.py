@@ -257,9 +257,9 @@ def test_long_segments_are_split_where_the_controller_has_a_longest():
 
 
 def test_more_segments_than_a_controller_has_leave_the_rapid_alone():
-    # Without a guard the optimum has a jerk in every interval, or nearly.
+    # Over a narrow band and without a guard the optimum has a jerk in every interval, or nearly.
     text = EXAMPLE.replace("limit: {jerk: 150000}", "limit: {jerk: 1.5e+7}")
-    text += "design: {guard: 0}\n"
+    text += "design: {band: 0.02, guard: 0}\n"
     options = "{counts_per_unit: {X: 1.0e+7}, axis_names: {X: A}}"
     result = written("galil", options, text=text, profile="optimal")
     assert [row.reason for row in result.rapids] == ["too long for a stream"]

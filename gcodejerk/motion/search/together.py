@@ -36,8 +36,11 @@ from gcodejerk.motion.search.unit_move import Move, Optimum
 
 OFF = 0.2
 """Relative error of how strongly each move excites a mode, to which what cancels is robust."""
-MOST_GUARDED = 220
-"""Blocks of all moves together at most, where frequencies are guarded."""
+MOST_GUARDED, MOST_OF_MANY = 220, 500
+"""Blocks of all moves together at most, where frequencies are guarded, and where there are more
+than `MANY`: programmes of twice as many would take ten seconds each."""
+MANY = 50
+"""Frequencies."""
 ROUNDS = 10
 """Programmes at most, until all frequencies keep what they may: each move has its own."""
 
@@ -177,6 +180,8 @@ class _Search:
         self.cap = np.where(self.looked_at[0].source < 0, GUARDED, np.nan)
         self.ringing = Ringing.of(self.looked_at[0], 0, until, until, interval)
         self.curved = False
+        many = np.count_nonzero(self.looked_at[0].first) > MANY
+        self.most = MOST_GUARDED if guarded.size else MOST_OF_MANY if many else MOST_REFINED
 
     def first(self, allowed: float) -> _Found | None:
         """The least residual for the first blocks; None where none keep the limits."""
@@ -184,7 +189,7 @@ class _Search:
         if found is not None or any(move.guard for move in self.moves):
             return found
         # Where a velocity or acceleration is just enough, long blocks can be what is in the way.
-        if sum(move.count for move in self.moves) > MOST_REFINED:
+        if sum(move.count for move in self.moves) > self.most:
             return None
         return self.least([np.arange(move.count + 1) for move in self.moves], allowed)
 
@@ -232,8 +237,7 @@ class _Search:
     def finer(self, found: _Found) -> list[Index] | None:
         """Ends of shorter blocks where the jerk acts; None where there are none."""
         knots = [own.knots for own in found.every]
-        guarded = any(move.guard for move in self.moves)
-        most = (MOST_GUARDED if guarded else MOST_REFINED) // len(self.moves)
+        most = self.most // len(self.moves)
         cut = [
             refined_knots(own, solution.jerk, False, max(most, len(own)))
             for own, solution in zip(knots, found.solutions, strict=True)
