@@ -252,23 +252,24 @@ def null_curve(T_SUM: ArrayLike, frequency: float) -> Array:
     half = 0.5 * np.abs(mode_poles(frequency, 0.0)) * total
     longest = float(np.max(half, initial=0.0, where=np.isfinite(half)))
     ends = _extrema(max(2, int(longest / np.pi) + 2))[:, np.newaxis]
-    target = _sinc(half)
-    low, high = (
-        np.broadcast_to(x, (len(ends) - 1, len(half))).copy() for x in (ends[:-1], ends[1:])
-    )
-    exists = (high < half) & ((_sinc(low) - target) * (_sinc(high) - target) < 0.0)
-    rising = _sinc(low) < target
+    at_ends, target = _sinc(ends), _sinc(half)
+    exists = (ends[1:] < half) & ((at_ends[:-1] - target) * (at_ends[1:] - target) < 0.0)
+    # Of thousands of ranges only those that hold a root: long moves have few in each column.
+    branch, column = np.nonzero(exists)
+    low, high, sought = ends[branch, 0], ends[branch + 1, 0], target[column]
+    rising = at_ends[branch, 0] < sought
     for _ in range(60):
         middle = 0.5 * (low + high)
-        before = (_sinc(middle) < target) == rising
+        before = (_sinc(middle) < sought) == rising
         low, high = np.where(before, middle, low), np.where(before, high, middle)
-    T1 = np.where(exists, 1.0 - low / np.where(half > 0.0, half, 1.0), np.nan) * 0.5 * total
+    T1 = np.full(exists.shape, np.nan)
+    T1[branch, column] = (1.0 - low / half[column]) * 0.5 * total[column]
     return np.asarray(T1[exists.any(axis=1)])
 
 
 def _sinc(x: Array) -> Array:
     """sin(x)/x, without the factor pi of numpy's."""
-    return np.asarray(np.sinc(x / np.pi))
+    return np.divide(np.sin(x), x, out=np.ones_like(x), where=x != 0.0)
 
 
 def _extrema(count: int) -> Array:

@@ -95,12 +95,12 @@ def _peak(square: Array, band: float) -> float:
     inner = round(half * band / max(BANDS))
     low, high = half - inner, half + inner
     best = float(square[low : high + 1].max())
-    for k in range(max(low, 1), min(high, 2 * half - 1) + 1):
-        left, here, right = (float(x) for x in square[k - 1 : k + 2])
-        curvature = left - 2.0 * here + right
-        if curvature < 0.0 and here >= left and here >= right:
-            offset = 0.5 * (left - right) / curvature
-            offset = min(max(offset, 0.0 if k == low else -0.5), 0.0 if k == high else 0.5)
-            top = here + 0.5 * (right - left) * offset + 0.5 * curvature * offset**2
-            best = max(best, top)
-    return float(np.sqrt(best))
+    k = np.arange(max(low, 1), min(high, 2 * half - 1) + 1)
+    k = k[(square[k] >= square[k - 1]) & (square[k] >= square[k + 1])]
+    left, here, right = square[k - 1], square[k], square[k + 1]
+    slope, curvature = 0.5 * (right - left), left - 2.0 * here + right
+    # Level ground has its points for a peak; the parabola of an end's point is left outside.
+    offset = np.divide(-slope, curvature, out=np.zeros_like(slope), where=curvature < 0.0)
+    offset = np.clip(offset, np.where(k == low, 0.0, -0.5), np.where(k == high, 0.0, 0.5))
+    tops = here + slope * offset + 0.5 * curvature * offset**2
+    return float(np.sqrt(np.max(tops, initial=best)))

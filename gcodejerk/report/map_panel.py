@@ -193,8 +193,10 @@ class MapPanel:
         fine = np.linspace(self.T[0], self.T[-1], 4 * len(self.T))
         crowded = []
         for k, mode in enumerate(sorted(self.survey.counted_modes, key=lambda m: m.frequency)):
-            curves = self._null_curves(mode, fine)
-            if len(curves) > MOST_BRANCHES:
+            # A few of the times tell whether there are too many to draw: finding all is dear.
+            few = len(self.survey.nulls(self.T[::16], mode)) <= MOST_BRANCHES
+            curves = self._null_curves(mode, fine) if few else []
+            if not few or len(curves) > MOST_BRANCHES:
                 crowded.append(f"{mode.frequency:g}")
                 continue
             if not curves:
