@@ -20,7 +20,7 @@ down are both parts times 1 + d: an upper bound, and the exact one where both le
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,15 +49,15 @@ class Ringing:
         Of the nodes, in units of the duration of the whole move.
     first, last, count : int
         The stretch, and the whole move. [intervals]
-    known : ndarray of complex, shape (p, last - first + 1), optional
-        At the ends of all intervals, where they are not too many.
+    known : tuple of ndarray, each of shape (last - first + 1, p), optional
+        Its real and its imaginary part at the ends of all intervals, where they are not too many.
     """
 
     poles: Complex
     first: int
     last: int
     count: int
-    known: Complex | None = None
+    known: tuple[Array, Array] | None = None
 
     @classmethod
     def of(cls, looked_at: LookedAt, first: int, last: int, count: int, interval: float) -> Ringing:
@@ -66,7 +66,9 @@ class Ringing:
         rings = cls(poles, first, last, count)
         if len(poles) * (last - first + 1) > MOST_KNOWN:
             return rings
-        return cls(poles, first, last, count, rings._at(np.arange(first, last + 1)))
+        every = rings._at(np.arange(first, last + 1)).T
+        known = np.ascontiguousarray(every.real), np.ascontiguousarray(every.imag)
+        return cls(poles, first, last, count, known)
 
     def left(self, knots: Index, parts: int) -> Array:
         """What a unit jerk in each block leaves, shape (parts * p, k).
@@ -74,6 +76,11 @@ class Ringing:
         `parts`: rows of the real and the imaginary part of each pole, or of the latter alone.
         """
         rows = np.empty((len(self.poles), parts, len(knots) - 1))
+        if self.known is not None:
+            for part, every in enumerate(self.known[-parts:]):
+                there = every[knots - self.first]
+                rows[:, part] = (there[:-1] - there[1:]).T
+            return rows.reshape(-1, rows.shape[-1])
         # A few poles at a time: they stay in the processor's cache.
         for begin in range(0, len(self.poles), AT_ONCE):
             some = slice(begin, begin + AT_ONCE)
@@ -86,6 +93,9 @@ class Ringing:
     def sums(self, weights: Array, parts: int) -> Array:
         """The sum of these rows for each interval, times weights of shape (parts * p,)."""
         of_pole = weights.reshape(-1, parts)
+        if self.known is not None:
+            of_parts = zip(self.known[-parts:], of_pole.T, strict=True)
+            return -np.diff(sum((every @ own for every, own in of_parts), start=np.zeros(1)))
         used: Flags = np.any(of_pole != 0.0, axis=1)
         # Of a complex number, times its conjugate: the real part is that of the products.
         of_each = (of_pole[used, 0] if parts > 1 else 0.0) - 1j * of_pole[used, -1]
@@ -95,8 +105,6 @@ class Ringing:
 
     def _at(self, knots: Index, some: slice | Flags = slice(None)) -> Complex:
         """What rings from each knot, of some poles, shape (q, k + 1)."""
-        if self.known is not None:
-            return self.known[some][:, knots - self.first]
         pole = self.poles[some, np.newaxis]
         middle = 0.5 * (self.first + self.last)
         phase = pole.real * (self.last - knots[-1]) + 1j * pole.imag * (middle - knots[-1])
@@ -142,17 +150,15 @@ class Blocks:
     cruise: bool
 
     @classmethod
-    def whole(
-        cls, looked_at: LookedAt, knots: Index, interval: float, ringing: Ringing | None = None
-    ) -> Blocks:
-        """Blocks of a whole move; `ringing`, of all nodes, may be known from other blocks of it.
+    def whole(cls, looked_at: LookedAt, knots: Index, interval: float) -> Blocks:
+        """Blocks of a whole move.
 
         Without damping a profile and its mirror image in time (braking first, reversed) leave the
         same, and half of both no more: the optimum can be odd about its middle. Seen from there,
         its response is imaginary.
         """
         count, T = int(knots[-1]), knots[-1] * interval
-        ringing = ringing or Ringing.of(looked_at, 0, count, count, interval)
+        ringing = Ringing.of(looked_at, 0, count, count, interval)
         undamped = not looked_at.poles.real.any()
         mirrored = undamped and bool(np.all(knots + knots[::-1] == count))
         parts = 1 if mirrored else 2
@@ -188,6 +194,11 @@ class Blocks:
         rows = halves.reshape(-1, len(knots) - 1)
         between = _between(looked_at, [weights] * len(ringing), 2, T)
         return cls(knots, rows, *between, ringing, True, True)
+
+    def cut(self, knots: Index) -> Blocks:
+        """Other blocks of the same whole move, which have images if these have."""
+        (ringing,) = self.ringing
+        return replace(self, knots=knots, rows=ringing.left(knots, 1 if self.mirrored else 2))
 
     @property
     def leads(self) -> Index:

@@ -176,7 +176,8 @@ class Cutting:
         own = self.unknowns.at_a[used] - self.unknowns.speeds
         self._x[own] = np.interp(here[used], there, known) / self._unit
         self._above, self.peak = other._above, other.peak
-        # What is held is a guess from which the solver starts: only its sign counts.
+        # Where the solver starts is a guess, of which only the sign counts: accelerations at their
+        # limit, and planes. Of jerks it finds sooner itself which are held in other blocks.
         most = self._strongest * (1.0 - EXACT)
         self._of_bounds = np.sign(self._x) * (np.abs(self._x) >= most)
         reached = self._limits @ self._x
@@ -185,7 +186,7 @@ class Cutting:
         above = reached > np.where(jerk, steep, (1.0 - CLOSE) * self._fastest)
         below = reached < np.where(jerk, -steep, CLOSE * fast)
         self._held = np.flatnonzero(np.concatenate([above, below]))
-        self._of_held = np.ones(len(self._held))
+        self._of_held = np.zeros(len(self._held))
         if np.array_equal(self.problem.group, other.problem.group):
             self._cone, self._direction = other._cone, other._direction
             self._of_planes = other._of_planes
@@ -283,13 +284,15 @@ class Cutting:
         own = rows < self._starts[cut, np.newaxis] + self._sizes[cut, np.newaxis]
         direction = np.where(own, self._responded[np.where(own, rows, 0)], 0.0)
         direction /= self.left[cut, np.newaxis]
-        self._cone = np.append(self._cone, cut)
-        self._direction = np.concatenate([self._direction, direction])
-        self._planes = np.concatenate([self._planes, self._rows_of(cut, direction)])
-        self._of_planes = np.append(self._of_planes, np.zeros(len(cut)))
         beyond = self._beyond()
-        self._held = np.append(self._held, beyond)
-        self._of_held = np.append(self._of_held, np.zeros(len(beyond)))
+        if len(cut):
+            self._cone = np.concatenate([self._cone, cut])
+            self._direction = np.concatenate([self._direction, direction])
+            self._planes = np.concatenate([self._planes, self._rows_of(cut, direction)])
+            self._of_planes = np.concatenate([self._of_planes, np.zeros(len(cut))])
+        if len(beyond):
+            self._held = np.concatenate([self._held, beyond])
+            self._of_held = np.concatenate([self._of_held, np.zeros(len(beyond))])
         if len(cut) or len(beyond):
             return True
         self._cost = max(LONG * self._cost, self._lowest)
@@ -373,10 +376,11 @@ class Cutting:
 
     def _keep(self, multipliers: Array) -> None:
         """What the next programme begins with, of the multipliers of the last one."""
-        at = np.cumsum([len(self._x), 2, len(self._ends), len(self._held)])
-        self._of_bounds, _, self._of_ends, self._of_held, self._of_planes = np.split(
-            multipliers, at
-        )
+        ends = len(self._x) + 2
+        held = ends + len(self._ends)
+        planes = held + len(self._held)
+        self._of_bounds, self._of_ends = multipliers[: ends - 2], multipliers[ends:held]
+        self._of_held, self._of_planes = multipliers[held:planes], multipliers[planes:]
 
     def _rows_of(self, cone: Index, direction: Array) -> Array:
         """Rows of the planes that touch cones in these directions."""

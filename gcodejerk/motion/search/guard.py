@@ -137,12 +137,12 @@ def with_narrows(today: Profiles, omega: Array) -> tuple[Array, Array]:
     close = np.flatnonzero(apart < GAP * np.median(apart))
     shares = np.arange(1, BETWEEN) / BETWEEN
     between = omega[close, np.newaxis] + shares * apart[close, np.newaxis]
-    every = np.union1d(omega, between)
+    every = np.sort(np.concatenate([omega, between.ravel()]))
     bound = envelope(today, every)
     sides = np.pad(bound, 1, constant_values=np.inf)
     narrow = (bound < sides[:-2]) & (bound < sides[2:])
-    kept = np.isin(every, omega) | narrow
-    return every[kept], bound[kept]
+    narrow[np.searchsorted(every, omega)] = True
+    return every[narrow], bound[narrow]
 
 
 def guarded_response(move: Move, poles: Complex, duration: float) -> tuple[Array, Array] | None:

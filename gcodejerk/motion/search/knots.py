@@ -27,7 +27,7 @@ CRUISE_BLOCKS = 16
 MOST_REFINED, MOST_GUARDED = 1000, 110
 """Blocks of a refined programme at most, and of one with guarded frequencies, which are many: those
 of longer moves stay long."""
-FEW_BLOCKS = 30
+FEW_BLOCKS = 40
 """The same in the first programme of several."""
 MOST_FINE = 500
 """Moves with a cruise of at most so many intervals have a jerk in each, without a guard."""

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gcodejerk.motion.search.blocks import Blocks, Ringing
+from gcodejerk.motion.search.blocks import Blocks
 from gcodejerk.motion.search.exchange import USED, exchanged
 from gcodejerk.motion.search.found import GUARDED, Found, better
 from gcodejerk.motion.search.guard import guarded_response
@@ -170,12 +170,12 @@ class _Search:
 
         By both, where the least itself is asked for and cones can have their first blocks.
         """
-        move, most = self.move, self._most_blocks
+        move = self.move
         if move.count < FEWEST_INTERVALS:
             return None
-        many = most < min(most_blocks(move), move.count)
+        many = self._most_blocks < min(most_blocks(move), move.count)
         found = self._by_planes(asked) if many or self._guarded else None
-        exact = many and not (self._guarded or asked.allowed) and len(self._first_knots) <= most
+        exact = many and not (self._guarded or asked.allowed) and self._few
         return better(found, self._by_cones(asked)) if exact or found is None else found
 
     def optimum(self, found: Found | None) -> Optimum | None:
@@ -202,7 +202,7 @@ class _Search:
 
         found = within(looked_at, programme, knots, asked) if asked.allowed else None
         found = found or self._whole_by_planes(self._looked_at(move.count), asked)
-        if found is None and not self._guarded:
+        if found is None and not self._guarded and self._few:
             found = self._by_cones(asked)
         if found is not None and not asked.allowed < found.worst <= NEARLY * asked.allowed:
             return found
@@ -211,16 +211,17 @@ class _Search:
     def _whole_by_planes(self, looked_at: LookedAt, asked: Asked) -> Found | None:
         """The same for the whole move."""
         move, every = self.move, np.ones(len(looked_at.source), dtype=bool)
-        ringing = Ringing.of(looked_at, 0, move.count, move.count, move.interval)
+        first = coarse_knots(move, self.ramp)
+        whole = self._whole(looked_at, first)
 
         def programme(knots: Index) -> tuple[Blocks, Problem]:
             if knots[-1] < move.count:
                 # Those behind the middle are images of these.
                 knots = np.union1d(knots, move.count - knots)
-            blocks = Blocks.whole(looked_at, knots, move.interval, ringing)
+            blocks = whole.cut(knots)
             return blocks, self._problem(looked_at, blocks, every)
 
-        return refined(looked_at, programme, coarse_knots(move, self.ramp), asked)
+        return refined(looked_at, programme, first, asked)
 
     def _by_cones(self, asked: Asked) -> Found | None:
         """The same by cones: the least residual, and then less jerk on the same blocks."""
@@ -265,7 +266,13 @@ class _Search:
     @property
     def _first_knots(self) -> Index:
         """Ends of the blocks of a first programme of cones, of the whole move."""
-        return first_knots(self.move.count, self.ramp, self.move.guard > 0.0)
+        first = first_knots(self.move.count, self.ramp, self.move.guard > 0.0)
+        return first
+
+    @property
+    def _few(self) -> bool:
+        """Whether cones can have their first blocks."""
+        return len(self._first_knots) <= self._most_blocks
 
     @property
     def _most_blocks(self) -> int:

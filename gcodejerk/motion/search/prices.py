@@ -133,12 +133,11 @@ def switching_function(blocks: Blocks, weights: Weights) -> tuple[Array, Array]:
         ahead = 1.0 - moment
         left += weights.ends[0] * 0.5 * ahead**2 + weights.ends[1] * ahead
     # A jerk acts on the accelerations behind it, on speeds with the time until then.
-    before = ends[1 : len(weights.accelerations) + 1] - moment[:, np.newaxis]
-    left += (before > 0.0) @ weights.accelerations
-    before = blocks.knots[1 : len(weights.speeds) + 1] / count - moment[:, np.newaxis]
-    left += np.maximum(before, 0.0) @ weights.speeds
+    speeds = blocks.knots[1 : len(weights.speeds) + 1] / count
     half = 0.5 * np.diff(blocks.knots)[1 : len(weights.controls) + 1] / count
-    left += np.where(before > 0.0, before + half, 0.0) @ weights.controls
+    left += _behind(moment, ends[1 : len(weights.accelerations) + 1], weights.accelerations)
+    left += _behind(moment, speeds, weights.speeds * speeds + weights.controls * (speeds + half))
+    left -= moment * _behind(moment, speeds, weights.speeds + weights.controls)
     # At the least, a block's own jerk is worth what its limit is. It is not yet where steps still
     # go on, and up to what is the same for all intervals, for at the end there is rest.
     sizes = np.diff(own)
@@ -147,6 +146,13 @@ def switching_function(blocks: Blocks, weights: Weights) -> tuple[Array, Array]:
     within: Array = left - np.repeat(wrong, sizes)
     along: Array = left - (wrong * sizes).sum() / sizes.sum()
     return within, along
+
+
+def _behind(moment: Array, place: Array, weight: Array) -> Array:
+    """Sum of the weights whose places, ascending, are behind each moment."""
+    sums = np.append(np.cumsum(weight[::-1])[::-1], 0.0)
+    behind: Array = sums[np.searchsorted(place, moment, side="right")]
+    return behind
 
 
 def _own_knots(blocks: Blocks, intervals: int) -> Index:

@@ -232,6 +232,12 @@ class Unknowns:
         """The rows of the problem for each unknown acceleration of that size, (n, len(a))."""
         # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
         per_time = unit / self.h
+        if self.odd and not self.problem.cruise:
+            # Blocks and their images say the same: the folded sum is twice that of the first half.
+            per_time, rows = 2.0 * per_time[: len(self.a) + 1], self.problem.rows
+            half: Array = rows[:, : len(self.a)] * per_time[:-1]
+            half -= rows[:, 1 : len(self.a) + 1] * per_time[1:]
+            return half
         response: Array = self.problem.rows[:, :-1] * per_time[:-1]
         # Some rows at a time: all of them are new memory once more, which costs more than the sum.
         for first in range(0, len(response), AT_ONCE):

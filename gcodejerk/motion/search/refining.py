@@ -28,7 +28,7 @@ from gcodejerk.motion.search.looked_at import Index, LookedAt
 from gcodejerk.motion.search.prices import Priced, priced_knots
 from gcodejerk.motion.search.programme import Problem
 
-ROUNDS = 5
+ROUNDS = 4
 """Programmes of ever shorter blocks at most."""
 MOST_BLOCKS = 150
 """Blocks that are no images of others, at most."""
