@@ -69,6 +69,18 @@ def loop_notes(program: Program, written: WrittenOut | None) -> list[str]:
     ]
 
 
+def frame_notes(program: Program, machine: Machine) -> list[str]:
+    """That a control may keep what lies between machine and work system from the program before."""
+    lasting = "tool length" in program.language.groups.values()
+    if not machine.program.offsets or not lasting or not (program.rapids.reason == CERTAIN).any():
+        return []
+    return [
+        "program.offsets is taken to mean, too, that this program begins without G92 and without "
+        "a tool length: where the control keeps them from another program, clear them in front "
+        "(G49, G92.1)"
+    ]
+
+
 def program_notes(
     program: Program, written: WrittenOut | None, emitter: Controller, machine: Machine
 ) -> list[str]:
@@ -77,6 +89,7 @@ def program_notes(
     notes = [_finding(finding.line, finding.message) for finding in findings]
     notes += subprogram_notes(program, machine)
     notes += loop_notes(program, written)
+    notes += frame_notes(program, machine)
     home = DIALECT_OF_CONTROLLER.get(emitter.name)
     if emitter.in_place and home is not None and not program.dialect.startswith(home):
         notes.append(

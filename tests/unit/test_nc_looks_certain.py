@@ -290,7 +290,9 @@ STILL_CERTAIN = {
     "a common variable": ("fanuc", b"#500=5.\n#1=2.\nG0 X5.\n"),
     "a timer": ("fanuc", b"#3001=0\nG0 X5.\n"),
     "an offset is written, then selected": ("fanuc", b"#5221=3.\nG54\nG49\nG0 X5. Y5.\nX6.\n"),
-    "a frame is written, then selected": ("siemens", b"$P_UIFR[1]=X5\nG54 D1\nG0 X5\nX6\n"),
+    "a frame is written, then selected": (
+        "siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG54 D1\nG0 X5\nX6\n"
+    ),
     "parameters of LinuxCNC": ("linuxcnc", b"#5221=3\nG0 X5\n"),
     "G43 with its axis": ("fanuc", b"G43 H1 Z5.\nG0 Z9.\n"),
     "no length along X": ("haas", b"G43 H1 Z5.\nG0 X9.\nG49\nG0 X5.\n"),
@@ -357,6 +359,102 @@ STILL_CERTAIN = {
     ),
     "behind the corner's other side": ("siemens", b"G1 X10 RND=5\nY10\nG1 X9 Y9\nG0 Y8\n"),
 }  # fmt: skip
+
+
+MEASURED = {
+    "an edge is measured": ("haas", b"G36 X20. F50.\nG0 X10. Y10. Z20.\n"),
+    "a centre": ("haas", b"G136 X20. F50.\nG0 X10. Y10. Z20.\n"),
+    "a tool": ("haas", b"G37 H1 Z-5. F50.\nG43 H1 G0 X10. Y10. Z20.\n"),
+    "and then the place is known to the machine": (
+        "haas",
+        b"G36 X20. F50.\nG53 G0 X-10. Y-10. Z-5.\nG55\nG1 F100.\n",
+    ),
+    "a cycle measures": ("siemens", b"CYCLE978(100,1,1,1,10)\nG1 X10 Y10 Z10 F100\nG54\n"),
+    "another one": ("siemens", b"CYCLE976(100,1,1,1,10)\nG1 X10 Y10 Z10 F100\nG54\n"),
+}
+"""What writes offsets that the machine file had stated."""
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_what_was_measured_is_not_what_the_machine_file_says(name):
+    dialect, text = MEASURED[name]
+    offsets = {"G54": dict.fromkeys("XYZ", -100.0), "G55": dict.fromkeys("XYZ", -150.0)}
+    facts = {
+        "offsets": offsets, "tool_lengths": {1: 80.0}, "home": dict.fromkeys("XYZ", 0.0),
+        "startup": "G710 G55" if dialect == "siemens" else "",
+    }  # fmt: skip
+    start = Start(**facts)
+    data = HEADS[dialect] + text + b"G0 X5. Y5. Z5.\n"
+    rapids = read_program(io.BytesIO(data), dialect=dialect, start=start).rapids
+    assert rapids.reason[-1] != CERTAIN
+    found = Findings(100)
+    assert not confirm(io.BytesIO(data), dialect, start, rapids, [len(rapids) - 1], found)
+
+
+FRAMES = {
+    "of the program": (b"$P_PFRAME=CROT(Z,45):CSCALE(X,2,Y,2)\nG54 D1\n", b"TRANS\n"),
+    "a chain": (b"$P_PFRAME = $P_PFRAME : CMIRROR(X)\nG54 D1\n", b"ROT\n"),
+    "a part of it": (b"$P_PFRAME[Z,RT]=45\nG54 D1\n", b"TRANS\n"),
+    "settable": (b"$P_UIFR[1]=CTRANS(X,5):CROT(Z,45)\nG54 D1\n", None),
+    "copied": (b"$P_UIFR[1]=$P_UIFR[2]\nG54 D1\n", None),
+    "its angle": (b"$p_uifr[1, z, rt]=45\nG54 D1\n", None),
+    "a basic one": (b"$P_CHBFRAME[0]=CSCALE(X,2)\nG54 D1\n", None),
+}
+"""Frames that turn, scale or mirror, written as data; and what ends them for certain."""
+SHIFTS = (
+    b"$P_UIFR[1,X,TR]=5\n",
+    b"$P_UIFR[1]=CTRANS(X,5,Y,3):CFINE(X,0.1)\n",
+    b"$P_UIFR[1,Z,FI]=1\n",
+)
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_frames_that_are_written_as_data_may_turn(name):
+    text, end = FRAMES[name]
+    moves = b"G1 X10 Y5 Z5 F100\nG0 X20 Y6\n"
+    assert read(text + moves, "siemens")[-1] == Reason.ROTATION
+    assert also_noticed(text + moves, "siemens")
+    if end is not None:
+        assert read(text + end + moves, "siemens")[-1] is None
+
+
+@pytest.mark.parametrize("shift", SHIFTS)
+def test_shifts_that_are_written_as_data_turn_nothing(shift):
+    assert read(shift + b"G54 D1\nG1 X10 Y5 Z5 F100\nG0 X20 Y6\n", "siemens")[-1] is None
+
+
+TURNED_LENGTHS = {
+    "in another plane": b"G18\nG43 H1\nG0 X0. Y0. Z50.\nG28 Y0.\nG0 Y5.\n",
+    "along the axis of the block": b"G43 X5. H1\nG0 X0. Y0. Z50.\nG53 G0 X-10.\nG0 X5.\n",
+}
+
+
+@pytest.mark.parametrize("name", TURNED_LENGTHS)
+def test_along_which_axis_a_length_lies_is_not_always_known(name):
+    facts = {
+        "offsets": {"G54": dict.fromkeys("XYZ", -100.0)}, "tool_lengths": {1: 80.0},
+        "home": dict.fromkeys("XYZ", 0.0),
+    }  # fmt: skip
+    assert read(TURNED_LENGTHS[name], "fanuc", **facts)[-1] is not None
+    plain = b"G43 Z50. H1\nG0 X0. Y0. Z50.\nG53 G0 X-10.\nG0 X5.\n"
+    assert read(plain, "fanuc", **facts)[-1] is None
+
+
+WRITTEN_VARIABLES = {
+    "another axis": (b"#5222=-24.64\nG10 L2 P1 X0\nX-20\n", b"Y-47"),
+    "another axis of L20": (b"#5222=-24.64\nG10 L20 P1 X0\nX-20\n", b"Y-47"),
+    "a rotation": (b"#5230=45\nG10 L2 P1 X0\nG1 X-20 Y3 Z5 F100\n", b"X1"),
+    "that of another system": (b"#5250=45\nG55\nG1 X-20 Y3 Z5 F100\n", b"X1"),
+    "a computed one": (b"#[5200+30]=45\nG10 L2 P1 X0\nG1 X-20 Y3 Z5 F100\n", b"X1"),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN_VARIABLES)
+def test_what_linuxcnc_takes_over_of_written_variables_is_not_known(name):
+    text, word = WRITTEN_VARIABLES[name]
+    text = text + b"G0 " + word + b"\n"
+    assert read(text, "linuxcnc")[-1] is not None
+    assert also_noticed(text, "linuxcnc")
 
 
 @pytest.mark.parametrize("name", STILL_CERTAIN)

@@ -326,3 +326,11 @@ def test_a_program_of_linuxcnc_that_begins_again_begins_nowhere_known(case):
     believed = replace(rapids, reason=rapids.reason * 0 + CERTAIN)
     found = Findings(9)
     assert confirm(io.BytesIO(text), "linuxcnc", start, believed, [0], found) == (first is None)
+
+
+def test_offsets_are_said_to_mean_that_nothing_else_lies_between():
+    # LinuxCNC and others keep G92 and G43 behind the end of a program.
+    said = "without G92 and without a tool length"
+    assert any(said in note for note in process(PROGRAM, Machine.loads(MACHINE)).notes)
+    without = MACHINE.replace("  offsets: {G54: {X: -100, Y: -50, Z: -200}}\n", "")
+    assert not any(said in note for note in process(PROGRAM, Machine.loads(without)).notes)

@@ -290,7 +290,8 @@ _PROGRAM = Section(
             ),
             "a work offset such as G54 or a tool length such as H1",
             ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3", "H1")),
-            "Work offsets, and tool lengths, that are known.",
+            "Work offsets, and tool lengths, that are known. Where there are any, programs begin "
+            "without G92 and, until they say so, without a tool length.",
             example="{G54: {X: 10}, H1: 87.2}"),
         Key("decimal_point", Choice(("calculator", "standard")),
             "What X100 without a decimal point is, where a parameter of the control decides (Fanuc "

@@ -175,7 +175,8 @@ class Arithmetic:
     parameters: str = ""
     """Letters of the arguments of a macro, #1 first; a blank for one that has no letter."""
     feed: frozenset[str] = frozenset()
-    """Variables that read the F in force: ``4109``, ``<_feed>``."""
+    """What reads the F in force: variables (``4109``, ``<_feed>``), any of the control's where
+    they begin with ``$``, or a function (``FN 18``)."""
     q_parameters: bool = False
     """Variables are Heidenhain's: Q1, QL1, QR1."""
 

@@ -221,7 +221,9 @@ FANUC = Dialect(
         offsets=1000,
         timers=frozenset({3000, 3001, 3002}),
         overrides="3004",
-        feed=frozenset({"4109"}),
+        # Modal data of the block in front (4001 to 4130), of the one that runs (4201 to 4330), of
+        # the one that was interrupted (4401 to 4530): F is number 109 of each.
+        feed=frozenset({"4109", "4309", "4509"}),
     ),
     harmless=frozenset(
         {0, 90, 170, 180, 190, 200, 210, 400, 610, 640, 900, 910, 930, 940, 950, 960, 970}

@@ -92,7 +92,7 @@ def _read_in_part(
         unknown_lasts=True,
         drilling=Drilling(CYCLES, CYCLES, own_group=True, repeats="KL", missing="unknown"),
         # A variable may be one of the control's, and what it holds is not computed.
-        arithmetic=Arithmetic(system=1, offsets=1),
+        arithmetic=Arithmetic(system=1, offsets=1, feed=ISO_MILL.arithmetic.feed),
         harmless=(ISO_MILL.harmless & _OWN) | set(inches),
         stops_after_rapid=False,
         note=f"the codes of {title} were not verified: it is read as what Fanuc and Haas mills "

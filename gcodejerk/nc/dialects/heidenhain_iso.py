@@ -32,6 +32,7 @@ Q_PARAMETERS = Arithmetic(
     compared="digits",
     chained=False,
     q_parameters=True,
+    feed=frozenset({"FN 18"}),  # SYSREAD Q1 = ID20 NR9
 )
 HEIDENHAIN_ISO = Dialect(
     name="heidenhain-iso",

@@ -78,7 +78,7 @@ _TURNED = (
 _CYCLES = (
     *(f"CYCLE{n}" for n in (*range(60, 100), 801, 802, 899, *range(930, 960))),
     *("HOLES1", "HOLES2", "POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2"),
-    *("LONGHOLE", "CYCLE61", "CYCLE976", "CYCLE977", "CYCLE978"),
+    "LONGHOLE",
 )
 _FLOW = (
     *("IF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "FOR", "ENDFOR", "LOOP", "ENDLOOP", "REPEAT"),
@@ -232,6 +232,7 @@ SIEMENS = Dialect(
         brackets="()",
         compared="relative",
         chained=False,
+        feed=frozenset({"$"}),  # $P_F, $AC_F and more
     ),
     harmless=frozenset(
         {0, 90, 170, 180, 190, 400, 700, 710, 7000, 7100, 900, 910, 930, 940, 950, 600, 640}

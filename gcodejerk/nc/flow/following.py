@@ -24,7 +24,7 @@ from gcodejerk.nc.interpreter.modal import NAN, State, agree, join
 from gcodejerk.nc.interpreter.operations import VACANT
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.runner import Runner
-from gcodejerk.nc.interpreter.variables import converted, is_local
+from gcodejerk.nc.interpreter.variables import converted, is_local, reads_feed
 from gcodejerk.nc.text.block import Block, Line
 
 MOST_STEPS = 50_000
@@ -194,6 +194,8 @@ class Follower:
                 self._block(unit, at, line, state, ways)
             return
         self.runner.log.visits.add(line.number, None)
+        if reads_feed(block, self.runner.dialect.arithmetic):
+            self.runner.log.feed_event(USES_FEED)
         if block.block_delete and op.kind != "call":
             self._split(ways, at + 1, state.copy())
         if op.kind == "jump":

@@ -19,7 +19,7 @@ from gcodejerk.nc.interpreter.expressions import evaluate
 from gcodejerk.nc.interpreter.modal import State, agree, join
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.runner import Runner
-from gcodejerk.nc.interpreter.variables import is_local
+from gcodejerk.nc.interpreter.variables import is_local, reads_feed
 from gcodejerk.nc.text.block import ELSEWHERE
 
 EXACT = 50_000
@@ -175,6 +175,10 @@ class Passes:
         if node.kind == "line":
             return self._line(node, state)
         state.line = node.line  # since which what it loses is unknown
+        if reads_feed(node.line.block, self.runner.dialect.arithmetic):
+            self.runner.log.feed_event(USES_FEED)
+        if node.kind == "endsub":
+            return {NEXT: state}
         if node.kind == "if":
             return self._branches(node, state)
         if node.kind == "call":

@@ -112,6 +112,8 @@ class Collector:
                 top.branches[0] = (condition, top.body)
                 return self._close(line)
             if word == "end" + top.kind:
+                if word == "endsub" and condition is not None:
+                    self._append(Node(word, name, line))  # what it returns is computed
                 return self._close(line)
         self._open(Node(word, name, line, [(condition, [])]))
         return None

@@ -41,6 +41,13 @@ _DECLARED = re.compile(
     re.IGNORECASE,
 )
 """A variable, the size of an array, and what it begins with."""
+_FRAME_DATA = re.compile(rb"\$P_[A-Z0-9]*FR[A-Z]*(\[[^\]]*\])?=", re.IGNORECASE)
+_SHIFT_ALONE = re.compile(
+    rb"\$[A-Z0-9_]+(\[[^\]]*,(TR|FI)\]=|(\[[^\]]*\])?=C(TRANS|FINE)\([^()]*\)"
+    rb"(:C(TRANS|FINE)\([^()]*\))*$)",
+    re.IGNORECASE,
+)
+"""Frames of Siemens as data, and those that hold no rotation, scale or mirror for certain."""
 
 
 CONTINUOUS = 64
@@ -282,6 +289,13 @@ class Effects:
         frames.shift_program(state, shift if known or bare else [NAN] * len(AXES))
         if bare or further:
             state.put("added", further)
+
+    def _write_frame(self, text: bytes) -> None:
+        """$P_PFRAME=CROT(Z,45) turns the program's frame, which TRANS ends; $P_UIFR another one."""
+        text = text.translate(None, b" \t")
+        if _FRAME_DATA.match(text) and not _SHIFT_ALONE.match(text):
+            own = text[:9].upper() == b"$P_PFRAME"
+            self._transform("programmed frame" if own else "written frame", on=True)
 
     def _transform(self, name: str, on: bool) -> None:
         """Begin or end a rotation, scaling, mirroring or polar frame."""

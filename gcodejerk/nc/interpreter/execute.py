@@ -169,6 +169,7 @@ class Executor(Phases):
             return
         if rules.at_selection:
             self.state.offsets = {}
+            self.state.put("rotates", True)  # one of them is the rotation
             self.state.lose("home")
         else:
             frames.data_written(self.state, self.lengths)

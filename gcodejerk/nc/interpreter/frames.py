@@ -67,6 +67,8 @@ def tool_length(
     axes = dialect.length_axes
     end_bar(state, "tool data written")
     if state.plane != G17 or any(axis in values for axis in AXES if axis not in axes):
+        if axes != AXES:
+            lengths = {}  # along which axis, nobody knows
         axes = AXES
     others = [k for k, axis in enumerate(AXES) if axis not in axes]
     kept = [] if code == G49 else [(k, state.tool[k], state.position[k]) for k in others]
@@ -239,6 +241,7 @@ def _write_table(state: State, values: Values, lengths: dict[int, float]) -> Non
         if "R" in values:
             state.put("rotates", True)
         return
+    # What a variable has been set to is taken over, too, of every axis.
     state.put("g5x", [NAN] * len(AXES))
     state.forget_positions(
         range(len(AXES))
@@ -248,3 +251,5 @@ def _write_table(state: State, values: Values, lengths: dict[int, float]) -> Non
     if "R" in values:
         state.put("rotates", True)
         state.put("rotated", False if values["R"] == 0 and kind == 2 else None)
+    elif state.rotates:
+        state.put("rotated", None)

@@ -60,11 +60,11 @@ def run_m_code(
         if dialect.other_m == "positions" or f"M{m}" in dialect.refused or dialect.macro_change:
             _behind_macro(state)
         change_tool(state, tool_change if m == 6 and group is not None else None)
-    elif m == 73 and group == "state":
-        state.put("restores", True)
-    elif m in (70, 72) and group == "state":
-        step.feed_event = USES_FEED  # M70 keeps F and the modes, M72 gives them back
-        if m == 72:
+    elif m in (70, 72, 73) and group == "state":
+        step.feed_event = USES_FEED  # M70 and M73 keep F and the modes
+        if m == 73:
+            state.put("restores", True)  # where the subprogram ends
+        elif m == 72:
             state.forget_modes()
             state.forget_positions()
     return group == "macro" or (group is not None and m in _CALLS and step.call is None)

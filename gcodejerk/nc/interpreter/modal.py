@@ -212,7 +212,7 @@ class State:
     system_stated: bool | None
     """The work system is in force because the program, or the machine file, has said so."""
     rotates: bool
-    """The program turns a coordinate system somewhere."""
+    """The program turns a coordinate system somewhere, or may do so by a variable."""
     turns: bool
     """The program uses G7, so X may be a diameter."""
     restores: bool

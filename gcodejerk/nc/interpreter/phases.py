@@ -208,9 +208,11 @@ class Phases(Effects):
             return
         if effects == ["cycle"] and self._drill_by_name(codes, step):
             return
-        for effect in effects:
+        for name, effect in zip(codes.names, effects, strict=True):
             if effect == "flow":
                 continue
+            if effect == "written":
+                self._write_frame(name.arguments)
             if effect == "feed override":
                 self.state.put("bars", {**self.state.bars, effect: True})
             if effect in ("shift", "further shift", "turned frame", "further turn"):

@@ -164,6 +164,10 @@ def reads_feed(block: Block, rules: Arithmetic) -> bool:
         return False
     texts = [word.text for word in block.words if word.value is None]
     texts += [*block.assigned, *block.o_arguments, *(name.arguments for name in block.names)]
+    if any(name.name in rules.feed for name in block.names):
+        return True
+    if "$" in rules.feed:
+        return any(b"$" in text for text in texts)
     if not any(b"#" in text for text in texts):
         return False
     names = {n for text in texts for n in _READ.findall(text.translate(None, b" \t").upper())}

@@ -141,6 +141,8 @@ class Codes(Known):
             self.forget()
         if effect == "written":
             self.written()
+            if line.frame:
+                self.frames[line.frame] = True
         else:
             self.bars["feed group"] = line.group
 

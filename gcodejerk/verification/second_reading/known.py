@@ -28,7 +28,7 @@ KINDS = {
     "slow": "least",
     **dict.fromkeys(("feed", "level", "r"), "number"),
     **dict.fromkeys(("p", "q"), "tolerance"),
-    **dict.fromkeys(("doubt", "turns", "habits", "strayed"), "ever"),
+    **dict.fromkeys(("doubt", "turns", "habits", "strayed", "rewritten"), "ever"),
     **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter"), "mode"),
     **dict.fromkeys(("selected", "told", "added"), "mode"),
     **dict.fromkeys(("cycle", "modal", "feed_whole", "spindle"), "mode"),
@@ -122,6 +122,9 @@ class Known:
         self.systems = {_system(name): values for name, values in facts.offsets.items()}
         self.lengths = dict(facts.tool_lengths)
         self.home = dict(facts.home)
+        self.rewritten = False
+        """Variables that hold offsets were set, a rotation among them: whatever selects or writes
+        a work system next takes them over."""
         self.told: tuple[int, int] | None = None
         """The work system that a block, or the startup codes, have selected last."""
         self.selected: tuple[int, int] | None = None
@@ -265,6 +268,8 @@ class Known:
         length = 0.0 if code == G49 else length if code == G43 else NAN
         only = self.g.get("plane") == G17 and named & ~_bits(self.dialect.length_axes) == 0
         axes = self.dialect.length_axes if only else AXES
+        if code == G43 and axes != self.dialect.length_axes:
+            length = NAN
         changed = AXES if code == G49 else axes
         after = list(self.tool)
         for k, axis in enumerate(AXES):
@@ -339,6 +344,8 @@ class Known:
         """Select a work system."""
         self.end_bar("offsets")
         if selected is None or selected != self.selected:
+            if self.rewritten:
+                self.frames["rotation"] = None
             known = [NAN] * len(AXES) if selected is None else self.offsets_of(selected)
             self.system = self.rename(self.system, known)
         self.selected = self.told = selected
@@ -399,7 +406,7 @@ class Known:
             if "table" in kinds:
                 self.systems, self.lengths = {}, {}
                 self.lose_offsets()
-                if "R" in values:
+                if "R" in values or self.rewritten:
                     self.frames["rotation"] = None
 
     def turned(self) -> bool:

@@ -84,6 +84,8 @@ class Line:
     """An assignment that may change offsets."""
     switched: float | None = None
     """What is written into the variable that switches overrides; NaN where it is computed."""
+    frame: str = ""
+    """Which frame may turn, scale or mirror from here on, being written as data."""
     swivelled: bool = False
     """The plane is turned from here on."""
     smoothed: bool = False
@@ -316,6 +318,7 @@ class Text:
             line.understood = False
         elif rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
             line.effects.append("written")
+            line.frame = _written_frame(text)
         else:
             return False
         return True
@@ -441,3 +444,13 @@ def pieces(file: BinaryIO) -> Iterator[bytes]:
             rest += piece
     if rest:
         yield rest
+
+
+def _written_frame(text: bytes) -> str:
+    """Which frame of Siemens a line writes with more than a shift in it; empty without one."""
+    target, _, value = b"".join(text.upper().split()).partition(b"=")
+    if b"FR" not in target or target.endswith((b",TR]", b",FI]")):
+        return ""
+    if value and not re.sub(rb"C(?:TRANS|FINE)\([^()]*\):?", b"", value):
+        return ""
+    return "a programmed frame" if b"P_PFRAME" in target else "a written frame"

@@ -52,7 +52,7 @@ class Tracker(Circling):
             self._flow(line.flow)
             return Observation()
         if line.offsets and self.dialect.arithmetic.at_selection:
-            self.systems, self.home = {}, {}
+            self.systems, self.home, self.rewritten = {}, {}, True
         elif line.offsets:
             self.written()
         if line.switched is not None:
