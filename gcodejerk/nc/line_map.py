@@ -104,6 +104,8 @@ class Chain:
     def replaced(self) -> LineMap:
         """What was replaced, piece by piece, in the order of both files."""
         outer, inner = self.first.replaced, self.second.replaced
+        if not len(outer) or not len(inner):
+            return outer if len(outer) else inner
         ends = np.array([0, 1, 2, 1])
         stood = inner.original_end + ends[inner.original_terminator]
         outer = replace(

@@ -199,3 +199,24 @@ def test_m97_that_the_proof_does_not_follow_is_named():
     made = process(text.encode(), machine, unroll=True)
     assert made.planned == 1
     assert any("M97 (line 6) runs a part" in note for note in made.notes), made.notes
+
+
+LOOP = "o1 repeat [3]\nG1 X5\nG0 X20\no1 endrepeat\n"
+DRILLED = "G0 Z20\nG99 G81 X5 Y5 Z-3 R2\nX15\nG80\n"
+
+
+@pytest.mark.parametrize("loop", ["", LOOP])
+@pytest.mark.parametrize("drilled", ["", DRILLED])
+def test_both_may_be_asked_for_where_one_has_nothing_to_do(loop, drilled):
+    # With nothing to unroll, cycles beside it ended with a traceback.
+    head = "G21 G90 G94 G17 G40 G49 G80 G54 G64 F300\nG0 X0 Y0 Z50\n"
+    text = (head + loop + drilled + "G0 X40 Y0 Z50\nM2\n").encode()
+    both = process(text, VMC, unroll=True, expand_cycles=True)
+    assert b"\no1" not in both.output
+    assert b"\nG99 G81" not in both.output
+    assert both.verification.confirmed == both.planned > 0
+    asked = {"unroll": bool(loop), "expand_cycles": bool(drilled)}
+    if not all(asked.values()):
+        one = process(text, VMC, **{name: True for name, needed in asked.items() if needed})
+        assert both.output.split(b"\n", 2)[2] == one.output.split(b"\n", 2)[2]
+        assert [rapid.line for rapid in both.rapids] == [rapid.line for rapid in one.rapids]
