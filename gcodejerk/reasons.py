@@ -102,7 +102,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.CANNED_CYCLE: Explanation(
         "the moves of a drilling cycle, of a modal macro, or of a turning contour",
-        "drilling cycles: `--expand-cycles` writes them out; others: post them as single moves",
+        "drilling cycles: `--expand-cycles` writes them out; others: post them as single moves; "
+        "behind a call on a Siemens, where one may have been left in force: MCALL alone ends it",
     ),
     Reason.FRAME_CHANGE: Explanation(
         "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
@@ -149,8 +150,10 @@ EXPLAINED: dict[Reason, Explanation] = {
         "put `FGROUP()` in front of the rapids",
     ),
     Reason.FEED_SCALED: Explanation(
-        "M52 of LinuxCNC, OVR of Siemens: they act on streams, not on G0",
-        "LinuxCNC: end it in front of the rapids (M52 P0); Siemens: take OVR out",
+        "M52 of LinuxCNC, OVR of Siemens: they act on streams, not on G0; M220 of Marlin and its "
+        "kin: by what share, is not known",
+        "LinuxCNC: end it in front of the rapids (M52 P0), Marlin too (M220 S100); Siemens: take "
+        "OVR out",
     ),
     Reason.OVERRIDES_OFF: Explanation(
         "Fanuc and its kin, behind G63 (tapping) or `#3004` set to anything but 0: feed override "

@@ -23,6 +23,7 @@ HEADS = {
     "siemens": b"G71 G90 G94 G17 G40 G64 F100\nG0 X0 Y0 Z50\n",
     "marlin": b"G21\nG90\nG0 X0 Y0 Z50 F6000\n",
     "klipper": b"G90\nG0 X0 Y0 Z50 F6000\n",
+    "duet": b"M453\nG90 G94 G17\nG21\nG0 X0 Y0 Z50\nG1 X1 F200\n",
     "fanuc": b"G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 X0. Y0. Z50.\n",
     "fanuc-lathe-a": b"G21 G98 G40 G18 F100.\nG0 X0. Z50.\n",
     "haas": b"G21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 X0. Y0. Z50.\n",
@@ -294,6 +295,13 @@ STILL_CERTAIN = {
         "siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG54 D1\nG0 X5\nX6\n"
     ),
     "parameters of LinuxCNC": ("linuxcnc", b"#5221=3\nG0 X5\n"),
+    "an offset of a Duet": ("duet", b"G10 L2 P1 X5\nG54\nG0 X5 Y5 Z5\nG0 X6\n"),
+    "behind MCALL, which a call may have left": (
+        "siemens", b"SUB_OF_THE_BUILDER\nG710 G90 G94 G17 G40 G64 F100\nMCALL\nG0 X5 Y5 Z5\nX6\n"
+    ),
+    "behind an override that was ended": (
+        "marlin", b"M220 S50\nM9999\nM220 S100\nG21\nG90\nG0 X5 Y5 Z5 F6000\nG0 X6\n"
+    ),
     "G43 with its axis": ("fanuc", b"G43 H1 Z5.\nG0 Z9.\n"),
     "no length along X": ("haas", b"G43 H1 Z5.\nG0 X9.\nG49\nG0 X5.\n"),
     "behind a modal macro": (
@@ -369,6 +377,7 @@ MEASURED = {
         "haas",
         b"G36 X20. F50.\nG53 G0 X-10. Y-10. Z-5.\nG55\nG1 F100.\n",
     ),
+    "and the axis stands where it was met": ("haas", b"G36 X20. F50.\nG54 G49\n"),
     "a cycle measures": ("siemens", b"CYCLE978(100,1,1,1,10)\nG1 X10 Y10 Z10 F100\nG54\n"),
     "another one": ("siemens", b"CYCLE976(100,1,1,1,10)\nG1 X10 Y10 Z10 F100\nG54\n"),
 }

@@ -87,6 +87,7 @@ Effect = Literal[
     "watch",  # what is said here may act at any time from here on
     "transform",  # turns, scales or mirrors what follows, for good
     "home",  # moves the axes that it names, or all, to a place that is not known
+    "measure",  # does that, and writes what it has measured: an offset, a tool's length
     "label",  # may be come to from elsewhere: nothing is known behind it but the unit of lengths
     "flow",  # a jump, a loop, a branch or a call: nothing is certain behind it
     "diameter",  # X is a diameter from here on

@@ -60,7 +60,7 @@ HAAS = replace(
         310: "home",
         # Measuring: a tool's diameter or length, the work offset at an edge or a centre, written
         # where the control keeps them.
-        **dict.fromkeys((350, 360, 370, 1360), "data"),
+        **dict.fromkeys((350, 360, 370, 1360), "measure"),
         **dict.fromkeys((1410, 1430, 2340), "frames"),
         **dict.fromkeys((1000, 1010), "words"),  # which axes are mirrored
     },

@@ -110,12 +110,14 @@ class Effects:
             number = values.get("P", NAN)
             self._select_system(frames.numbered_system(number), step)
         elif effect == "frames":
+            if self.dialect.groups.get(code) == "system":
+                frames.end_bar(state, "offsets written")
             state.forget_frame()
             state.forget_positions()
         elif effect == "watch":
             state.forget()
             state.put("bars", {**state.bars, "synchronized action": True})
-        elif effect == "written":
+        elif effect in ("written", "measure"):
             frames.data_written(state, self.lengths)
         elif effect == "data":
             frames.write_data(state, self.lengths, values)

@@ -44,7 +44,8 @@ _FRAME_CHANGES: frozenset[Effect] = frozenset(
             "restore",
             "local",
         ),
-        *("table", "frames", "home", "shift", "further shift", "turned frame", "further turn"),
+        *("table", "frames", "home", "measure", "shift", "further shift", "turned frame"),
+        "further turn",
     }
 )
 """Effects that, in the block of a rapid, move the origin that its numbers refer to."""

@@ -42,7 +42,7 @@ from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
 
 _TAKES_WORDS: frozenset[Effect] = frozenset(
-    {"words", "cycle", "home", "flow", "modal cycle", "swivel"}
+    {"words", "cycle", "home", "measure", "flow", "modal cycle", "swivel"}
 )
 """Effects of a code beside which the axis words of the block are no straight move."""
 _NAME_TAKES_WORDS: frozenset[Effect] = (_TAKES_WORDS - {"flow"}) | {

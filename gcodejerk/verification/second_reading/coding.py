@@ -311,6 +311,8 @@ class Codes(Known):
         elif effect in SELECTIONS:
             self.select(self.selection(effect, code, values))
         elif effect == "frames":
+            if self.dialect.groups.get(code) == "system":
+                self.end_bar("offsets")
             self.lose_offsets()
             self.lose()
         elif effect in ("transform", "modal cycle"):
@@ -322,6 +324,8 @@ class Codes(Known):
             self.g["motion"], self.feed = None, NAN
         elif effect == "home":
             self.lose()
+        elif effect == "measure":
+            self.written()
         elif effect == "data":
             self._data(values)
         elif effect == "label":

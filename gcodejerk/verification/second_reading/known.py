@@ -123,8 +123,7 @@ class Known:
         self.lengths = dict(facts.tool_lengths)
         self.home = dict(facts.home)
         self.rewritten = False
-        """Variables that hold offsets were set, a rotation among them: whatever selects or writes
-        a work system next takes them over."""
+        """Variables that hold offsets were set: the next work system takes over a rotation, too."""
         self.told: tuple[int, int] | None = None
         """The work system that a block, or the startup codes, have selected last."""
         self.selected: tuple[int, int] | None = None
@@ -265,15 +264,13 @@ class Known:
     def lengthen(self, code: int, number: float, named: int) -> None:
         """Put a tool length in force: that of the machine file under an H number, or none."""
         length = self.lengths.get(int(number), NAN) if number == number else NAN
-        length = 0.0 if code == G49 else length if code == G43 else NAN
         only = self.g.get("plane") == G17 and named & ~_bits(self.dialect.length_axes) == 0
         axes = self.dialect.length_axes if only else AXES
-        if code == G43 and axes != self.dialect.length_axes:
-            length = NAN
-        changed = AXES if code == G49 else axes
+        sure = code == G43 and axes == self.dialect.length_axes
+        length = 0.0 if code == G49 else length if sure else NAN
         after = list(self.tool)
         for k, axis in enumerate(AXES):
-            if axis in changed:
+            if axis in (AXES if code == G49 else axes):
                 after[k] = NAN if length != length else length if axis == "Z" else 0.0
         self.tool = self.rename(self.tool, after)
         self.end_bar("tool data")

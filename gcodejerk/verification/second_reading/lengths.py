@@ -1,4 +1,4 @@
-"""Which lines a control cuts, refuses or reads as other words, for the second reading.
+"""Which lines a control cuts, refuses or reads as other words, or writes frames with, told anew.
 
 Rule: what stands here is said of the bytes of a line, before anything looks at its words.
 """
@@ -37,3 +37,13 @@ def is_too_much(text: bytes, dialect: Dialect) -> bool:
         return True
     numbers = _LONG.findall(text) if rules.digits else []
     return any(len(n) - n.count(b".") > rules.digits for n in numbers)
+
+
+def written_frame(text: bytes) -> str:
+    """Which frame of Siemens a line writes with more than a shift in it; empty without one."""
+    target, _, value = b"".join(text.upper().split()).partition(b"=")
+    if b"FR" not in target or target.endswith((b",TR]", b",FI]")):
+        return ""
+    if value and not re.sub(rb"C(?:TRANS|FINE)\([^()]*\):?", b"", value):
+        return ""
+    return "a programmed frame" if b"P_PFRAME" in target else "a written frame"

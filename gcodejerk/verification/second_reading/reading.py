@@ -21,7 +21,12 @@ from typing import BinaryIO
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 from gcodejerk.verification.second_reading.klartext import read_statement
-from gcodejerk.verification.second_reading.lengths import is_cut, is_loose, is_too_much
+from gcodejerk.verification.second_reading.lengths import (
+    is_cut,
+    is_loose,
+    is_too_much,
+    written_frame,
+)
 from gcodejerk.verification.second_reading.limiting import Said, take_limits
 
 PIECE = 1 << 20
@@ -318,7 +323,7 @@ class Text:
             line.understood = False
         elif rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
             line.effects.append("written")
-            line.frame = _written_frame(text)
+            line.frame = written_frame(text)
         else:
             return False
         return True
@@ -413,8 +418,7 @@ class Text:
             return b" "
 
         if self.dialect.one_command:
-            match = _NAME.match(text)
-            if match is None:
+            if (match := _NAME.match(text)) is None:
                 return text
             take(match)
             return b""
@@ -444,13 +448,3 @@ def pieces(file: BinaryIO) -> Iterator[bytes]:
             rest += piece
     if rest:
         yield rest
-
-
-def _written_frame(text: bytes) -> str:
-    """Which frame of Siemens a line writes with more than a shift in it; empty without one."""
-    target, _, value = b"".join(text.upper().split()).partition(b"=")
-    if b"FR" not in target or target.endswith((b",TR]", b",FI]")):
-        return ""
-    if value and not re.sub(rb"C(?:TRANS|FINE)\([^()]*\):?", b"", value):
-        return ""
-    return "a programmed frame" if b"P_PFRAME" in target else "a written frame"

@@ -27,9 +27,10 @@ _FRAMES: frozenset[Effect] = frozenset(
     {
         *("return", "store", "machine", "system", "numbered system", "length", "set", "clear"),
         *("restore", "local", "table", "frames", "home", "transform", "modal cycle", "data"),
+        "measure",
     }
 )
-_MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "flow"))
+_MOVES: frozenset[Effect] = frozenset(("words", "cycle", "home", "measure", "flow"))
 """Effects beside which the axis words are no straight move."""
 _SHIFTS = frozenset[Effect](("shift", "further shift", "turned frame", "further turn"))
 _SMOOTH = frozenset[Effect](("smoothing", "compressor", "no compressor"))
