@@ -73,22 +73,27 @@ class Ringing:
     def left(self, knots: Index, parts: int) -> Array:
         """What a unit jerk in each block leaves, shape (parts * p, k).
 
-        `parts`: rows of the real and the imaginary part of each pole, or of the latter alone.
+        `parts`: rows of the real and the imaginary part of each pole, or of the latter alone: of
+        blocks whose images leave the same there.
         """
-        rows = np.empty((len(self.poles), parts, len(knots) - 1))
+        blocks = len(knots) - 1
+        rows = np.empty((len(self.poles), parts, blocks))
+        # Those that have an image behind them, or are their own, are computed.
+        own = blocks if parts > 1 else (blocks + 1) // 2
         if self.known is not None:
             for part, every in enumerate(self.known[-parts:]):
-                there = every[knots - self.first]
-                rows[:, part] = (there[:-1] - there[1:]).T
-            return rows.reshape(-1, rows.shape[-1])
+                there = every[knots[: own + 1] - self.first]
+                rows[:, part, :own] = (there[:-1] - there[1:]).T
         # A few poles at a time: they stay in the processor's cache.
-        for begin in range(0, len(self.poles), AT_ONCE):
+        for begin in range(0, len(self.poles) if self.known is None else 0, AT_ONCE):
             some = slice(begin, begin + AT_ONCE)
-            left = np.diff(self._at(knots, some), axis=1)
-            np.negative(left.imag, out=rows[some, -1])
+            left = np.diff(self._at(knots[: own + 1], some), axis=1)
+            np.negative(left.imag, out=rows[some, -1, :own])
             if parts > 1:
-                np.negative(left.real, out=rows[some, 0])
-        return rows.reshape(-1, rows.shape[-1])
+                np.negative(left.real, out=rows[some, 0, :own])
+        if own < blocks:
+            rows[:, :, own:] = rows[:, :, blocks - own - 1 :: -1]
+        return rows.reshape(-1, blocks)
 
     def sums(self, weights: Array, parts: int) -> Array:
         """The sum of these rows for each interval, times weights of shape (parts * p,)."""
@@ -197,6 +202,8 @@ class Blocks:
 
     def cut(self, knots: Index) -> Blocks:
         """Other blocks of the same whole move, which have images if these have."""
+        if knots is self.knots:
+            return self
         (ringing,) = self.ringing
         return replace(self, knots=knots, rows=ringing.left(knots, 1 if self.mirrored else 2))
 
