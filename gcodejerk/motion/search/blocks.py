@@ -248,7 +248,9 @@ class Blocks:
         """
         T = move.count * move.interval
         used = active[self.owner]
-        rows = np.repeat(used, np.diff(self.leads, append=len(self.cone)))
+        rows: Flags | slice = slice(None)
+        if not used.all():
+            rows = np.repeat(used, np.diff(self.leads, append=len(self.cone)))
         return Problem(
             knots=self.knots,
             velocity=move.velocity * T,

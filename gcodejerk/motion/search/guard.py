@@ -186,9 +186,11 @@ def undamped_response(profile: Profiles, omega: Array) -> Array:
 
     Computed for all frequencies at once, as a profile has few segments or is looked at seldom.
     """
-    poles = 1j * omega[:, np.newaxis]
-    steps = profile.acceleration_steps() + profile.jerk_steps() / poles
-    response: Array = np.abs((steps * np.exp(-poles * profile.step_times())).sum(axis=1)) / omega
+    phase = np.multiply.outer(omega, profile.step_times())
+    cosine, sine = np.cos(phase), np.sin(phase)
+    a, j = profile.acceleration_steps(), profile.jerk_steps()
+    real = cosine @ a - (sine @ j) / omega
+    response: Array = np.hypot(real, sine @ a + (cosine @ j) / omega) / omega
     return response
 
 

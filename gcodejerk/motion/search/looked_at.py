@@ -56,6 +56,10 @@ class LookedAt:
         [rad/s]
     near, share : ndarray of int and of float, shape (q, 4)
         The nodes around each frequency, and how much each of them has of what is left there.
+    sparse : ndarray of bool, shape (g,)
+        Some of the groups that are guarded: side by side they say nearly the same.
+    same : ndarray of bool, shape (g - 1,)
+        Groups whose successor has the same source.
     """
 
     poles: Complex
@@ -66,6 +70,8 @@ class LookedAt:
     nodes: Complex
     near: Index
     share: Array
+    sparse: Flags
+    same: Flags
 
     @classmethod
     def of(
@@ -102,26 +108,27 @@ class LookedAt:
             groups = np.concatenate([groups, len(source) + np.arange(count_guarded)])
             source = np.concatenate([source, np.full(count_guarded, -1)])
             first = np.concatenate([first, np.zeros(count_guarded, dtype=bool)])
-        return cls(every, weight, groups, source, first, *_nodes(every, groups, source, duration))
+        guards = source < 0
+        stride = max(8, int(np.count_nonzero(guards)) // 48)
+        sparse = guards & (np.arange(len(guards)) % stride == 0)
+        nodes = _nodes(every, groups, source, duration)
+        return cls(every, weight, groups, source, first, *nodes, sparse, np.diff(source) == 0)
 
     def exceeded(self, left: Array, most: Array) -> Flags:
         """Groups that are left with too much: peaks, and some of those that are guarded, (g,).
 
         `left`, `most`, shape (g,): what each is left with, and what it may be.
         """
-        guarded = self.source < 0
-        # Guarded frequencies side by side say nearly the same.
-        stride = max(8, int(np.count_nonzero(guarded)) // 48)
-        sparse = guarded & (np.arange(len(guarded)) % stride == 0)
-        exceeded: Flags = (left > most) & (self.peaks(left) | sparse)
+        exceeded: Flags = (left > most) & (self.peaks(left) | self.sparse)
         return exceeded
 
     def peaks(self, left: Array) -> Flags:
         """Groups that are left with no less than their neighbours of the same source, (g,)."""
-        same = np.diff(self.source) == 0
-        before = np.append(0.0, np.where(same, left[:-1], 0.0))
-        behind = np.append(np.where(same, left[1:], 0.0), 0.0)
-        peaks: Flags = (left >= before) & (left >= behind)
+        rises = left[1:] > left[:-1]
+        falls = left[1:] < left[:-1]
+        peaks = np.ones(len(left), dtype=bool)
+        peaks[:-1] &= ~(self.same & rises)
+        peaks[1:] &= ~(self.same & falls)
         return peaks
 
 
