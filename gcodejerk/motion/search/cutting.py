@@ -437,9 +437,8 @@ def _kept(x: Array, matrix: Array, lower: Array, upper: Array) -> bool:
     """Whether a solution keeps all: with multipliers of 1e7 daqp has lost rows, and said solved."""
     reached = np.concatenate([x, matrix @ x])
     lost = np.maximum(reached - upper, lower - reached)
-    doubtful = np.flatnonzero(lost[len(x) :] > LOST * TINY)
-    sizes = np.sqrt(np.einsum("rn,rn->r", matrix[doubtful], matrix[doubtful]))
-    lost[len(x) + doubtful] /= np.maximum(sizes, TINY)
+    sizes = np.sqrt(np.einsum("rn,rn->r", matrix, matrix))
+    lost[len(x) :] /= np.maximum(sizes, TINY)
     return bool(lost.max() <= LOST)
 
 
