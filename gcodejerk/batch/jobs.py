@@ -218,7 +218,7 @@ def _run(
 ) -> Done:
     _refuse_overwriting(job, machine)
     writes = job.mode == "write"
-    if job.if_changed and writes:
+    if job.if_changed and writes and not job.strict:  # what is left alone, no stamp says
         others = [name for name in (job.report, job.beside) if name is not None]
         if is_current(job.input, job.output, others, machine, settings):
             summary = f"{job.called}: {job.output} is up to date"
@@ -354,6 +354,9 @@ def _refuse_overwriting(job: Job, machine: Machine) -> None:
             )
         if same_file(machine.source, name):
             raise EmitError(f"{name} is the machine file", "choose another name")
+    report, others = job.report, (name for name in (job.output, job.beside) if name is not None)
+    if report is not None and job.mode == "write" and any(same_file(report, n) for n in others):
+        raise EmitError(f"{report} would hold the output and the report", "choose another name")
 
 
 def _refuse_foreign_beside(job: Job) -> None:

@@ -73,3 +73,36 @@ def test_another_version_makes_it_again(command, made, monkeypatch):
 def test_it_needs_an_output(command, made):
     assert command(*ARGUMENTS, "-o", "-")[0] == 2
     assert command(*ARGUMENTS, "--in-place")[0] == 2
+
+
+@pytest.mark.parametrize("more", [[], ["--unroll"], ["--report", "r.json"]])
+def test_a_program_that_came_with_its_old_date_is_made_again(command, made, tmp_path, more):
+    # mv, cp -p, rsync -t and archives keep the date: a shop would have run last week's part.
+    command(*ARGUMENTS, *more)
+    other = tmp_path / "other.ngc"
+    other.write_bytes(PROGRAM.replace(b"X20", b"X25"))
+    os.utime(other, (9e8, 9e8))
+    other.replace(tmp_path / "a.ngc")
+    assert "is up to date" not in command(*ARGUMENTS, *more)[1]
+    assert b"(gcodejerk: G0 X25)" in made.read_bytes()
+    assert "is up to date" in command(*ARGUMENTS, *more)[1]
+
+
+def test_the_same_program_with_another_date_is_current(command, made, tmp_path):
+    (tmp_path / "copy.ngc").write_bytes(PROGRAM)
+    os.utime(tmp_path / "copy.ngc", (9e8, 9e8))
+    (tmp_path / "copy.ngc").replace(tmp_path / "a.ngc")
+    assert "is up to date" in command(*ARGUMENTS)[1]
+
+
+def test_how_strict_a_run_was_no_output_says(command, made, tmp_path):
+    (tmp_path / "a.ngc").write_bytes(PROGRAM.replace(b"G0 X20", b"G0 X[#1]"))
+    assert command(*ARGUMENTS)[0] == 0
+    assert command(*ARGUMENTS, "--strict")[0] == 1
+
+
+def test_a_report_does_not_replace_the_output(command, made, tmp_path):
+    for name in ("x.json", "./x.json", str(tmp_path / "x.json")):
+        code, out = command(*ARGUMENTS[:-1], "-o", "x.json", "--report", name)
+        assert (code, "would hold the output and the report" in out) == (1, True), out
+    assert not (tmp_path / "x.json").exists()
