@@ -127,6 +127,8 @@ class Start:
     """The same of the path of all linear axes together."""
     straight: bool = True
     """Rapids are straight lines, all axes together; else every axis runs on its own."""
+    control: str = ""
+    """Dialect that the machine's own control reads; empty: nobody says."""
     subprograms: Mapping[str, bytes] = field(default_factory=dict)
     """Files in which the control finds what a program calls: name -> text."""
 

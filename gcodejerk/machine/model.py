@@ -17,6 +17,7 @@ import yaml
 from gcodejerk.errors import MachineError, Place
 from gcodejerk.machine.file.document import read_text
 from gcodejerk.machine.file.loader import load_text
+from gcodejerk.machine.file.table import DIALECT_OF_CONTROLLER
 from gcodejerk.machine.file.writer import settings_text
 from gcodejerk.machine.parts import Description
 from gcodejerk.machine.problems import MachineFileError
@@ -169,6 +170,7 @@ class Machine(Description):
             limits={axis.name: axis.largest() for axis in self.axes},
             along=self.path.largest(),
             straight=self.positioning == "linear",
+            control=DIALECT_OF_CONTROLLER.get(self.controller, ""),
             subprograms={} if self.subprograms is None else self.subprograms.files,
         )
 

@@ -175,7 +175,7 @@ def open_reader(
         file = seekable(file)
         begin = file.tell()
         head = next(read_chunks(file, name)).data.removeprefix(BYTE_ORDER_MARK)
-        dialect, why = detect_dialect(head, name, lathe=start.diameter)
+        dialect, why = detect_dialect(head, name, lathe=start.diameter, control=start.control)
         file.seek(begin)
     chosen = find_dialect(dialect)
     if start.diameter and chosen.lathe == "no":

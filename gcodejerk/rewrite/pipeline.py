@@ -344,13 +344,14 @@ def _read(
     source.seek(0)
     refuse_foreign(source.read(HEAD), name)
     source.seek(0)
+    written_for = replace(machine, controller=emitter.name)
     program = read_program(
         source,
         name=name,
         dialect=settings.dialect or machine.dialect,
-        start=machine.program_start(),
+        start=written_for.program_start(),
         progress=lambda done: report("reading", done, size),
-        neighbours=replace(machine, controller=emitter.name).neighbours_matter,
+        neighbours=written_for.neighbours_matter,
     )
     program.rapids.freeze()
     if program.stamp is not None and not settings.force:

@@ -189,3 +189,34 @@ def test_what_stands_far_behind_in_a_line_tells_nothing():
     near, far = b"G0 X1" + b" " * 200 + b"G187 P1\n", b"G0 X1" + b" " * 300 + b"G187 P1\n"
     assert detect_dialect(b"%\nO1000\n" + near, "part.nc")[0].name == "haas"
     assert detect_dialect(b"%\nO1000\n" + far, "part.nc")[0].name == "iso-mill"
+
+
+@pytest.mark.parametrize("part", ["LID FOR MACH3 BOX", "LINUXCNC BOX", "GRBL ENCLOSURE"])
+def test_a_comment_may_name_the_part_and_not_the_control(part):
+    # Read as Mach's, X100 of a Fanuc was 100 mm instead of 0.1, and the tool plunged.
+    body = b"G21 G90 G54\nN2 G0 X100 Y50\nN4 G1 Z-5 F100\nN6 G0 Z20\nM30\n"
+    tape = b"%%\nO1234 (%s)\n" % part.encode() + body + b"%\n"
+    with pytest.raises(ProgramError, match="iso-mill: a % and a program number"):
+        detect_dialect(tape, "part.nc")
+    named = b"(%s)\n" % part.encode() + body
+    dialect, _ = detect_dialect(named, "part.nc")
+    assert dialect.name in part.lower()
+    for control in ("fanuc", "haas", "siemens"):
+        with pytest.raises(ProgramError, match=f"the machine's control reads {control}") as no:
+            detect_dialect(named, "part.nc", control=control)
+        assert f"--dialect {control}" in no.value.remedy
+    assert detect_dialect(named, "part.nc", control="linuxcnc")[0] is dialect
+    with pytest.raises(ProgramError, match="fanuc-lathe-a: a tool with its offset"):
+        detect_dialect(named.replace(b"N2", b"T0101\nN2"), "part.nc")
+
+
+@pytest.mark.parametrize("sign", [b"G21\nG90\n", b"(made with care)\nG21 G90\n"])
+def test_what_controls_on_a_pc_read_alike_is_not_read_so_for_a_machining_centre(sign):
+    program = sign + b"G0 X100 Y50\nG1 Z-5 F100\nG0 Z20\nM30\n"
+    assert detect_dialect(program, "part.nc")[0].name == "rs274"
+    with pytest.raises(ProgramError, match="the machine's control reads haas"):
+        detect_dialect(program, "part.nc", control="haas")
+    machine = replace(Machine.load(find_machine("vmc")), dialect="auto")
+    assert process(program, machine).program.dialect == "rs274"
+    with pytest.raises(ProgramError, match="the machine's control reads haas"):
+        process(program, machine, controller="haas")

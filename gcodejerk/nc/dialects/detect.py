@@ -99,6 +99,11 @@ CODE = (
           rb"|SAVE_GCODE_STATE|RESTORE_GCODE_STATE|EXCLUDE_OBJECT\w*)\b", "a Klipper command"),
 )  # fmt: skip
 _LIKE_FANUC = frozenset({"fanuc", "haas", "mitsubishi", "mazatrol-eia", "syntec", "okuma", "fagor"})
+_ON_A_PC = frozenset(
+    {"linuxcnc", "grbl", "mach", "rs274", "uccnc", "edingcnc", "planetcnc", "masso"}
+    | {"marlin", "klipper", "duet"}
+)
+"""Dialects in which X100 is 100 mm, and none of which has a tape with a program number."""
 _INCREMENTS = _in_line(rb"(?<![A-Z_#\[])[UW]\s*[-+]?[.\d]")
 LATHE = (
     (_in_line(rb"(?<![A-Z_])T\d{4}(?!\d)"), "a tool with its offset, T0101"),
@@ -123,6 +128,7 @@ _POINT = _in_line(rb"(?<![A-Z_])[XYZ]\s*[-+]?\d*\.", re.IGNORECASE)
 _O_PROGRAM = _in_line(rb"^\s*[O:]\d+")
 _TAPE = re.compile(rb"\s*%[^\n]*\n(?:\s*\n)*\s*[O:]\d+", re.IGNORECASE)
 """How a program begins that is read as a tape."""
+_NUMBERED_TAPE = re.compile(_TAPE.pattern + rb"[ \t]*(?:\r?\n|\(|$)", re.IGNORECASE)
 _BLOCK = _in_line(rb"(?<![A-Z_])G0*[0-3](?!\d|\.)", re.IGNORECASE)
 _PC_CONTROL = (
     (_in_line(rb"(?<![A-Za-z_])[XYZxyz]\s*[-+]?\d*\.\d{5}"), "a length with five decimals"),
@@ -168,7 +174,9 @@ def refuse_klartext(head: bytes, dialect: Dialect, name: str) -> None:
         )
 
 
-def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect, str]:
+def detect_dialect(
+    head: bytes, name: str, lathe: bool = False, control: str = ""
+) -> tuple[Dialect, str]:
     r"""Find the dialect of a program.
 
     Parameters
@@ -179,6 +187,8 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
         For messages.
     lathe : bool
         The machine file is one of a lathe.
+    control : str
+        Dialect of the control that will run it; empty: nobody says.
 
     Returns
     -------
@@ -215,15 +225,16 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
     _find_system(found, code)
     _prefer(found, code)
     chosen = found or hints
+    _doubt_names(chosen, code)
     _refuse_mills(chosen, code, comments, lathe, name)
     if not found and set(chosen) == {"fanuc", "haas"}:
         why = f"{chosen['fanuc']}, which Fanuc and Haas have; which of the two, nothing tells"
         return DIALECTS["iso-mill"], f"{why}, so as what both read alike"
     if len(chosen) == 1:
         ((dialect, why),) = chosen.items()
-        return DIALECTS[dialect], why
+        return _that_control_reads(control, DIALECTS[dialect], why, name)
     if not chosen and (common := _read_alike(code, comments, lathe)) is not None:
-        return common
+        return _that_control_reads(control, *common, name)
     if not chosen:
         raise ProgramError(
             f"the dialect cannot be told from the program (dialect: {AUTO})",
@@ -236,6 +247,37 @@ def detect_dialect(head: bytes, name: str, lathe: bool = False) -> tuple[Dialect
         "state it: --dialect, or the machine file's dialect",
         Place(name),
     )
+
+
+def _doubt_names(chosen: dict[str, str], code: bytes) -> None:
+    """Set what a program is made of beside a name in a comment, which may name the part.
+
+    (LID FOR MACH3 BOX) in a program with % and O1234, or with the T0101 of a lathe.
+    """
+    if len(chosen) != 1:
+        return
+    ((dialect, why),) = chosen.items()
+    if dialect not in _ON_A_PC or not why.startswith("a comment names"):
+        return
+    if _NUMBERED_TAPE.match(code):
+        chosen["iso-mill"] = "a % and a program number"
+    elif _TOOL_OF_LATHE.search(code):
+        chosen["fanuc-lathe-a"] = "a tool with its offset, T0101"
+
+
+def _that_control_reads(control: str, dialect: Dialect, why: str, name: str) -> tuple[Dialect, str]:
+    """Refuse to read a program as one for a PC that a machining centre's control will run.
+
+    X100 is 100 mm for the one, and may be 0.1 mm for the other.
+    """
+    if control and control not in _ON_A_PC and dialect.name in _ON_A_PC:
+        raise ProgramError(
+            f"the program could be of {dialect.name} ({why}), but the machine's control reads "
+            f"{control}",
+            f"state which it is: --dialect {control}, or --dialect {dialect.name}",
+            Place(name),
+        )
+    return dialect, why
 
 
 def _beginning(line: bytes) -> bytes:
