@@ -82,6 +82,8 @@ class Sheets:
     """Regular expression of what in a program sets the same, or keeps what is set for good."""
     program_inches: bool = False
     """Its numbers may be inches where a program counts in inches."""
+    program_commands: bool = False
+    """It runs all commands of a line, one behind the other, where its kin take the first."""
     acts_on: str = ""
     """Which moves of a program the settings change."""
     name: str

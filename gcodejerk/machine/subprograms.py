@@ -7,6 +7,7 @@ same bytes. Which file a call means, the readers say, each by itself.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -77,7 +78,7 @@ def load_subprograms(folder: str, within: Path | None = None) -> Subprograms:
                 )
             files[name] = data = path.read_bytes()
             size += len(data)
-            together.update(b"%d %d " % (len(name), len(data)) + name.encode() + data)
+            together.update(b"%d %d " % (len(name), len(data)) + os.fsencode(name) + data)
             if len(files) > MOST_FILES or size > MOST_TOGETHER:
                 raise MachineError(
                     f"folder {folder!r} of subprograms holds more than {MOST_FILES} files or "

@@ -19,7 +19,7 @@ from gcodejerk.errors import EmitError, Place
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program
 from gcodejerk.nc.program import split_lines
-from gcodejerk.nc.text.block import Block
+from gcodejerk.nc.text.block import Block, Word
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK, read_chunks
 from gcodejerk.nc.text.tokenizer import parse_line
 
@@ -196,11 +196,16 @@ class _Scan:
 
     def _firmware(self, block: Block, number: int) -> bool:
         """The same where the first G or M of a line is its command, or a name is."""
-        command = next((word for word in block.words if word.letter in "GM"), None)
-        if command is None:
+        commands = [word for word in block.words if word.letter in "GM"]
+        if not commands:
             if block.problem is not None:
                 self._refuse(number, "the line is not understood: it may jump, call or stop")
             return self._macro(block.names[0].name, number) if block.names else False
+        several = self.emitter.program_commands
+        return any([self._command(one, number) for one in commands[: None if several else 1]])
+
+    def _command(self, command: Word, number: int) -> bool:
+        """Whether a command of a firmware stops the program."""
         if command.value is None:
             self._refuse(number, "a code is computed")
             return False

@@ -102,7 +102,9 @@ class _Walk:
     def run(self) -> tuple[int, int]:
         """Walk to the end of both."""
         if self._top():
-            for line, needed in _needs(self.original, self.dialect, self.begun):
+            for line, needed in _needs(
+                self.original, self.dialect, self.begun, self.control.several
+            ):
                 if not self._stands(needed) or (line and not self._keep(line)):
                     return self.kept, self.places
             if not self.processed.ended:
@@ -272,10 +274,17 @@ SETS, BACK = "s", "b"
 _M = re.compile(rb"M0*([0-9]+)(?:\.0*)?(?![0-9.])")
 _FIRST = re.compile(rb"(?:N\s*[0-9]+\s*)?([GM])\s*0*([0-9]+)(?![0-9.])")
 _WAITS = (0, 1, 25, 226, 600, 601)
+_SAYS = (117, 118)
+"""M codes that show the rest of their line."""
 
 
-def _needs(original: Window, dialect: Dialect, begun: bool) -> Iterator[tuple[bytes, str]]:
-    """The lines of the original, and what has to stand in front of each; at last an empty one."""
+def _needs(
+    original: Window, dialect: Dialect, begun: bool, several: bool
+) -> Iterator[tuple[bytes, str]]:
+    """The lines of the original, and what has to stand in front of each; at last an empty one.
+
+    `several`: all commands of a line run.
+    """
     pending, ended = "", False
     while not original.ended:
         line = original.peek_line()
@@ -285,7 +294,7 @@ def _needs(original: Window, dialect: Dialect, begun: bool) -> Iterator[tuple[by
         if not ended and closing and begun:
             needed, ended = needed + BACK, True
         elif not ended and not closing:
-            stop, end = _stops(code, dialect)
+            stop, end = _stops(code, dialect, several)
             if stop or end:
                 needed += BACK
                 ended = end and not code.startswith(b"/")
@@ -313,10 +322,13 @@ def _code(line: bytes, dialect: Dialect) -> bytes:
     return bytes(byte for byte in line if byte not in b" \t\r\n\v\f\x11\x13")
 
 
-def _stops(code: bytes, dialect: Dialect) -> tuple[bool, bool]:
+def _stops(code: bytes, dialect: Dialect, several: bool) -> tuple[bool, bool]:
     """Whether a line stops a program, and whether it ends it."""
-    if dialect.one_command:
+    if dialect.one_command or several:
         first = _FIRST.match(code)
+        if several and not (first and first[1] == b"M" and int(first[2]) in _SAYS):
+            numbers = re.findall(rb"M\s*0*([0-9]+)(?![0-9.])", code)
+            return not {int(number) for number in numbers}.isdisjoint(_WAITS), False
         if first is None:
             return re.match(rb"(?:N[0-9]+\s*)?PAUSE(?![A-Z0-9_])", code) is not None, False
         return first[1] == b"M" and int(first[2]) in _WAITS, False

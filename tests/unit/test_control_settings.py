@@ -86,6 +86,28 @@ def test_a_program_of_a_printer_ends_where_its_file_does(program, expected):
     assert stops_of(program, "klipper") == expected
 
 
+@pytest.mark.parametrize("name", ["rrf", "smoothieware"])
+@pytest.mark.parametrize("line", [b"M5 M0", b"G1 X5 M0", b"N7 M9 M1", b"G91 M226 G90"])
+def test_some_firmwares_run_every_command_of_a_line(name, line):
+    found = stops_of(b"G0 X1\n" + line + b"\nG0 X2\n", name)
+    assert found == [(0, SET), (1, BACK), (2, SET), (3, BACK)]
+    assert stops_of(b"G0 X1\nM117 M0\nG0 X2\n", name) == [(0, SET), (3, BACK)]
+    for other in (b'M9 M98 P"a.g"', b"G91 G20", b"M5 M500"):
+        with pytest.raises(EmitError, match=r":2: "):
+            stops_of(b"G0 X1\n" + other + b"\nG0 X2\n", name)
+
+
+@pytest.mark.parametrize("name", ["rrf", "smoothieware"])
+def test_a_stop_behind_another_command_is_proven(name):
+    program = golden(name)[0] + b"M5 M0\nG0 X7\n"
+    made = process(program, MACHINES[name], form="parameters")
+    assert made.verification.ok
+    lines = made.output.splitlines(keepends=True)
+    stop = lines.index(b"M5 M0\n")
+    for moved in (lines[: stop - 1] + lines[stop:], lines[: stop + 1] + lines[stop + 2 :]):
+        assert not verify(program, b"".join(moved), MACHINES[name]).ok
+
+
 @pytest.mark.parametrize(
     "line",
     [

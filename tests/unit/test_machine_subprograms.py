@@ -1,5 +1,7 @@
 """The folder of subprograms: what is read, what is refused, and what its sum tells."""
 
+import os
+
 import pytest
 
 from gcodejerk.errors import MachineError
@@ -51,3 +53,10 @@ def test_what_is_no_folder_is_refused(folder):
     for name in ("O1000.nc", "missing"):
         with pytest.raises(MachineError, match="which is no folder"):
             load_subprograms(name, folder)
+
+
+def test_names_may_be_of_old_controls(folder):
+    # Memory dumps have them in Latin-1; the sum of the folder ended with a traceback.
+    name = b"\xdcBUNG.nc"
+    (folder / os.fsdecode(name)).write_bytes(b"O2000\nM99\n")
+    assert load_subprograms(str(folder)).files[os.fsdecode(name)] == b"O2000\nM99\n"

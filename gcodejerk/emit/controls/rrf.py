@@ -32,6 +32,7 @@ class RrfController(SettingsOnly):
     program_damping = "M593 S"
     program_sets = r"M0*(?:20[14]|593|50[0-2])(?!\d)"
     program_inches = True
+    program_commands = True
     acts_on = "M204 T acts on travel (G0) alone, M593 on all moves of the program"
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:

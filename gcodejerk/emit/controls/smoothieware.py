@@ -22,6 +22,7 @@ class SmoothiewareController(SettingsOnly):
     program_way = "acceleration"
     program_sets = r"M0*(?:204|50[0-2])(?!\d)"
     program_inches = True
+    program_commands = True
     acts_on = "M204 acts on all moves of the program, cuts too"
 
     def schemes(self, machine: Machine) -> Mapping[str, Scheme]:

@@ -32,6 +32,8 @@ class Control:
     """Of a shaper."""
     shared: bool = False
     """The acceleration along the path is all that holds for the axes, but for Z."""
+    several: bool = False
+    """A line may hold several commands, all of which run."""
 
 
 def _text(match: re.Match[bytes], group: int) -> str:
@@ -94,9 +96,11 @@ CONTROLS = {
             (re.compile(rb'M593 P"none"'), lambda m: {("M593 P", PATH): "off"}),
             (re.compile(rb'M593 P"([a-z0-9]+)" F' + _N + rb" S" + _N), _shaper(_RRF, (0, 1, 2, 3))),
         ),
-        "M204 T", *_RRF,
+        "M204 T", *_RRF, several=True,
     ),
-    "smoothieware": Control(((re.compile(rb"M204((?: [XYZABCUVW][0-9]+)+)"), _each_axis),), "M204"),
+    "smoothieware": Control(
+        ((re.compile(rb"M204((?: [XYZABCUVW][0-9]+)+)"), _each_axis),), "M204", several=True
+    ),
     "twincat": Control(
         (
             (re.compile(rb"G231=([0-9]{1,4})"), _one("G231")),
