@@ -36,6 +36,12 @@ API = 1
 MOST_DECIMALS = 9
 
 
+ONE_FRAME = (
+    "positions are those of the program: where it changes its work system, tool length or G92 "
+    "between rapids, another offset lies between them and the drives from there on, which the file "
+    "does not say (docs/points.md)"
+)
+"""Of files of absolute positions."""
 CONFIRM = "confirm with your machine's manual before use"
 """Said of every fact that nobody could verify."""
 

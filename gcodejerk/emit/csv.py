@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import Controller, Options, decimal_step, step_sizes
+from gcodejerk.emit.base import ONE_FRAME, Controller, Options, decimal_step, step_sizes
 from gcodejerk.emit.number_format import Column, format_lines
 from gcodejerk.emit.points.table import PvtTableController
 from gcodejerk.machine import Machine
@@ -48,8 +48,8 @@ class CsvController(Controller):
         return NumberFormat(rapids.start, step, np.broadcast_to(0.0, rapids.start.shape))
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
-        """Nothing to say."""
-        return []
+        """What absolute positions count from."""
+        return [ONE_FRAME] if plans.planned.any() else []
 
     def header(self, machine: Machine) -> bytes:
         """Name the columns."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gcodejerk._version import __version__
 from gcodejerk.axes import AXES
-from gcodejerk.emit.base import CONFIRM, Controller, Options, WithoutStreams
+from gcodejerk.emit.base import CONFIRM, ONE_FRAME, Controller, Options, WithoutStreams
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Rapids
@@ -44,6 +44,8 @@ class PointsFile(Controller):
     """What the text rests on, each with its mark."""
     unsure = False
     """Some of them are U or R."""
+    relative = False
+    """Rows count from where the rapid begins."""
 
     def in_form(self, form: str) -> Controller:
         """The emitter for one of its forms; `stream`, which says nothing else, is the first."""
@@ -68,12 +70,16 @@ class PointsFile(Controller):
         return False
 
     def notes(self, rapids: Rapids, plans: Plans) -> list[str]:
-        """That nothing would move."""
-        if not self.inert(plans.machine) or not plans.planned.any():
+        """That nothing would move; and what absolute positions count from."""
+        if not plans.planned.any():
             return []
+        counted = [] if self.relative else [ONE_FRAME]
+        if not self.inert(plans.machine):
+            return counted
         return [
+            *counted,
             f"the rows for {self.name} are comments: they rest on facts that nobody could verify; "
-            "the head of the file says what to confirm (docs/points.md)"
+            "the head of the file says what to confirm (docs/points.md)",
         ]
 
     def about(self, machine: Machine) -> list[str]:

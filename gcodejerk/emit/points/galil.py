@@ -52,6 +52,7 @@ class GalilController(PointsController):
         "ranges of p, v and t: U; at most 255 segments an axis: M",
     )
     unsure = True
+    relative = True
 
     def require(self, machine: Machine) -> None:
         """Counts, and a letter for each axis."""
