@@ -19,7 +19,7 @@ import stat
 import sys
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -256,6 +256,31 @@ def same_file(one: str, other: str) -> bool:
         return os.path.samefile(one, other)
     except (OSError, ValueError):
         return os.path.abspath(one) == os.path.abspath(other)
+
+
+def refuse_clashes(outputs: Iterable[str | None], inputs: Iterable[str | None]) -> None:
+    """Refuse to write over what is read, or twice to one place.
+
+    Parameters
+    ----------
+    outputs, inputs : iterable of str
+        Names of the files of one command; None: nothing is asked for.
+
+    Raises
+    ------
+    EmitError
+        An output is one of the inputs, or another output, under whatever name.
+    """
+    written: list[str] = []
+    read = [name for name in inputs if name is not None]
+    for name in outputs:
+        if name is None:
+            continue
+        if any(same_file(name, other) for other in read):
+            raise EmitError(f"{name} is a file that this command reads", "choose another name")
+        if any(name == other or same_file(name, other) for other in written):
+            raise EmitError(f"{name} would hold two results", "choose another name for one")
+        written.append(name)
 
 
 _ROWS = re.compile(

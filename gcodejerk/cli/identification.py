@@ -71,6 +71,7 @@ def identify(
     ] = None,
 ) -> None:
     """Identify modes (frequency, damping, participation) from records of vibration."""
+    from gcodejerk.batch.files import refuse_clashes
     from gcodejerk.identification import (
         FrequencyResponse,
         RecordError,
@@ -85,6 +86,7 @@ def identify(
     if len(set(outputs)) < len(outputs):
         raise typer.BadParameter("--json, --plot and -o are files of their own")
     described, moves = _told(machine, program, name)
+    refuse_clashes(outputs, [*records, program, None if described is None else described.source])
     read = [
         found
         for one in records

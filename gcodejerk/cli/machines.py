@@ -136,10 +136,11 @@ def machine_test_program(
     ] = False,
 ) -> None:
     """Write a program of rapids and dwells, to record the machine's vibration with."""
-    from gcodejerk.batch.files import new_file
+    from gcodejerk.batch.files import new_file, refuse_clashes
     from gcodejerk.identification import excitation, rapids_program
 
     described = load_machine(machine)
+    refuse_clashes([output], [described.source])
     chosen = [name.upper() for name in axis or ()] or [
         one.name for one in described.axes if not one.rotary
     ]

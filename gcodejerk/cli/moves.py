@@ -57,7 +57,7 @@ def plan(
     ] = None,
 ) -> None:
     """Plan one move: its profile, peaks and residuals, the conventional ones beside it."""
-    from gcodejerk.batch.files import new_file
+    from gcodejerk.batch.files import new_file, refuse_clashes
     from gcodejerk.emit import load_controller
     from gcodejerk.planning.lines import Play
     from gcodejerk.planning.move import not_planned, plan_move
@@ -66,6 +66,7 @@ def plan(
     from gcodejerk.report.tables import move_limit, move_tables
 
     described = load_machine(machine)
+    refuse_clashes([csv, as_json, plot], [described.source])
     emitter = load_controller(described.controller)
     # LinuxCNC follows the profile between the points: judged at every interval, like a table.
     held = emitter.play is Play.HELD
@@ -143,7 +144,7 @@ def map_amplitudes(
     as_json: JsonOption = False,
 ) -> None:
     """Map what is left of vibration over T1 and T_SUM, for one move of one axis."""
-    from gcodejerk.batch.files import STANDARD, new_file
+    from gcodejerk.batch.files import STANDARD, new_file, refuse_clashes
 
     suffix = _suffix_of_map(output, condition, conditions=conditions)
     if as_json and output == STANDARD:
@@ -151,6 +152,7 @@ def map_amplitudes(
     if output is None and (points is not None or longest is not None):
         raise typer.BadParameter("--points and --longest are of a map that is written (-o FILE)")
     described = load_machine(machine)
+    refuse_clashes([output], [described.source])
     survey = _survey(described, axis, length, (condition or "III").upper(), mode, suffix == TABLE)
     if as_json:
         from gcodejerk.report.map_record import map_record
@@ -228,7 +230,7 @@ def compare(
     ] = None,
 ) -> None:
     """Compare every profile and shaper on one move: time, peaks, vibration, settling."""
-    from gcodejerk.batch.files import new_file
+    from gcodejerk.batch.files import new_file, refuse_clashes
     from gcodejerk.report.compare_record import compare_record
     from gcodejerk.report.compare_table import compare_notes, compare_table
     from gcodejerk.report.records import dump
@@ -241,6 +243,7 @@ def compare(
         raise typer.BadParameter("--json and --plot are two files")
     displacement = displacement_of(moves)
     described = load_machine(machine)
+    refuse_clashes([as_json, plot], [described.source])
     with progress(False) as show:
         found = compare_move(
             displacement,

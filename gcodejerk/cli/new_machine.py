@@ -69,10 +69,11 @@ def machine_new(
     ] = False,
 ) -> None:  # fmt: skip
     """Make a commented machine file from a control's own configuration, or from answers."""
-    from gcodejerk.batch.files import new_file
+    from gcodejerk.batch.files import new_file, refuse_clashes
     from gcodejerk.errors import MachineError
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
 
+    refuse_clashes([output], files or ())
     if output != "-" and os.path.lexists(output) and not force:
         raise MachineError(
             f"{output} is there already", "give another name, or --force to replace it"

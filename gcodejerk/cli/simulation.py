@@ -73,6 +73,7 @@ def simulate(
     ] = None,
 ) -> None:
     """Simulate drives and structure: each rapid as it moves today, and as planned."""
+    from gcodejerk.batch.files import refuse_clashes
     from gcodejerk.rewrite.pipeline import Settings
 
     moves = [one for one in what if MOVE.fullmatch(one)]
@@ -90,6 +91,7 @@ def simulate(
     if moves and (controller is not None or dialect is not None):
         raise typer.BadParameter("--controller and --dialect are of a program")
     described = load_machine(machine, [] if moves else what)
+    refuse_clashes(outputs, [described.source, *([] if moves else what)])
     files = _Files(as_json, csv, plot)
     if moves:
         _move(described, moves, profile, time, t1, files, written=as_written)

@@ -74,7 +74,7 @@ def parameters(
     dialect: Annotated[str | None, typer.Option(help="how the programs are read")] = None,
 ) -> None:  # fmt: skip
     """Tune the control's own time constants, jerk limits and shapers for a shop's rapids."""
-    from gcodejerk.batch.files import new_file
+    from gcodejerk.batch.files import new_file, refuse_clashes
     from gcodejerk.emit import load_controller
     from gcodejerk.emit.sheets import Sheets
     from gcodejerk.errors import EmitError
@@ -90,6 +90,7 @@ def parameters(
     own = _numbers(tried or [])
     written = _written(output, as_json, plot, no_curve=no_curve)
     described = load_machine(machine, files or ())
+    refuse_clashes(written, [described.source, *(files or ())])
     emitter = load_controller(controller or described.controller)
     if not isinstance(emitter, Sheets):
         raise EmitError(
