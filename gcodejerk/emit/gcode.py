@@ -166,7 +166,7 @@ class GcodeController(Controller):
 
 def _fastest(bound: str, rapids: Rapids, plans: Plans) -> str:
     """How fast the blocks become, about, in the unit of the fastest."""
-    most, inch = 0.0, False
+    most, inch, turns = 0.0, False, 0.0
     peak = plans.profiles.peak_velocity
     linear = [k for k, axis in enumerate(AXES) if axis not in "ABC"]
     for part in windows(len(plans.move)):
@@ -177,7 +177,11 @@ def _fastest(bound: str, rapids: Rapids, plans: Plans) -> str:
         at = int(np.argmax(speed))
         if speed[at] > most:
             most, inch = float(speed[at]), bool(rapids.inch[first + at])
+        turned = np.where(square == 0.0, np.linalg.norm(plans.share[part], axis=1), 0.0)
+        turns = max(turns, float((turned * peak[part]).max()))
     unit, name = (MM_PER_INCH, "in/min") if inch else (1.0, "mm/min")
+    if not most:
+        most, unit, name = turns, 1.0, "deg/min"
     return (
         f"blocks of the streams reach F{per_minute(most) / unit:.0f} ({name}): {bound} "
         "has to allow that for G1, or the control slows them down or stops; where it is lower, "

@@ -29,10 +29,11 @@ from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.motion.shapers import SHAPERS, shaped_profile
 from gcodejerk.planning.arrival import arrival_response, worst_in_bands
 from gcodejerk.planning.bounds import known_limits
+from gcodejerk.planning.conventional import least_time
 from gcodejerk.planning.designs import condition1, condition2
-from gcodejerk.planning.move import check_time, displacement_row
+from gcodejerk.planning.move import check_time, displacement_row, not_planned
 from gcodejerk.planning.optima import Progress
-from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.plan import MOST_INTERVALS, plan_moves
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.task import Task
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
@@ -218,6 +219,8 @@ def compare_move(
     row = np.where(np.abs(row) > STANDSTILL, row, 0.0)
     if not row.any():
         raise PlanError("no axis moves: nothing to compare", "for example Z=1")
+    if least_time(row, machine)[0] > MOST_INTERVALS * machine.interval:
+        raise not_planned(Reason.TOO_LONG)
     one = _Field(machine, row, time, shaper_damping, progress)
     if not one.task.objective.weights.any():
         moving = ", ".join(AXES[k] for k in np.flatnonzero(row[0]))

@@ -303,6 +303,12 @@ def test_an_axis_that_shakes_nothing_has_nothing_to_compare():
         compare_move({"X": 5.0}, still)
 
 
+@pytest.mark.parametrize("length", [1e7, -1e30])
+def test_a_move_that_is_too_long_is_not_compared(length):
+    with pytest.raises(PlanError, match="too long"):
+        compare_move({"Z": length}, Machine.load(find_machine("vmc")))
+
+
 TRAPEZOID = """\
 interval: 0.001
 positioning: linear

@@ -271,6 +271,22 @@ def test_a_lower_limit_keeps_streams_below_the_highest_cutting_feed(positioning)
     assert max(feeds) <= most * 1.01
 
 
+def test_rotary_streams_alone_are_in_degrees():
+    # "F0 (mm/min)", where the blocks had F12000.
+    axis = "rapid: {velocity: 200, acceleration: 2000, jerk: 5.0e+4}"
+    machine = Machine.loads(
+        "interval: 0.001\npositioning: linear\naxes:\n  X:\n    " + axis + "\n"
+        "    modes: [{frequency: 30, damping: 0.02, participation: 1}]\n  A:\n    " + axis + "\n"
+        "    wrap: none\n    modes: [{frequency: 25, damping: 0.02, participation: 0.5}]\n"
+    )
+    data = b"G21 G90 G94 G17 G40 G49 G80 G54 G64\nG0 A0.\nG0 A120.\nM30\n"
+    made = process(data, machine, controller="fanuc", dialect="fanuc")
+    assert made.planned == 1
+    feeds = [float(f) for f in re.findall(rb"G1 .*F([0-9.]+)", made.output)]
+    most = int(re.search(r"reach F(\d+) \(deg/min\)", " ".join(made.notes))[1])
+    assert max(feeds) == pytest.approx(most, rel=0.01)
+
+
 @pytest.mark.parametrize(("dialect", "mode"), [("fanuc", "G95"), ("fanuc-lathe-b", "G95")])
 def test_no_dwell_counts_turns_of_a_spindle_that_may_stand(dialect, mode):
     head = f"G21 G18 G90 G40 {mode} G64 F0.2\nM5\nG1 X1. F0.2\n".encode()
