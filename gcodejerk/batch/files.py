@@ -280,7 +280,8 @@ def refuse_clashes(outputs: Iterable[str | None], inputs: Iterable[str | None]) 
             raise EmitError(f"{name} is a file that this command reads", "choose another name")
         if any(name == other or same_file(name, other) for other in written):
             raise EmitError(f"{name} would hold two results", "choose another name for one")
-        written.append(name)
+        if not _is_special(name):
+            written.append(name)
 
 
 _ROWS = re.compile(

@@ -62,6 +62,12 @@ def test_what_is_read_is_not_written(command, files, name):
         assert (files / lost).read_bytes() == before
 
 
+def test_results_that_nobody_wants_may_go_to_one_place(command, files):
+    text = "plan -m m.yaml Z=1 --csv /dev/null --json /dev/null"
+    code, out = command(*text.split())
+    assert code == 0, out
+
+
 @pytest.mark.parametrize("text", TWICE)
 def test_one_file_does_not_hold_two_results(command, files, text):
     suffix = ".svg" if "--plot" in text else ".json"

@@ -266,8 +266,7 @@ class _Search:
     @property
     def _first_knots(self) -> Index:
         """Ends of the blocks of a first programme of cones, of the whole move."""
-        first = first_knots(self.move.count, self.ramp, self.move.guard > 0.0)
-        return first
+        return first_knots(self.move.count, self.ramp, self.move.guard > 0.0)
 
     @property
     def _few(self) -> bool:
