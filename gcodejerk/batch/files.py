@@ -258,7 +258,7 @@ def same_file(one: str, other: str) -> bool:
         return os.path.abspath(one) == os.path.abspath(other)
 
 
-def refuse_clashes(outputs: Iterable[str | None], inputs: Iterable[str | None]) -> None:
+def refuse_clashes(outputs: Iterable[str | None], inputs: Iterable[str | None] | None) -> None:
     """Refuse to write over what is read, or twice to one place.
 
     Parameters
@@ -272,7 +272,7 @@ def refuse_clashes(outputs: Iterable[str | None], inputs: Iterable[str | None]) 
         An output is one of the inputs, or another output, under whatever name.
     """
     written: list[str] = []
-    read = [name for name in inputs if name is not None]
+    read = [name for name in inputs or () if name is not None]
     for name in outputs:
         if name is None:
             continue

@@ -71,7 +71,6 @@ def identify(
     ] = None,
 ) -> None:
     """Identify modes (frequency, damping, participation) from records of vibration."""
-    from gcodejerk.batch.files import refuse_clashes
     from gcodejerk.identification import (
         FrequencyResponse,
         RecordError,
@@ -86,7 +85,7 @@ def identify(
     if len(set(outputs)) < len(outputs):
         raise typer.BadParameter("--json, --plot and -o are files of their own")
     described, moves = _told(machine, program, name)
-    refuse_clashes(outputs, [*records, program, None if described is None else described.source])
+    _keep_apart(outputs, [*records, program], described)
     read = [
         found
         for one in records
@@ -233,6 +232,13 @@ def _spectra(spectra: list[Spectrum], axis: str, band: tuple[float, float]) -> _
         lambda: peaks_record(found, axis),
         lambda file, suffix: plot_peaks(found, band, file, suffix),
     )
+
+
+def _keep_apart(outputs: list[str], read: list[str | None], machine: Machine | None) -> None:
+    """Refuse outputs that are records, the program that was recorded, or the machine file."""
+    from gcodejerk.batch.files import refuse_clashes
+
+    refuse_clashes(outputs, [*read, None if machine is None else machine.source])
 
 
 def _show(

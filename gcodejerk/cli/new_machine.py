@@ -73,7 +73,7 @@ def machine_new(
     from gcodejerk.errors import MachineError
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
 
-    refuse_clashes([output], files or ())
+    refuse_clashes([output], files)
     if output != "-" and os.path.lexists(output) and not force:
         raise MachineError(
             f"{output} is there already", "give another name, or --force to replace it"

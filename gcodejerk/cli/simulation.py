@@ -91,7 +91,7 @@ def simulate(
     if moves and (controller is not None or dialect is not None):
         raise typer.BadParameter("--controller and --dialect are of a program")
     described = load_machine(machine, [] if moves else what)
-    refuse_clashes(outputs, [described.source, *([] if moves else what)])
+    refuse_clashes(outputs, [described.source, *what])
     files = _Files(as_json, csv, plot)
     if moves:
         _move(described, moves, profile, time, t1, files, written=as_written)

@@ -89,8 +89,9 @@ def parameters(
         raise typer.BadParameter(f"--goal {goal}: choose {' or '.join(GOALS)}")
     own = _numbers(tried or [])
     written = _written(output, as_json, plot, no_curve=no_curve)
-    described = load_machine(machine, files or ())
-    refuse_clashes(written, [described.source, *(files or ())])
+    programs = files or []
+    described = load_machine(machine, programs)
+    refuse_clashes(written, [described.source, *programs])
     emitter = load_controller(controller or described.controller)
     if not isinstance(emitter, Sheets):
         raise EmitError(
@@ -98,7 +99,7 @@ def parameters(
             "`gcodejerk controllers` shows which have the form parameters",
         )
     with progress(False) as show:
-        moves, of = _moves(files or [], lengths, described, dialect)
+        moves, of = _moves(programs, lengths, described, dialect)
         scheme = emitter.scheme(described, settings)
         scheme.checked(own)
         found = tune(
