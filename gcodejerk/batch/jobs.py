@@ -21,6 +21,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from gcodejerk.batch.copies import is_copy, remember_copy
 from gcodejerk.batch.current import is_current
 from gcodejerk.batch.files import (
     STANDARD,
@@ -323,6 +324,12 @@ def _with_output(job: Job, done: Done, *, keeps: bool) -> Done:
         return done
     if keeps and not done.changed:
         return replace(done, summary=f"{done.summary}; the file is as it was")
+    if (
+        not (job.in_place or done.changed)
+        and os.path.isfile(job.output)
+        and not is_ours(job.output)
+    ):
+        remember_copy(job.output)
     to = job.called if job.in_place else job.output
     more = f" and {job.beside}" if job.beside else ""
     return replace(done, summary=f"{done.summary} -> {to}{more}", output=to)
@@ -372,13 +379,15 @@ def _refuse_foreign_beside(job: Job) -> None:
 def _refuse_foreign(job: Job, source: BinaryIO, target: BinaryIO) -> None:
     """An output or report that is there already, and that gcodejerk has not written.
 
-    What holds the very bytes of the program, or those that are about to be written, may be
-    replaced: nothing is lost.
+    What holds the very bytes of the program, those that are about to be written, or those of an
+    earlier run, may be replaced: nothing is lost.
     """
     for name, own in ((job.output, is_ours), (job.report, is_report)):
         if name is None or name == STANDARD or not os.path.isfile(name) or own(name):
             continue
-        if name == job.output and (same_content(name, source) or same_content(name, target)):
+        if name == job.output and (
+            same_content(name, source) or same_content(name, target) or is_copy(name)
+        ):
             continue
         raise EmitError(
             f"{name} exists and was not written by gcodejerk: it carries no stamp",

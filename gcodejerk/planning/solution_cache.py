@@ -28,8 +28,8 @@ AT_A_TIME = 500
 """Keys of one query: SQLite allows 999."""
 
 
-def cache_file() -> Path | None:
-    """The file, or None where the user wants none or none can be named."""
+def cache_folder() -> Path | None:
+    """The user's cache directory, or None where the user wants none or none can be named."""
     folder = os.environ.get(VARIABLE)
     if folder is None:
         try:
@@ -37,7 +37,13 @@ def cache_file() -> Path | None:
         except ImportError:
             return None
         folder = user_cache_dir("gcodejerk", appauthor=False)
-    return Path(folder) / f"solutions-{VERSION}.sqlite" if folder else None
+    return Path(folder) if folder else None
+
+
+def cache_file() -> Path | None:
+    """The file, or None where there is no such directory."""
+    folder = cache_folder()
+    return None if folder is None else folder / f"solutions-{VERSION}.sqlite"
 
 
 def read_solutions(keys: Sequence[bytes], file: Path | None) -> dict[bytes, bytes]:
