@@ -3,11 +3,12 @@
 This module owns the question "what if". It is answered by reading the program again with entries
 stated, so that the number holds whatever the reasons were: the values that are put in for them do
 not matter for what is certain, and go nowhere else. Of all entries together those are named without
-which it would be fewer.
+which it would be fewer. Of a long program the beginning is read, where what is missing shows.
 """
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -21,9 +22,11 @@ from gcodejerk.nc import CERTAIN, Dialect, Program, Start, read_program
 from gcodejerk.nc.dialects.gcodes import G40, G90
 
 LONGEST = 200_000
-"""Programs of more bytes are not read again. [B]"""
+"""Of programs of more bytes the beginning is read. [B]"""
 MOST_STEPS = 2_000
-"""Nor are those of which more blocks are run one by one: a loop of a few lines may take seconds."""
+"""So it is where more blocks are run one by one; with loops, which may take seconds, nothing is."""
+BEGINNING = 1_000
+"""Lines of a beginning."""
 _SYSTEM = re.compile(rb"(?<![A-Z_])G(5[4-9](?:\.[1-3])?)(?![\d.])", re.IGNORECASE)
 _TOOL_CHANGE = re.compile(rb"(?<![A-Z_])M0?6(?!\d)", re.IGNORECASE)
 _STOP = re.compile(rb"(?<![A-Z_])M0?[01](?!\d)", re.IGNORECASE)
@@ -48,15 +51,24 @@ def entry_notes(source: BinaryIO, program: Program, start: Start) -> list[str]:
     Returns
     -------
     list of str
-        One note, or none where no entry helps or reading again takes long (`LONGEST`,
-        `MOST_STEPS`).
+        One note, or none where no entry helps or reading again takes long (loops of more than
+        `MOST_STEPS` blocks).
     """
-    left = program.rapids.reason != CERTAIN
-    if program.size > LONGEST or program.steps > MOST_STEPS or not left.any():
+    of_what = ""
+    if program.size > LONGEST or program.steps > MOST_STEPS:
+        if program.steps > program.lines or not _left(program):
+            return []
+        source = _beginning(source)
+        try:
+            program = read_program(source, dialect=program.dialect, start=start)
+        except ProgramError:
+            return []
+        of_what = f" of the first {program.lines} lines"
+    if not _left(program):
         return []
     source.seek(0)
     text = source.read()
-    known = int(np.count_nonzero(~left))
+    known = len(program.rapids) - _left(program)
 
     def gain(entries: Mapping[str, Change]) -> int:
         stated = start
@@ -67,7 +79,7 @@ def entry_notes(source: BinaryIO, program: Program, start: Start) -> list[str]:
             again = read_program(source, dialect=program.dialect, start=stated)
         except ProgramError:
             return 0
-        return int(np.count_nonzero(again.rapids.reason == CERTAIN)) - known
+        return len(again.rapids) - _left(again) - known
 
     entries = dict(_entries(text, program, start))
     most = gain(entries) if entries else 0
@@ -77,13 +89,25 @@ def entry_notes(source: BinaryIO, program: Program, start: Start) -> list[str]:
         fewer = {name: change for name, change in entries.items() if name != entry}
         if fewer and gain(fewer) >= most:
             entries = fewer
-    more = "1 more rapid" if most == 1 else f"{most} more rapids"
+    more = ("1 more rapid" if most == 1 else f"{most} more rapids") + of_what
     note = f"stated in the machine file, {', '.join(entries)} would make {more} certain"
     if len(entries) == 1:
         return [note]
     alone = {entry: gain({entry: change}) for entry, change in entries.items()}
     best = max(alone, key=lambda entry: alone[entry])
     return [f"{note} ({best} alone: {alone[best]})" if alone[best] > 0 else note]
+
+
+def _left(program: Program) -> int:
+    """Rapids that are not certain."""
+    return int(np.count_nonzero(program.rapids.reason != CERTAIN))
+
+
+def _beginning(source: BinaryIO) -> BinaryIO:
+    """The first lines of a program, whole ones."""
+    source.seek(0)
+    lines = source.read(LONGEST).split(b"\n", BEGINNING)
+    return io.BytesIO(b"\n".join([*lines[:-1], b""]))
 
 
 def _entries(text: bytes, program: Program, start: Start) -> Iterator[tuple[str, Change]]:

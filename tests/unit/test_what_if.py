@@ -6,7 +6,7 @@ import pytest
 
 from gcodejerk import Machine, process
 from gcodejerk.nc import Start, read_program
-from gcodejerk.rewrite.what_if import LONGEST, MOST_STEPS, entry_notes
+from gcodejerk.rewrite.what_if import BEGINNING, LONGEST, MOST_STEPS, entry_notes
 
 MACHINE = """
 interval: 0.001
@@ -84,14 +84,33 @@ def test_nothing_is_said_where_nothing_helps():
     assert note(text, "linuxcnc", "program: {start: {X: 0, Y: 0, Z: 0}}")[0] == ""
 
 
-def test_long_programs_are_not_read_again():
-    text = b"G90 G21\nG0 X1 Y1\n" * (LONGEST // 10)
-    source = io.BytesIO(text)
-    program = read_program(source, dialect="linuxcnc")
-    assert entry_notes(source, program, Start()) == []
+LINES = b"G0 X1 Y1\nX2\nG1 Z-1 F100\n"
 
 
-def test_programs_of_many_steps_are_not_read_again():
+@pytest.mark.parametrize(
+    ("first", "lines"),
+    [
+        # Much is written, or much is run line by line: what M6 does to modes nobody knows.
+        (b"G21\n", LINES * (LONGEST // len(LINES) + 1)),
+        (b"T1 M6\nG21\n", LINES * MOST_STEPS),
+    ],
+)
+def test_of_long_programs_the_beginning_is_read(first, lines):
+    def notes(text):
+        program = read_program(io.BytesIO(text), dialect="fanuc")
+        return program, entry_notes(io.BytesIO(text), program, Start())
+
+    text = first + lines
+    program, (said,) = notes(text)
+    assert program.size > LONGEST or program.steps > MOST_STEPS
+    beginning = b"\n".join(text.split(b"\n")[:BEGINNING]) + b"\n"
+    short, (alone,) = notes(beginning)
+    assert max(short.size / LONGEST, short.steps / MOST_STEPS) <= 1
+    assert said == alone.replace("more rapids", "more rapids of the first 1000 lines", 1)
+    assert 600 < int(said.split("would make ")[1].split()[0]) < 700
+
+
+def test_programs_with_long_loops_are_not_read_again():
     text = b"#1=0\no1 while [#1 LT 3000]\n#1=[#1+1]\no1 endwhile\nG90 G21\nG0 X1 Y1\nX2\nM2\n"
     source = io.BytesIO(text)
     program = read_program(source, dialect="linuxcnc")
