@@ -24,7 +24,7 @@ from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.interpreter.runner import Finding, Runner
 from gcodejerk.nc.interpreter.runs import can_run, run_plain
 from gcodejerk.nc.interpreter.unfed import can_run_unfed, run_unfed
-from gcodejerk.nc.text.block import Line
+from gcodejerk.nc.text.block import Block, Line
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK
 from gcodejerk.nc.text.tokenizer import parse_line
 from gcodejerk.nc.text.words import Lines
@@ -34,6 +34,9 @@ from gcodejerk.start import Start
 _FILE_NAME = re.compile(
     rb"[ \t]*(?:\$[\w-]*|[A-Za-z_][\w-]*)\.[A-Za-z]{1,5}%?[ \t]*(?:\([^()]*\)[ \t]*)?"
 )
+
+REMEMBERED, SHORT = 1 << 12, 80
+"""Lines that are remembered in parts, and how long they are at most. [bytes]"""
 
 
 class Reader:
@@ -54,6 +57,7 @@ class Reader:
         self.started = False
         """A line that is not blank has been read."""
         self._structure = Collector()
+        self._parsed: dict[bytes, Block] = {}
         self._targets: frozenset[int] | None = None
         self._plain = True
 
@@ -118,8 +122,8 @@ class Reader:
         if text.endswith(b"\r"):
             text = text[:-1]
             terminator = 2 if terminator else 3
-        line = Line(text, begin, number, terminator, parse_line(text, self.dialect))
-        block = line.block
+        block = self._parsed.get(text) or self._parse(text)
+        line = Line(text, begin, number, terminator, block)
         if self._structure:
             self._collect(line)
         elif block.percent:
@@ -133,6 +137,15 @@ class Reader:
                 # ;$PATH= belongs to the head of a Siemens program
                 self.insert_at = line.end
             self.started = self.started or bool(block.comments)
+
+    def _parse(self, text: bytes) -> Block:
+        """Take a line apart, and remember it: in programs by variables many are the same."""
+        block = parse_line(text, self.dialect)
+        if len(text) <= SHORT:
+            if len(self._parsed) >= REMEMBERED:
+                self._parsed.clear()
+            self._parsed[text] = block
+        return block
 
     def _read_block(self, line: Line) -> None:
         """Take a line that says something."""

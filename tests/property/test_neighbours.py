@@ -54,3 +54,15 @@ def test_they_agree_where_chunks_meet(monkeypatch):
         found = around(monkeypatch, data, 0)
         assert np.array_equal(found[0], every[0])
         assert np.array_equal(found[1], every[1])
+
+
+@pytest.mark.parametrize(
+    ("computed", "queued"),
+    # X11 takes 0.6 s at F100 and 10 ms at F6000; what the other one takes nobody knows.
+    [("G1 X[#1]", True), ("G1 X[#1] F100", False), ("G1 G91 X[#1]", False), ("X[#1]F[#2]", False)],
+)
+def test_a_computed_motion_may_hide_how_fast_the_one_before_is(monkeypatch, computed, queued):
+    feed = "F100" if queued else "F6000"
+    lines = ["G21 G90 G94 G64", "#1=11.01", "#2=100", "G0 X10 Y0", "M3 S100", f"G1 X11 {feed}"]
+    data = "\n".join([*lines, computed, "G90 G0 Y50", "M2", ""]).encode()
+    assert around(monkeypatch, data, 1 << 60)[1][-1] == queued

@@ -164,12 +164,13 @@ def _long_motion(lines: list[bytes], incremental: bool, unit: float, feed: float
     that changes what lengths mean, ends the search.
     """
     for at in range(len(lines) - 1, -1, -1):
-        kind = _kind(lines[at])
-        if kind is None and not _words(lines[at]).keys() & {"G", "F"}:
-            continue
-        words = _words(lines[at])
+        kind, words = _kind(lines[at]), _words(lines[at])
         if kind is False or not _MEANING.isdisjoint(words.get("G", ())):
             return False
+        if kind and not words and _hides_modes(lines[at]):
+            return False
+        if not words or (kind is None and not words.keys() & {"G", "F"}):
+            continue  # computed, or neither a motion nor a mode
         fast = bool({0, 53} & set(words.get("G", ())))
         least = LONG_RAPID if fast or not feed > 0.0 else min(LONG_RAPID, feed * LONG_TIME / 60.0)
         for axis in "XYZ":
@@ -187,12 +188,27 @@ def _long_motion(lines: list[bytes], incremental: bool, unit: float, feed: float
 def _value_before(lines: list[bytes], axis: str) -> float:
     """The last position of an axis that these lines state; NaN where none does for certain."""
     for line in reversed(lines):
-        words = _words(line)
-        if (not words and _plain(line)) or not _MEANING.isdisjoint(words.get("G", ())):
+        if _ends_search(line):
             return float("nan")
+        words = _words(line)
         if axis in words:
             return words[axis][0]
     return float("nan")
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _hides_modes(line: bytes) -> bool:
+    """Whether a motion by an expression may state F, or a code beside its motion's."""
+    text = _plain(line)
+    motion = _COMPUTED.match(text)
+    return motion is None or not {*b"FG"}.isdisjoint(text[motion.end() :])
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _ends_search(line: bytes) -> bool:
+    """Whether a line is not understood, or changes what lengths mean."""
+    words = _words(line)
+    return (not words and _plain(line) != b"") or not _MEANING.isdisjoint(words.get("G", ()))
 
 
 @lru_cache(maxsize=REMEMBERED)
