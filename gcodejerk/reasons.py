@@ -30,6 +30,7 @@ class Reason(enum.StrEnum):
     COMPRESSED = "a compressor joins the blocks of a stream"
     FEED_GROUP = "F is the speed of some axes only"
     FEED_SCALED = "adaptive or programmed override of the feed"
+    LINES_READ = "the program reads the numbers of its lines"
     OVERRIDES_OFF = "overrides or feed hold switched off by the program"
     LIMIT_SET = "limit of speed, acceleration or jerk set by the program"
     NO_MOTION = "no axis moves"
@@ -90,6 +91,11 @@ EXPLAINED: dict[Reason, Explanation] = {
         "or such a block stands in front of it, and since then nobody has said G40",
         "the notes name the line: correct it, say how the program is written (`--dialect`), "
         "declare a harmless code (`program.harmless`), or state G40 and the other modes behind it",
+    ),
+    Reason.LINES_READ: Explanation(
+        "LinuxCNC: `#<_line>` stands in the program, and lines that are put in front of it change "
+        "what it says",
+        "take it out of the program",
     ),
     Reason.EXPRESSION: Explanation(
         "an axis word is a variable or an expression; where it ends is known if every variable is",
@@ -192,8 +198,10 @@ EXPLAINED: dict[Reason, Explanation] = {
         "state the control's own unit in `program.startup` (G71 or G70), or use G710 and G700",
     ),
     Reason.PATH_UNKNOWN: Explanation(
-        "Siemens: exact stop (G60) is usual, and would stop a stream at every point",
-        "state G64 in the program or in `program.startup`",
+        "exact stop would stop a stream at every point: usual on Siemens (G60), and what is not "
+        "followed (a call, a jump, a block that may be skipped) may have left it on other controls "
+        "(G61)",
+        "state G64 in the program, behind what is not followed, or in `program.startup`",
     ),
     Reason.START_UNKNOWN: Explanation(
         "no absolute word has yet said where an axis stands, or something may have moved it: tool "

@@ -1,5 +1,7 @@
 """Which streams a control could not read, or would read otherwise: too long, too many digits.
 
+And programs that read how many lines stand in front of one, which streams change.
+
 The last point of a stream repeats the words of its rapid's block, and the block's other words stand
 in a line of their own; so it is the block that decides, and a rapid whose lines would not fit is
 left alone before anything is planned.
@@ -9,6 +11,7 @@ Rule: lengths are those of the longest spelling that could be needed, so nothing
 
 from __future__ import annotations
 
+import re
 from typing import BinaryIO
 
 import numpy as np
@@ -18,10 +21,14 @@ from gcodejerk.axes import AXES
 from gcodejerk.emit.base import axis_steps
 from gcodejerk.machine import Machine
 from gcodejerk.nc import Dialect, Program, Rapids, parse_block
+from gcodejerk.nc.text.chunks import read_chunks
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.storage import windows
 from gcodejerk.units import MM_PER_INCH
 
+_OF_CONTROL = re.compile(rb"#[ \t]*<[ \t]*_[^<>\n]*>")
+"""Variables whose names begin as those of the control do."""
+_COMMENT = re.compile(rb"\([^()\n]*(?:\)|$)|;[^\n]*")
 AROUND = len(b"G1 G61.1  F") + 15
 """Of the last point, besides the block's own words."""
 REWRITTEN = 18
@@ -73,7 +80,25 @@ def reasons_to_leave(
         block = source.read(int(size[i]))
         if max(_lengths(block, dialect)) > limit:
             reason[i] = REASONS.index(Reason.LINE_LIMIT)
+    if reads_own_lines(source, dialect):
+        reason[reason == CERTAIN] = REASONS.index(Reason.LINES_READ)
     return reason
+
+
+def reads_own_lines(source: BinaryIO, dialect: Dialect) -> bool:
+    """Whether a program reads the number of a line, which every line in front of it changes."""
+    name = dialect.arithmetic.own_line.upper().encode()
+    if not name:
+        return False
+    source.seek(0)
+    for chunk in read_chunks(source, ""):
+        for found in _OF_CONTROL.finditer(chunk.data):
+            if found[0].translate(None, b" \t").upper() != name:
+                continue
+            line = chunk.data.rfind(b"\n", 0, found.start()) + 1
+            if _COMMENT.sub(b"", chunk.data[line : found.end()]).endswith(found[0]):
+                return True
+    return False
 
 
 def _lengths(block: bytes, dialect: Dialect) -> tuple[int, int]:

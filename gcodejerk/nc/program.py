@@ -21,6 +21,7 @@ from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.again import begins_again
 from gcodejerk.nc.flow.elsewhere import Elsewhere, find_elsewhere
+from gcodejerk.nc.flow.left_on import left_on
 from gcodejerk.nc.flow.outline import find_outline, may_go_back, read_body, refers, seekable
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.following_reader import MOST_BYTES, FollowingReader, worth_following
@@ -197,10 +198,10 @@ def open_reader(
         reader = FollowingReader(name, chosen, start, None, Elsewhere())
     elif not refers(chosen):
         reader = Reader(name, chosen, start)
-        if chosen.text.o_word == "flow" and (start.positions or start.startup):
+        if chosen.text.o_word == "flow":
             file = seekable(file)
             if begins_again(file, name, chosen):
-                reader.forget_start(None)
+                reader.forget_start(None, left_on(file, chosen, name))
     else:
         file = source = seekable(file)
         origin = source.tell()

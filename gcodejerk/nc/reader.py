@@ -15,6 +15,7 @@ import numpy as np
 from gcodejerk.nc.dialects.dialect import Dialect, code_name
 from gcodejerk.nc.flow.branches import Flow
 from gcodejerk.nc.flow.jumps import is_target
+from gcodejerk.nc.flow.left_on import LeftOn
 from gcodejerk.nc.flow.o_words import Passes
 from gcodejerk.nc.flow.structures import Collector, Node
 from gcodejerk.nc.flow.subprograms import Calls
@@ -100,9 +101,9 @@ class Reader:
         self.runner.executor.jumps_known = True
         self.runner.call = calls.call
         if outline.repeats:
-            self.forget_start(outline.groups)
+            self.forget_start(outline.groups, outline.left_on)
 
-    def forget_start(self, groups: frozenset[str] | None) -> None:
+    def forget_start(self, groups: frozenset[str] | None, left: LeftOn) -> None:
         """Forget what the last line may leave to the first one, where the program repeats."""
         state = self.state
         kept = {name: getattr(state, name) for name in MODES}
@@ -113,6 +114,8 @@ class Reader:
             for name, value in kept.items():
                 if name not in stated:
                     state.put(name, value)
+        state.put("transforms", {**state.transforms, **dict.fromkeys(left.transforms)})
+        state.put("bars", {**state.bars, **dict.fromkeys(left.bars)})
 
     def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
         """Take one line the careful way; text without its LF."""

@@ -19,6 +19,8 @@ from gcodejerk.verification.second_reading.agreement import confirm
 from gcodejerk.verification.second_reading.known import KINDS, Facts, Known
 
 WRITTEN, NO_DISTANCE = Reason.SYSTEM_WRITTEN, Reason.DISTANCE_MODE_UNKNOWN
+START, PATH = Reason.START_UNKNOWN, Reason.PATH_UNKNOWN
+CALLED = Reason.NOT_FOLLOWED
 HEADS = {
     "siemens": b"G71 G90 G94 G17 G40 G64 F100\nG0 X0 Y0 Z50\n",
     "marlin": b"G21\nG90\nG0 X0 Y0 Z50 F6000\n",
@@ -277,6 +279,40 @@ NOT_CERTAIN = {
         "marlin", b"M28 A\nG21\nG90\nG0 X5 Y5 Z5\nM29\nG0 X9 F6000\n", NO_DISTANCE
     ),
     "a macro of Klipper": ("klipper", b"M600\nG0 X5 Y5 Z5\nG0 X9 F6000\n", NO_DISTANCE),
+    "polar moves, which name no axis": (
+        "heidenhain-iso", b"N3 I+50 J+50*\nN4 G11 R+30 H+30 F500*\nN5 G00 X+10*\n", START
+    ),
+    "a polar rapid": ("heidenhain-iso", b"N3 G10 R+30 H+30*\nN5 G00 X+10*\n", START),
+    "a polar arc": ("heidenhain-iso", b"N3 G12 H+30 F9*\nN5 G00 X+10*\n", START),
+    "a polar move without its code": (
+        "heidenhain-iso", b"N3 G11 R+30 H+30 F9*\nN4 G11 X1 Y1*\nN5 H+60*\nN6 G00 X+10*\n", START
+    ),
+    "by a parameter": ("heidenhain-iso", b"N3 Q1 = 5*\nN4 G11 R+Q1 F9*\nN5 G00 X+10*\n", START),
+    "what a modal macro leaves": (
+        "fanuc", b"G66 P9001 A1.\nG0 X5.\nG67\nG0 X6. Y6. Z6.\nX7.\n", CALLED
+    ),
+    "that of a Haas": ("haas", b"G66 P9001 A1.\nG67\nG90 G21 G17 G40 G94 G0 X6.\nX7.\n", PATH),
+    "modes behind it are stated too early": (
+        "fanuc", b"G66 P9001\nG90 G21\nG0 X5.\nG67\nG0 X6. Y6.\nX7.\n", CALLED
+    ),
+    "a pallet that may be there": ("haas", b"M46 Q1 P100\nG0 X50.\nN100 G0 X9.\n", CALLED),
+    "and where it then leads": (
+        "haas", b"M46 Q1 P9\nG21 G90 G94 G17 G40 G64 F1.\nG0 X5. Y5. Z5.\nN9 G0 X9.\n", CALLED
+    ),
+    "so on either control": ("iso-mill", b"M46 Q1 P100\nG0 X50.\nN100 G0 X9.\n", CALLED),
+    "G92 that G54 may end": ("haas", b"G92 X0. Y0.\nG0 X-20.\nG54\nG0 X9.\n", START),
+    "or in one block": ("haas", b"G92 X0. Y0.\nG0 X-20.\nG54 G0 X9.\n", Reason.FRAME_CHANGE),
+    "so in what both read alike": ("iso-mill", b"G92 X0. Y0.\nG0 X-20.\nG54\nG0 X9.\n", START),
+    "G52 that may be a system": ("haas", b"G52 X5.\nG54\nG0 X9.\n", START),
+    "E of a Fadal": ("iso-mill", b"E2\nG0 X9.\n", START),
+    "what a FluidNC runs": ("grbl", b"$SD/Run=a.nc\nG0 X5 Y5\nX9\n", NO_DISTANCE),
+    "the check mode": ("grbl", b"$C\nG0 X5 Y5\nX9\n", NO_DISTANCE),
+    "jogging": ("grbl", b"$J=G91 X5 F9\nG0 X9\n", NO_DISTANCE),
+    "G61 that may be skipped": ("linuxcnc", b"/G61.1\nG0 X9\n", PATH),
+    "G61 in a branch": ("linuxcnc", b"o1 if [#5399 EQ 1]\nG61\no1 endif\nG0 X9\n", PATH),
+    "G61 of a call": (
+        "linuxcnc", b"o<elsewhere> call\nG21 G90 G94 G17 G40 G49 F9\nG0 X5 Y5 Z5\nX9\n", PATH
+    ),
 }  # fmt: skip
 
 
@@ -288,6 +324,16 @@ def test_what_only_looks_certain_is_left_alone(name):
 
 
 STILL_CERTAIN = {
+    "a pole and a straight line": ("heidenhain-iso", b"N3 I+50 J+50*\nN4 G01 X5 F9*\nN5 G00 X9*\n"),
+    "modes behind a modal macro": (
+        "fanuc", b"G66 P9001\nG67\nG90 G21 G94 G17 G40 G80 G64 F9.\nG0 X5. Y5. Z5.\nX6.\n"
+    ),
+    "an absolute word behind G92 and G54": ("haas", b"G92 X0.\nG54\nG0 X5. Y5. Z5.\nG0 X9.\n"),
+    "a system that is selected again": ("haas", b"G54\nG0 X9.\n"),
+    "settings of grbl": ("grbl", b"$10=1\n$$\n$G\nG0 X5 Y5 Z5\nX6\n"),
+    "G64 behind a call": (
+        "linuxcnc", b"o<elsewhere> call\nG21 G90 G94 G17 G40 G49 G64 F9\nG0 X5 Y5 Z5\nX9\n"
+    ),
     "a common variable": ("fanuc", b"#500=5.\n#1=2.\nG0 X5.\n"),
     "a timer": ("fanuc", b"#3001=0\nG0 X5.\n"),
     "an offset is written, then selected": ("fanuc", b"#5221=3.\nG54\nG49\nG0 X5. Y5.\nX6.\n"),
@@ -470,6 +516,30 @@ def test_what_linuxcnc_takes_over_of_written_variables_is_not_known(name):
 def test_what_is_certain_is_still_rewritten(name):
     dialect, text = STILL_CERTAIN[name]
     assert read(text, dialect)[-1] is None
+
+
+AGAIN = {
+    "a macro at every position": ("fanuc", b"G66 P9001 A1.\nX8.\nM99\n"),
+    "a compressor of Fanuc": ("fanuc", b"G5.1 Q2\nM99\n"),
+    "polar coordinates": ("fanuc", b"G16\nM99\n"),
+    "overrides that are off": ("fanuc", b"#3004=3\nM99\n"),
+    "what M47 repeats": ("mach", b"G16\nM47\n"),
+    "a cycle behind MCALL": ("siemens", b"MCALL CYCLE81(10,0,2,-5,0)\nX8\nGOTOS\n"),
+    "a compressor of Siemens": ("siemens", b"COMPCAD\nGOTOS\n"),
+    "F of some axes": ("siemens", b"FGROUP(X)\nIF R1<5 GOTOS\nM30\n"),
+    "corners": ("siemens", b"RNDM=1\nGOTOS\n"),
+    "a limit": ("siemens", b"ACC[X]=20\nGOTOS\n"),
+    "adaptive feed": ("linuxcnc", b"M52 P1\nM99\n"),
+    "exact stops": ("linuxcnc", b"G61.1\nM99\n"),
+}
+
+
+@pytest.mark.parametrize("name", AGAIN)
+def test_what_the_last_pass_has_left_on_is_on_in_the_next_one(name):
+    dialect, last = AGAIN[name]
+    head = HEADS[dialect].replace(b" G64", b"") if b"G61" in last else HEADS[dialect]
+    assert read(b"G0 X9.\nX7.\n" + last, dialect, head)[0] is not None
+    assert read(b"G0 X9.\nX7.\nM30\n", dialect, head)[0] is None
 
 
 @pytest.mark.parametrize("dialect", ["fanuc", "grbl", "mach", "siemens", "haas"])

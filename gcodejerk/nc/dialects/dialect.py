@@ -178,6 +178,8 @@ class Arithmetic:
     feed: frozenset[str] = frozenset()
     """What reads the F in force: variables (``4109``, ``<_feed>``), any of the control's where
     they begin with ``$``, or a function (``FN 18``)."""
+    own_line: str = ""
+    """Variable that holds the number of the line it is read in."""
     q_parameters: bool = False
     """Variables are Heidenhain's: Q1, QL1, QR1."""
 
@@ -266,6 +268,8 @@ class Dialect:
     """Systems that a P may turn into another one: G54 P3 for G54.1 P3."""
     bare_set: Literal["nothing", "zero", "unknown"] = "unknown"
     """G92 without axis words: changes nothing; makes every position zero; nobody knows."""
+    shift_may_end: bool = False
+    """By a setting of the control, selecting a work system ends what G92 has shifted."""
     incremental_set: bool = False
     """G92 means the same in G91."""
     units_once: bool = False

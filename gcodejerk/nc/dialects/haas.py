@@ -4,8 +4,11 @@ Sources: Haas, "Help with the decimal points" (setting 162; ``X5`` is 0.0005 inc
 gcodes.net, G28 (without axes it moves all of them; it cancels the tool length); VF 96-8000 p. 182
 (positions between holes are rapids). Whether G0 goes straight is a setting: `positioning`. G100 to
 G103, G112, G113, G253 to G255, G268 and G269 are general knowledge that was not looked up; they are
-used to leave rapids alone. G141, compensation in space, is of the group of G40 (NGC mill operator's
-manual).
+used to leave rapids alone, as is M46 Q P, which jumps where a pallet is loaded. G141, compensation
+in space, is of the group of G40 (NGC mill operator's manual).
+
+Setting 33 (VF 96-8000 p. 146): under YASNAC a work system that is selected ends what G92 has
+shifted, and G52 is a work system itself; under FANUC and HAAS neither.
 
 M codes that move no axis, by the lists of M codes of the mill manuals 96-8000 and 96-8200: chip
 conveyor (M31, M33), coolant spigot (M34, M35), gear (M41, M42; p. 215), air blast and air gun (M73,
@@ -58,6 +61,7 @@ HAAS = replace(
         **dict.fromkeys(_EXTRA_SYSTEMS, "system"),
         1540: "numbered system",
         310: "home",
+        520: "frames",
         # Measuring: a tool's diameter or length, the work offset at an edge or a centre, written
         # where the control keeps them.
         **dict.fromkeys((350, 360, 370, 1360), "measure"),
@@ -76,7 +80,7 @@ HAAS = replace(
     },
     m_groups={
         **FANUC.m_groups,
-        **dict.fromkeys((96, 97), "stop"),
+        **dict.fromkeys((46, 96, 97), "stop"),
         **dict.fromkeys(_STANDING_M, "auxiliary"),
     },
     # G103 P1 lets the control look only one block ahead, so that no stream is blended.
@@ -86,6 +90,7 @@ HAAS = replace(
     packed_repeats=False,
     m_bars={},  # M21 to M28 are relays
     tool_word_moves=False,
+    shift_may_end=True,
     tool_cancelled_by_return="all",
     bare_return=True,
     harmless=FANUC.harmless | {1030, 1870},

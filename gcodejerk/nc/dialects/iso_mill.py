@@ -3,8 +3,9 @@
 Haas speaks Fanuc's language with codes of its own. This table holds what the two tables have in
 common, and is no control's own; where they differ, it has what is the more cautious: a code of one
 of them is not understood, but for Haas's mirrors and their kin, which would go unseen so; T may
-call a program of the builder's (Fanuc), G28 may cancel the tool length (Haas), ``M98 P31000`` is
-not followed unless there is an O31000.
+call a program of the builder's (Fanuc), E may select a work system (Fadal, whose programs look
+alike), G28 may cancel the tool length (Haas), ``M98 P31000`` is not followed unless there is an
+O31000.
 
 `tests/unit/test_nc_common.py` draws programs of both and holds this reading to each of theirs.
 """
@@ -31,7 +32,10 @@ ISO_MILL = replace(
     sources=tuple(dict.fromkeys((*FANUC.sources, *HAAS.sources))),
     groups={**_ALIKE, **_HAAS},
     # M96 and M97 go on elsewhere, whatever they are called
-    m_groups={m: group for m, group in FANUC.m_groups.items() if m in HAAS.m_groups},
+    m_groups={
+        **{m: group for m, group in FANUC.m_groups.items() if m in HAAS.m_groups},
+        46: HAAS.m_groups[46],
+    },
     effects={
         **{code: effect for code, effect in FANUC.effects.items() if code in _ALIKE},
         **{code: effect for code, effect in HAAS.effects.items() if code in _HAAS},
@@ -41,6 +45,8 @@ ISO_MILL = replace(
     drilling=replace(FANUC.drilling, repeats="", maybe_repeats="KL"),
     packed_repeats=False,
     tool_word_moves=True,
+    shift_may_end=True,
+    tool_frame=FANUC.tool_frame | {"E"},
     tool_cancelled_by_return="all",
     harmless=FANUC.harmless & HAAS.harmless,
 )

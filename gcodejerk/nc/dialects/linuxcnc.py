@@ -156,6 +156,7 @@ LINUXCNC = Dialect(
         offsets=5161,
         at_selection=True,
         feed=frozenset({"<_feed>"}),
+        own_line="#<_line>",
     ),
     harmless=frozenset(
         {0, 40, 70, 80, 170, 171, 180, 181, 190, 191, 200, 210, 400, 610, 611, 640}

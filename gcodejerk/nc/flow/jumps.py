@@ -27,7 +27,7 @@ def jumps_of(block: Block, dialect: Dialect) -> frozenset[int] | None:
     found: set[int] = set()
     jumps = False
     words = {word.letter: word.value for word in block.words}
-    returns = any(w.letter == "M" and w.value in (96, 99) for w in block.words)
+    returns = any(w.letter == "M" and w.value in (46, 96, 99) for w in block.words)
     if returns and "P" in words:
         jumps = True
         value = words["P"]

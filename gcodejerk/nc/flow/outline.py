@@ -15,7 +15,8 @@ from typing import BinaryIO
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.jumps import EVERYWHERE, jumps_of
-from gcodejerk.nc.text.block import Line
+from gcodejerk.nc.flow.left_on import NOTHING, LeftOn, left_on
+from gcodejerk.nc.text.block import Line, Name
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.nc.text.tokenizer import parse_line
 
@@ -25,8 +26,9 @@ MOST_BYTES = 1_000_000
 MOST_NUMBERS = 100_000
 """Numbered places that are kept."""
 _SPOOLED = 1 << 23
-_CANDIDATES = re.compile(rb"GOTO|M[ \t]*0*(?:9[6-9]|47|2|30)(?![0-9])|REPEAT|CASE")
-_REFERS = re.compile(rb"GOTO|REPEAT|CASE|M[ \t]*0*9[69]")
+_CANDIDATES = re.compile(rb"GOTO|M[ \t]*0*(?:9[6-9]|4[67]|2|30)(?![0-9])|REPEAT|CASE")
+_REFERS = re.compile(rb"GOTO|REPEAT|CASE|M[ \t]*0*(?:46|9[69])")
+_TO_START = re.compile(rb"(?<![A-Z0-9_])GOTOS(?![A-Z0-9_])")
 _FLOW = re.compile(
     rb"(?<![A-Z0-9_])(?:GOTO|IF|WHILE|REPEAT|RPT|LOOP|FOR|CASE|UNTIL|GOSUB|CALL)(?![A-Z_])", re.I
 )
@@ -60,11 +62,13 @@ class Outline:
     numbers: dict[int, Mark | None] = field(default_factory=dict)
     """N number -> its line, where subprograms are called by it."""
     repeats: bool = False
-    """The program goes back to its beginning (M99 in the main program, M47)."""
+    """The program goes back to its beginning (M99 in the main program, M47, GOTOS)."""
     calls: bool = False
     """Subprograms are called."""
     groups: frozenset[str] | None = None
     """Modal groups of the codes in a file that repeats and runs nothing else; None unknown."""
+    left_on: LeftOn = NOTHING
+    """What else a file that repeats may have left on."""
 
     @property
     def plain(self) -> bool:
@@ -139,6 +143,8 @@ def find_outline(file: BinaryIO, dialect: Dialect, name: str) -> Outline:
                     found.clear()  # too many to tell which stand twice
                     break
             file.seek(begin)
+    if outline.repeats:
+        outline.left_on = left_on(file, dialect, name)
     if outline.repeats and outline.plain and not dialect.text.names:
         outline.groups = _groups(file, dialect, name)
         file.seek(begin)
@@ -197,7 +203,13 @@ class _Scan:
         outline.calls |= bool(codes & {97.0, 98.0})
         self.by_number |= 97.0 in codes
         outline.repeats |= bool(codes & {99.0, 47.0}) and (main or outline.targets is not None)
+        outline.repeats |= any(_TO_START.search(_spelled(name)) for name in block.names)
         self._ended |= main and not block.block_delete and bool(codes & {2.0, 30.0})
+
+
+def _spelled(name: Name) -> bytes:
+    """A word with a name, and what belongs to it."""
+    return name.name.encode() + b" " + name.arguments.upper()
 
 
 def _mark(marks: dict[int, Mark | None], pattern: re.Pattern[bytes], chunk: Chunk) -> bool:

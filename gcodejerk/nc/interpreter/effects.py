@@ -49,7 +49,8 @@ _SHIFT_ALONE = re.compile(
 )
 """Frames of Siemens as data, and those that hold no rotation, scale or mirror for certain."""
 
-
+MODAL_MACRO = "modal macro"
+"""Name, among the transforms, of a cycle or macro that runs at every position."""
 CONTINUOUS = 64
 """Path mode in which blocks blend."""
 
@@ -124,7 +125,7 @@ class Effects:
         elif effect == "transform":
             self._transform("frame", on=True)
         elif effect == "modal cycle":
-            step.leaves = True
+            self._leave(step)
             self._modal_cycle(begins=True)  # G67, which ends it, is among the transforms
         elif effect == "cycle":
             step.feed_event = USES_FEED
@@ -302,6 +303,8 @@ class Effects:
     def _transform(self, name: str, on: bool) -> None:
         """Begin or end a rotation, scaling, mirroring or polar frame."""
         state = self.state
+        if name == MODAL_MACRO and state.transforms.get(name, False) is not False:
+            state.forget()  # it has run behind every move, and left its modes each time
         if on or state.transforms.get(name, False) is not False:
             state.forget_positions()
         if on or name in state.transforms:
@@ -337,7 +340,7 @@ class Effects:
         """Begin or end a cycle or macro that runs at every position."""
         state = self.state
         state.put("modal_cycle", None)
-        state.put("transforms", {**state.transforms, "modal macro": begins})
+        state.put("transforms", {**state.transforms, MODAL_MACRO: begins})
         state.forget_positions()
 
     def _feed_group(self, names: list[Name]) -> None:

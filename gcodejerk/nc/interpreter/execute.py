@@ -8,6 +8,8 @@ out, and whatever they touched is unknown afterwards.
 
 from __future__ import annotations
 
+import re
+
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import OVERRIDES_SET, Dialect
 from gcodejerk.nc.interpreter import frames
@@ -27,6 +29,7 @@ from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
 
 _CALL_WORDS = frozenset("MNPL")
+_SHOWS_OR_SETS = re.compile(rb"\$[ \t]*(?:[$#GINXH]|N?[0-9]*[ \t]*=.*)?[ \t]*", re.IGNORECASE)
 
 
 class Executor(Phases):
@@ -153,7 +156,7 @@ class Executor(Phases):
         unread = self.dialect.feed_on_rapids or b"F" in block.rest.upper()
         if block.problem is not None and unread:
             state.put("feed", NAN)  # what is not read may hold an F, which rapids run at
-        if block.problem is not None and any(byte in b"GMOgmo#[\r" for byte in block.rest):
+        if block.problem is not None and _may_do_anything(block.rest):
             state.forget(Reason.NOT_UNDERSTOOD)
         if block.problem is not None:
             step.limits |= set_by_setting(state, block.rest, self.dialect, self.limits)
@@ -185,6 +188,16 @@ class Executor(Phases):
         self.state.forget()
         self.state.put("motion", 10)
         self.state.ended = True
+
+
+def _may_do_anything(rest: bytes) -> bool:
+    """Whether text that is not understood may be a code, a variable, or a command of a control.
+
+    Of the latter (``$SD/Run=part.nc``, ``$C``), those that show or set something are known.
+    """
+    if rest[:1] == b"$":
+        return _SHOWS_OR_SETS.fullmatch(rest) is None
+    return any(byte in b"GMOgmo#[\r" for byte in rest)
 
 
 def _first_refused(codes: Codes, dialect: Dialect) -> str:

@@ -209,6 +209,9 @@ def set_names(state: State, codes: Codes, dialect: Dialect) -> None:
             after[axis] += state.position[axis] - named
             state.move(axis, named)
     state.put("g92", after)
+    if dialect.shift_may_end:
+        for name in ("system", "g5x", "g92"):
+            state.lose(name)  # the next system that is selected may leave the names as they are
     if state.rotates or state.transforms:
         state.forget_positions()
 

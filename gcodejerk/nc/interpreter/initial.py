@@ -11,7 +11,7 @@ from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.interpreter.execute import Executor
 from gcodejerk.nc.interpreter.frames import system_key
-from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, State
+from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, NAN, UNSTATED, State
 from gcodejerk.nc.text.block import Block
 from gcodejerk.nc.text.tokenizer import parse_line
 from gcodejerk.start import Start
@@ -39,7 +39,7 @@ def _set_defaults(state: State, dialect: Dialect) -> None:
     mode = dialect.defaults.get("feed mode")
     state.feed_mode = None if mode is None else dialect.feed_modes.get(mode, mode // 10)
     path = dialect.defaults.get("path")
-    state.path = None if path is None else dialect.paths[path]
+    state.path = UNSTATED if path is None else dialect.paths[path]
     state.fixed = _fixed(dialect)
     units = dialect.defaults.get("units")
     state.unit = None if units is None else MM_PER_INCH if dialect.units[units] else 1.0

@@ -17,7 +17,7 @@ from gcodejerk.nc.interpreter.moves import change_tool, lose_tool_length
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import forget_shared
 
-_CALLS = frozenset({47, 96, 97, 98, 198})
+_CALLS = frozenset({46, 47, 96, 97, 98, 198})
 """M codes that go on elsewhere, or may, besides those of the group "macro"."""
 
 

@@ -70,6 +70,8 @@ class Field:
     X is a radius for certain."""
 
 
+UNSTATED = 0
+"""Path mode of a program that has not said any."""
 _NAMED_LOST = ("compensation", "distance", "unit")
 """Modes of which `State.lost` says since when they are unknown."""
 
@@ -167,6 +169,7 @@ class State:
     retract: int | None
     system: int | None
     path: int | None
+    """UNSTATED: that which the control starts in, as no program has said another so far."""
     path_p: float
     path_q: float
     """P and Q of G64; NaN where `path` is known: none were given."""

@@ -35,7 +35,7 @@ from gcodejerk.nc.interpreter.moves import (
 )
 from gcodejerk.nc.interpreter.named_cycles import drill_behind
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, NO_FEED, USES_FEED
-from gcodejerk.nc.interpreter.rules import arc_words, takes_axes
+from gcodejerk.nc.interpreter.rules import arc_words, moves_without_axes, takes_axes
 from gcodejerk.nc.interpreter.variables import forget_shared
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
@@ -313,6 +313,8 @@ class Phases(Effects):
             self._select_motion(codes)
         cycle = self._cycle(codes.g)
         if not step.words and not arc_words(codes.values, state):
+            if state.motion in dialect.redrawn and moves_without_axes(codes.g, codes.values):
+                state.forget_positions(plane_axes(state))
             if cycle is not None and "cycle" in codes.g:
                 begin_cycle(state, cycle, codes.values)
             if cycle is not None and dialect.drilling.own_group and "R" in codes.values:

@@ -14,6 +14,7 @@ from gcodejerk.nc.interpreter.modal import State
 AXIS_USERS = frozenset({"return", "table", "local", "set"})
 """Effects that take the axis words of the block, so that no motion may be stated beside them."""
 _OFF = frozenset({G40, None})
+_OF_NO_MOTION = frozenset("FSTD")
 _REFUSED = -1
 """In the place of a motion code: the control refuses the block."""
 
@@ -113,6 +114,11 @@ def _words_used(codes: Codes, motion: int | None, state: State, dialect: Dialect
 def arc_words(values: dict[str, float], state: State) -> bool:
     """Whether centre words alone make an arc, one being in force."""
     return state.motion in (20, 30) and ("I" in values or "J" in values or "K" in values)
+
+
+def moves_without_axes(g: dict[str, int], values: dict[str, float]) -> bool:
+    """Whether a motion that is redrawn may run: ``G11 R30 H20`` in polar words names no axis."""
+    return "motion" in g or not _OF_NO_MOTION.issuperset(values)
 
 
 def _arc_complete(values: dict[str, float], plane: int | None) -> bool:

@@ -31,6 +31,7 @@ _WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[0-9.]+)[ \t]*(?![-+0-9. \t#\[=])")
 _IDENTIFIER = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")
 _INDEX = re.compile(rb"[0-9]*")
 _R_ELEMENT = re.compile(rb"R[ \t]*\[", re.IGNORECASE)
+_L_CALL = re.compile(rb"(L[0-9]+)[ \t]*\(", re.IGNORECASE)
 _FUNCTION = re.compile(rb"(IC|AC|DC|ACP|ACN)[ \t]*\(", re.IGNORECASE)
 _SPINDLE = re.compile(rb"\$[ \t]*(-?[0-9]+)\.?(?![-+0-9. \t#\[]*[-+0-9.#\[])")
 _TO_BLANK = re.compile(rb"[^ \t;]*")
@@ -268,6 +269,17 @@ class CarefulLine(Cursor):
         self.assigned.append(self.text[at : self.at])
         return True
 
+    def _numbered_call(self) -> bool:
+        """Take ``L10(5,6)``, a call like that of a name, if it stands here."""
+        match = _L_CALL.match(self.text, self.at)
+        if not match:
+            return False
+        self.at = match.end() - 1
+        begin = self.at
+        self.pair()
+        self.names.append(Name(match[1].decode().upper(), self.text[begin : self.at]))
+        return True
+
     def _q_statement(self) -> bool:
         """Take ``Q5 = Q1 + 2``, ``D01 Q5 P01 +Q1 P02 +2`` or ``L1,2``, if one stands here."""
         end = _TO_COMMENT.match(self.text, self.at).end()  # type: ignore[union-attr]
@@ -353,7 +365,7 @@ class CarefulLine(Cursor):
         leads = all(word.letter == "N" for word in self.words) and not self.names
         if byte in b"Oo" and leads and rules.o_word != "error":
             self.flow()
-        elif (rules.variables == "R" and self._indexed_parameter()) or (
+        elif (rules.variables == "R" and (self._indexed_parameter() or self._numbered_call())) or (
             rules.variables == "Q" and self._q_statement()
         ):
             pass

@@ -131,7 +131,7 @@ class _Plain:
             same = np.abs(a - told) <= 1e-12 * np.maximum(np.abs(a), np.abs(told))
             good &= same | np.isnan(a) | np.isnan(told)
             known &= np.isnan(told) | ~np.isnan(a)
-        if tracker.path is not None:
+        if tracker.path:
             for own, column in ((tracker.p, rapids.path_p), (tracker.q, rapids.path_q)):
                 told = column[i]
                 none = np.isnan(told) & (own != own)

@@ -26,7 +26,7 @@ SELECTIONS: frozenset[Effect] = frozenset(("system", "numbered system"))
 QUIET: frozenset[Effect] = frozenset(("diameter", "radius", "either"))
 STATEMENTS: frozenset[Effect] = frozenset(("home", "cycle", "label"))
 """Effects of statements of Klartext."""
-_CALLS = (47, 96, 97, 98, 198)
+_CALLS = (46, 47, 96, 97, 98, 198)
 _ENDS = (2, 17, 30, 99)
 _OUTPUTS = (*range(62, 69), *range(100, 200))
 
@@ -232,6 +232,12 @@ class Codes(Known):
             named = [axis for k, axis in enumerate(AXES) if block.axes >> k & 1]
             self.lose("".join(axis for axis in named if axis != "X" or not timed))
 
+    def turn_polar(self, block: Sorted) -> None:
+        """Without a word of an axis, an angle and a radius may say where a motion leads."""
+        redrawn = self.g.get("motion") in self.dialect.redrawn
+        if redrawn and ("motion" in block.g or set(block.values) - set("FSTD")):
+            self.lose(self.in_plane())
+
     def modes(self, g: dict[str, int], values: dict[str, float]) -> None:
         """Execute modal codes."""
         dialect = self.dialect
@@ -261,6 +267,8 @@ class Codes(Known):
             return
         if on or self.frames.get(name, False) is not False:
             self.lose()
+        if name == "modal macro" and self.frames.get(name, False) is not False:
+            self.forget()  # whatever the macro has left at the last position
         if on or name in self.frames:
             self.frames[name] = on
 
@@ -315,9 +323,12 @@ class Codes(Known):
                 self.end_bar("offsets")
             self.lose_offsets()
             self.lose()
-        elif effect in ("transform", "modal cycle"):
-            # G67 ends a modal macro, under the name that the table of transforms gives it
-            self.frames["modal macro" if effect == "modal cycle" else "a frame"] = True
+        elif effect == "modal cycle":
+            # G67 ends it, under the name that the table of transforms gives it
+            self.unknown_call()
+            self.frames["modal macro"] = True
+        elif effect == "transform":
+            self.frames["a frame"] = True
             self.lose()
         elif effect == "cycle":
             self.lose()

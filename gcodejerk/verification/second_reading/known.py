@@ -17,6 +17,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G54_1, G90
 from gcodejerk.units import MM_PER_INCH as INCH
+from gcodejerk.verification.second_reading.common import common
 from gcodejerk.verification.second_reading.computing import is_local
 from gcodejerk.verification.second_reading.reading import NAN
 
@@ -98,7 +99,7 @@ class Known:
         self.g: dict[str, int | None] = dict(modes)
         """Modal group -> code in force."""
         self.feed_mode: int | None = self.mode_of(modes.get("feed mode"))
-        self.path: int | None = dialect.paths.get(modes.get("path", -1))
+        self.path: int | None = dialect.paths.get(modes.get("path", -1), 0)
         self.p = self.q = self.feed = NAN
         self.feed_whole: bool | None = False
         self.unit: float | None = None
@@ -190,7 +191,7 @@ class Known:
         for name, theirs in vars(other).items():
             mine = getattr(self, name)
             if KINDS[name] != "tolerance":
-                setattr(self, name, _common(KINDS[name], mine, theirs))
+                setattr(self, name, common(KINDS[name], mine, theirs))
             elif mine != theirs and (mine == mine or theirs == theirs):
                 self.path = None
         if self.feed_whole is None:
@@ -393,6 +394,8 @@ class Known:
                     named = values[axis] * self.scale(axis)
                     self.g92[k] += self.at[k] - named
                     self.at[k] = named
+            if dialect.shift_may_end:
+                self.selected, self.system, self.g92 = None, [NAN] * len(AXES), [NAN] * len(AXES)
             if self.frames:
                 self.lose()
         elif "clear" in kinds:
@@ -410,6 +413,12 @@ class Known:
         """Whether a rotation or its kin is, or may be, in force."""
         return any(on is not False for on in self.frames.values())
 
+    def may_stop(self) -> bool:
+        """Whether G61 may be in force: it has to be denied, or something may have left it."""
+        if self.dialect.path_has_to_be_stated:
+            return not self.path
+        return self.path is None and "path" in self.dialect.groups.values()
+
     def in_plane(self) -> str:
         """Axes that cutter compensation may displace; nothing here knows Heidenhain's G20."""
         plane = self.g.get("plane")
@@ -419,25 +428,6 @@ class Known:
 def _lone(dialect: Dialect, group: str, code: int) -> bool:
     """Whether a group has no code but this one."""
     return {code}.issuperset(c for c, name in dialect.groups.items() if name == group)
-
-
-def _common(kind: str, mine: Any, theirs: Any) -> Any:
-    """What two values of one field have in common."""
-    if kind in ("modes", "frames"):
-        none = None if kind == "modes" else False
-        both = {k: (mine.get(k, none), theirs.get(k, none)) for k in mine.keys() | theirs.keys()}
-        return {k: a if a == b else None for k, (a, b) in both.items()}
-    if kind == "axes":
-        return [a if a == b else NAN for a, b in zip(mine, theirs, strict=True)]
-    if kind == "least":
-        return {k: min(mine.get(k, v), theirs.get(k, v)) for k, v in (mine | theirs).items()}
-    if kind == "table":
-        return {k: v for k, v in mine.items() if theirs.get(k) == v}
-    if kind == "number":
-        return mine if mine == theirs else NAN
-    if kind == "ever":
-        return mine or theirs
-    return None if kind == "mode" and mine != theirs else mine
 
 
 def _bits(axes: str) -> int:

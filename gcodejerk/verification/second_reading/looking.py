@@ -12,7 +12,7 @@ from typing import BinaryIO
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.verification.second_reading.reading import pieces
 
-_JUMPS = re.compile(rb"(?:GOTO|DO)[ \t]*[0-9#\[]|WHILE[ \t]*\[", re.IGNORECASE)
+_JUMPS = re.compile(rb"(?:GOTO|DO)[ \t]*[0-9#\[]|WHILE[ \t]*\[|M[ \t]*0*46(?![0-9])", re.IGNORECASE)
 _NAMED_JUMPS = re.compile(rb"\b(?:GOTO[FBCS]?|WHILE|REPEATB?|UNTIL|LOOP|FOR|CASE)\b", re.IGNORECASE)
 """What may lead back to a line that was read before."""
 _TEXTS = re.compile(rb"\([ \t]*(?![ \t]*(?:GOTO|IF|CALL|RPT)\b)[^()\n]*\)|;.*", re.IGNORECASE)

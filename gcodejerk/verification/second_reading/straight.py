@@ -114,7 +114,7 @@ class PlainLines:
             and not tracker.doubt
             and (not tracker.dark or tracker.spindle == 5)
             and tracker.g.get("compensation") == G40
-            and (tracker.path is not None or not self.dialect.path_has_to_be_stated)
+            and not tracker.may_stop()
             and all(on is False for on in tracker.bars.values())
             and not tracker.slow
         )

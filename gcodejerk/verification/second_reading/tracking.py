@@ -253,6 +253,7 @@ class Tracker(Circling):
         elif block.axes or "motion" in g or "cycle" in g or kinds & _FRAMES:
             self._move(block, kinds, seen)
         else:
+            self.turn_polar(block)
             seen.against = seen.against or "it names no axis"
 
     def _stop(self, block: Sorted, *, ends: bool) -> None:
@@ -280,7 +281,7 @@ class Tracker(Circling):
             "F without a point": self.feed_whole if self.feed == self.feed else None,
             "plane": self.g.get("plane"),
             "retract": self.g.get("retract"),
-            "path": self.path,
+            "path": self.path or None,
             "motion": None if (motion := self.g.get("motion")) is None else motion // 10,
             "P": self.p,
             "Q": self.q,
@@ -314,10 +315,11 @@ class Tracker(Circling):
             seen.against = seen.against or "it belongs to a canned cycle"
             self._drill(code, block)
             return
+        motion = self.g.get("motion")
         if not block.axes:
+            self.turn_polar(block)
             seen.against = seen.against or "it names no axis"
             return
-        motion = self.g.get("motion")
         if motion is None or motion == G80:
             self.lose()
             return
@@ -356,7 +358,8 @@ class Tracker(Circling):
         if kinds & {"set", "clear", "restore", "local", "table"}:
             self.shift(kinds, block.values, block.increments)
             return not (kinds & {"clear", "restore"} and block.axes)
-        return block.g.get("tool length") not in (None, G43, G49) and block.axes != 0
+        frames = self.dialect.effect(block.g.get("non-modal")) == "frames"
+        return frames or (block.axes != 0 and block.g.get("tool length") not in (None, G43, G49))
 
     def _go(self, block: Sorted) -> None:
         """To where the words say."""
@@ -386,7 +389,7 @@ class Tracker(Circling):
         seen.against = seen.against or self._barred(block, seen)
         known = not (compensated or self.turned() or self.depth or self.doubt)
         known = known and all(on is False for on in self.bars.values())
-        known = known and (self.path is not None or not self.dialect.path_has_to_be_stated)
+        known = known and not self.may_stop()
         known = known and (self.feed_unit is not None or not self.dialect.lengths_only)
         seen.sure = known and seen.against is None
         if self.depth or self.doubt:
