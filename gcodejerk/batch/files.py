@@ -212,6 +212,10 @@ def _naming(path: str) -> Iterator[None]:
 
 def _pass_on(spool: IO[bytes], path: str) -> None:
     """Copy a finished output to standard output, a pipe or a device."""
+    if path == STANDARD and sys.__stdout__ is None:  # closed by whoever has called us
+        raise EmitError(
+            "standard output cannot be written: it is closed", "open it, or name a file (-o FILE)"
+        )
     try:
         if path == STANDARD:
             shutil.copyfileobj(spool, sys.stdout.buffer)

@@ -137,6 +137,7 @@ def machine_test_program(
 ) -> None:
     """Write a program of rapids and dwells, to record the machine's vibration with."""
     from gcodejerk.batch.files import new_file, refuse_clashes
+    from gcodejerk.errors import MachineError
     from gcodejerk.identification import excitation, rapids_program
 
     described = load_machine(machine)
@@ -144,6 +145,11 @@ def machine_test_program(
     chosen = [name.upper() for name in axis or ()] or [
         one.name for one in described.axes if not one.rotary
     ]
+    if not chosen:
+        raise MachineError(
+            f"{described.source or described.name} has no linear axis to record",
+            f"name the axes that are to move: --axis {described.axes[0].name}",
+        )
     rapids = [
         excitation(described, described.axis(name).name, room, lengths)
         for name in dict.fromkeys(chosen)

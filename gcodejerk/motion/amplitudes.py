@@ -171,7 +171,7 @@ def residual(
     Raises
     ------
     PlanError
-        The mode is not one that vibrates.
+        The mode is not one that vibrates, or times and steps are those of no move.
 
     Examples
     --------

@@ -91,7 +91,8 @@ def residual_acceleration(
     Raises
     ------
     PlanError
-        The damping ratio is not that of a mode that vibrates.
+        The damping ratio is not that of a mode that vibrates, or times and steps are those of no
+        move.
 
     Notes
     -----
@@ -118,11 +119,29 @@ def residual_acceleration(
     >>> float(residual_acceleration(t, dJ, 30.0, damping=0.02).round(1))
     12266.9
     """
-    t, dJ = np.asarray(switch_times, dtype=float), np.asarray(jerk_steps, dtype=float)
+    t, dJ = _changes(switch_times, jerk_steps)
     poles = mode_poles(frequency, damping)[..., np.newaxis]
     vibration = dJ * np.exp(poles * (t[-1] - t)) / poles.imag
     amplitude: Array = np.abs(vibration.sum(axis=-1))
     return amplitude
+
+
+def _changes(switch_times: ArrayLike, jerk_steps: ArrayLike) -> tuple[Array, Array]:
+    """Times and steps as arrays; refused where they are none of a move."""
+    t, dJ = np.asarray(switch_times, dtype=float), np.asarray(jerk_steps, dtype=float)
+    if t.ndim != 1 or t.shape != dJ.shape or not len(t):
+        raise PlanError(
+            f"switch_times of shape {t.shape} and jerk_steps of shape {dJ.shape}",
+            "give one time for each change of the jerk, shape (n,) each",
+        )
+    if not (np.isfinite(t).all() and np.isfinite(dJ).all()):
+        raise PlanError("a time or a change of the jerk is not finite", "give numbers alone")
+    if t[-1] < t.max():
+        raise PlanError(
+            f"the last time is {t[-1]:g} s, and {t.max():g} s comes before it",
+            "give the end of the move last",
+        )
+    return t, dJ
 
 
 def residual_displacement(response: NDArray[np.complex128], poles: Complex) -> Array:

@@ -19,7 +19,7 @@ from gcodejerk.planning.batch import Batch, NumberFormat
 from gcodejerk.planning.conventional import least_time
 from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plan import plan_moves
-from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.plans import Modes, Plans
 from gcodejerk.planning.stream import make_streams
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
@@ -195,7 +195,9 @@ def plan_move(
             for batch in points
         ]
     why = None if plans.reason[0] == CERTAIN else REASONS[plans.reason[0]]
-    if why in (Reason.LIMITS, Reason.NOT_BETTER):
+    if why is Reason.NOT_BETTER and not Modes.of(machine).modes:
+        why = Reason.NO_MODE
+    if why in (Reason.LIMITS, Reason.NOT_BETTER, Reason.NO_MODE):
         plans = plan_moves(row, machine, "conventional", as_today=True)
         # No stream is written: what is left is what the controller leaves.
         batches = [replace(b, residual=b.conventional_residual) for b in _streams(plans)]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from gcodejerk.report import compare_lanes as lanes
 from gcodejerk.report import compare_spectra as spectra
-from gcodejerk.report.compare_shown import OTHERS, TEXT, UM, Shown
+from gcodejerk.report.compare_shown import OTHERS, TEXT, UM, UNIT, Shown
 from gcodejerk.report.figures import new_figure, save
 from gcodejerk.studies.comparison import Comparison
 
@@ -119,8 +119,7 @@ def draw_comparison(figure: Figure, shown: Shown) -> None:
     )  # fmt: skip
     tolerance = UM * shown.comparison.machine.design.tolerance
     figure.suptitle(
-        f"{shown.moved} — {shown.comparison.machine.name}; settled: below {tolerance:g} "
-        f"{shown.small}",
+        f"{shown.moved} — {shown.comparison.machine.name}; settled: below {tolerance:g} {UNIT}",
         fontsize=TEXT + 0.5,
     )
     # Once more for what depends on where the first time put it.

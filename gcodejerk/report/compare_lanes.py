@@ -13,7 +13,7 @@ import numpy as np
 
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.planning.arrival import arrival_response
-from gcodejerk.report.compare_shown import MS, TEXT, UM, Shown, round_below
+from gcodejerk.report.compare_shown import MS, TEXT, UM, UNIT, Shown, round_below
 from gcodejerk.report.figures import acceleration_curve
 from gcodejerk.studies.comparison import Candidate
 
@@ -87,7 +87,7 @@ def draw_vibration(axes: Axes, shown: Shown) -> str:
         axes.plot(MS * t[0], LANE * swing[0] / scale - k, "o", color=colour, markersize=3)
     _lanes(axes, shown)
     _names(axes, shown, [f"{c.name}\n{_settled(c)}" for c in shown.shown])
-    _bar(axes, round_below(UM * scale), UM * scale, shown.small)
+    _bar(axes, round_below(UM * scale), UM * scale, UNIT)
     axes.set_xlim(MS * (first - 0.03 * (end - first)), MS * end)
     axes.set_xlabel("time since the start [ms]")
     return "vibration after arrival"

@@ -16,6 +16,8 @@ from gcodejerk.motion.shapers import SHAPERS
 from gcodejerk.studies.comparison import Candidate, Comparison
 
 MS, UM = 1e3, 1e3
+UNIT = "µm"
+"""Unit of what is left of vibration: at the tool, whatever moves."""
 TEXT = 8.0
 STYLES: dict[str, tuple[str, Any, float]] = {
     "conventional": ("#000000", "-", 1.2),
@@ -87,11 +89,6 @@ class Shown:
     def unit(self, axis: str) -> str:
         """Unit of lengths of an axis."""
         return "deg" if self.comparison.machine.axis(axis).rotary else "mm"
-
-    @property
-    def small(self) -> str:
-        """Unit of what is left of vibration, the same for all modes."""
-        return "deg/1000" if self.unit(self.longest) == "deg" else "µm"
 
     @property
     def weights(self) -> Array:

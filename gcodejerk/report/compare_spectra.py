@@ -20,7 +20,7 @@ from gcodejerk.motion.amplitudes import ramp_response
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.planning.arrival import arrival_response
-from gcodejerk.report.compare_shown import MS, TEXT, UM, Shown
+from gcodejerk.report.compare_shown import MS, TEXT, UM, UNIT, Shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,7 +136,7 @@ def draw_vibration_spectrum(axes: Axes, shown: Shown, part: str) -> str:
     low = max(SPECTRUM_FLOOR * top, min(0.1 * tolerance, 0.01 * top))
     _log_axes(axes, frequency, low, 2.0 * top, 0.11)
     _mark(axes, [m for m, _ in modes])
-    axes.set_ylabel(f"amplitude [{shown.small}]")
+    axes.set_ylabel(f"amplitude [{UNIT}]")
     return f"spectrum of ({part}), Hann window of {MS * window:.0f} ms"
 
 
@@ -170,7 +170,7 @@ def draw_residual(axes: Axes, shown: Shown) -> str:
             color="0.88", linewidth=0, zorder=0.5,
         )  # fmt: skip
     axes.set_xlabel("natural frequency [Hz]")
-    axes.set_ylabel(f"residual [{shown.small}]")
+    axes.set_ylabel(f"residual [{UNIT}]")
     about = f"{axis} {shown.length(axis):g} {shown.unit(axis)}, participation 1"
     if not own:
         return f"residual of a mode of any frequency ({about}); grey: measured spectrum"

@@ -38,8 +38,8 @@ def compare_table(comparison: Comparison) -> ScreenTable:
     -------
     ScreenTable
     """
-    unit, small = _units(comparison)
     axis = comparison.longest
+    unit = "deg" if comparison.machine.axis(axis).rotary else "mm"
     table = ScreenTable(
         ("profile", "left"),
         ("time\n[ms]", "right"),
@@ -47,15 +47,17 @@ def compare_table(comparison: Comparison) -> ScreenTable:
         (f"{axis} velocity\n[{unit}/s]", "right"),
         (f"acceleration\n[{unit}/s^2]", "right"),
         (f"jerk\n[{unit}/s^3]", "right"),
-        (f"residual\n[{small}]", "right"),
-        *((f"+-{100 * band:.0f} %\n[{small}]", "right") for band in BANDS),
-        (f"limit\n[{small}]", "right"),
+        ("residual\n[um]", "right"),
+        *((f"+-{100 * band:.0f} %\n[um]", "right") for band in BANDS),
+        ("limit\n[um]", "right"),
         drop=(
             f"jerk\n[{unit}/s^3]",
             f"{axis} velocity\n[{unit}/s]",
-            f"+-{100 * BANDS[0]:.0f} %\n[{small}]",
+            f"+-{100 * BANDS[0]:.0f} %\n[um]",
             f"acceleration\n[{unit}/s^2]",
-            f"limit\n[{small}]",
+            "limit\n[um]",
+            f"+-{100 * BANDS[-1]:.0f} %\n[um]",
+            "settled\n[ms]",
         ),
     )
     best = _Best(comparison)
@@ -96,11 +98,10 @@ def compare_notes(comparison: Comparison) -> list[str]:
     list of str
         Lines; the last one or two say what is gained.
     """
-    _, small = _units(comparison)
     tolerance = comparison.machine.design.tolerance * UM_PER_MM
     lines = [
         f"residual: largest displacement of any mode; +-: at worst with every frequency off by "
-        f"as much; settled: below {tolerance:g} {small}",
+        f"as much; settled: below {tolerance:g} um",
         "limit: the least that any profile of that time within the limits leaves; all of the "
         "profiles themselves, before sampling",
         _shapers(comparison),
@@ -153,11 +154,10 @@ def _gains(comparison: Comparison) -> list[str]:
     if same:
         stillest = min(same, key=lambda c: c.worst)
         if stillest.worst < usual.worst:
-            _, small = _units(comparison)
             lines.append(
                 f"in {_time(comparison.time)}, {stillest.name} leaves "
-                f"{_small(stillest.worst)} {small}; the controller's own G0 leaves "
-                f"{_small(usual.worst)} {small} after {_time(usual.time)}"
+                f"{_small(stillest.worst)} um; the controller's own G0 leaves "
+                f"{_small(usual.worst)} um after {_time(usual.time)}"
             )
     return lines
 
@@ -220,12 +220,6 @@ class _Best:
             and value <= max(self.least[column] * SAME, 0.5e-5)
         )
         return Text(text, style="bold" if best else "")
-
-
-def _units(comparison: Comparison) -> tuple[str, str]:
-    """Unit of the longest-moving axis, and that of its residuals."""
-    rotary = comparison.machine.axis(comparison.longest).rotary
-    return ("deg", "deg/1000") if rotary else ("mm", "um")
 
 
 def _settled(candidate: Candidate) -> str:

@@ -7,6 +7,7 @@ This module owns the page: size, title, colour bar and legend. What stands in a 
 from __future__ import annotations
 
 from dataclasses import replace
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from gcodejerk.motion.profiles.conditions import Condition
@@ -31,6 +32,10 @@ POINTS = 700
 """Of each axis of a picture."""
 ONE, THREE = (7.4, 6.0), (10.8, 5.2)
 """Width and height of a map and of three. [inch]"""
+
+
+LINE = 80
+"""Letters of a machine's name that a title has room for."""
 
 
 def plot_map(
@@ -99,7 +104,8 @@ def draw_map(
     axes.set_ylabel(f"{T_SUM} [ms]")
     _colour_bar(figure, survey, image, axes, 0.04)
     axes.set_title(
-        f"{_moved(survey)}, Condition {survey.condition}, {_judged(survey)}\n{survey.machine.name}",
+        f"{_moved(survey)}, Condition {survey.condition}, {_judged(survey)}\n"
+        f"{shorten(survey.machine.name, LINE, placeholder=' …')}",
         fontsize=10.5, loc="left",
     )  # fmt: skip
     entries = dict(panel.entries)
@@ -133,8 +139,10 @@ def draw_conditions(
     every[0].set_ylabel(f"{T_SUM} [ms]")
     _colour_bar(figure, survey, image, list(every), 0.012)
     figure.suptitle(
-        f"{_moved(survey)}, {_judged(survey)}; {_shortest_segment(survey)} — {survey.machine.name}",
+        f"{_moved(survey)}, {_judged(survey)}; {_shortest_segment(survey)} — "
+        f"{shorten(survey.machine.name, LINE, placeholder=' …')}",
         fontsize=10.5,
+        wrap=True,
     )
     _legend(figure, entries, 3)
     _name_lines(figure, panels)

@@ -32,6 +32,8 @@ LIMIT, NULL, POINT = "#c1121f", "white", "#ff9d2e"
 DARK = "#3b2a63"
 """As the valleys that the nulls run through: under what is white in legends and names."""
 TEXT, NAME = 8.5, 7.5
+MOST_LISTED = 4
+"""Modes whose frequencies are named in one entry of the legend."""
 MOST_BRANCHES = 12
 """More null curves of a mode than these hide the map, whose valleys show them as well."""
 DASHES: tuple[Any, ...] = ((0, (5, 2)), (0, (1.5, 1.2)), (0, (8, 1.5, 1.5, 1.5)), (0, (2.5, 3)))
@@ -63,10 +65,10 @@ def scale_of(survey: Survey) -> float:
 
 
 def unit_of(survey: Survey) -> str:
-    """Unit of what is shown."""
-    if survey.axis.rotary:
-        return "deg/s²" if survey.mode is not None else "deg/1000"
-    return "mm/s²" if survey.mode is not None else "µm"
+    """Unit of what is shown; a mode by itself has that of its axis, all together move the tool."""
+    if survey.mode is None:
+        return "µm"
+    return "deg/s²" if survey.axis.rotary else "mm/s²"
 
 
 class MapPanel:
@@ -219,8 +221,10 @@ class MapPanel:
             self._named.append((curves, f"{mode.frequency:g} Hz", NULL))
         if crowded:
             listed = ", ".join(crowded)
+            if len(crowded) > MOST_LISTED:
+                listed = f"{len(crowded)} modes, {crowded[0]} to {crowded[-1]}"
             self.entries[
-                f"nulls of {listed} Hz (Condition {self.survey.condition}): too many to be drawn"
+                f"nulls of {listed} Hz\n(Condition {self.survey.condition}): too many to be drawn"
             ] = Patch(facecolor="none", edgecolor="none")
 
     def _null_curves(self, mode: Mode, fine: Array) -> list[Array]:

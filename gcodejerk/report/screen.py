@@ -1,7 +1,8 @@
 """Tables on a screen of any width.
 
 Rule: no number and no word is ever broken. Columns of text are wrapped between words; where that is
-not enough, columns are left out in an order that the table states, and a line below says which.
+not enough, columns are left out in an order that the table states, then from the right, and a line
+below says which.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class ScreenTable:
     wrap : sequence of str
         Titles of columns of text.
     drop : sequence of str
-        Titles of columns that can be done without, the first one first.
+        Titles of columns that can be done without, the first one first. The first column stays.
     """
 
     def __init__(
@@ -82,7 +83,7 @@ class ScreenTable:
             for k, width in enumerate(natural)
         ]
         shown = list(range(len(self.titles)))
-        for k in self.drop:
+        for k in [*self.drop, *(j for j in shown[:0:-1] if j not in self.drop)]:
             if _total([least[j] for j in shown]) <= room:
                 break
             shown.remove(k)

@@ -300,7 +300,7 @@ def map_tables(survey: Survey) -> list[ScreenTable]:
         ("frequency\n[Hz]", "right"),
         ("damping\n[-]", "right"),
         (amplitude, "right"),
-        (f"displacement [{'um' if unit == 'mm' else 'deg/1000'}]\ntoday -> best", "right"),
+        ("displacement [um]\ntoday -> best", "right"),
         ("next null [ms]\nT_SUM (T1)", "right"),
         wrap=("mode",),
         drop=("damping\n[-]", amplitude, "next null [ms]\nT_SUM (T1)"),

@@ -277,3 +277,14 @@ def test_a_number_that_no_machine_has_is_refused_with_where_it_comes_from(comman
     assert "[printer] max_accel)" in out
     assert "m.yaml" not in out
     assert not (tmp_path / "m.yaml").exists()
+
+
+def test_a_test_program_without_an_axis_to_move_is_refused(command, tmp_path):
+    (tmp_path / "m.yaml").write_text(
+        "interval: 0.001\npositioning: linear\naxes:\n  B: {type: rotary, rapid: {velocity: 90, "
+        "acceleration: 3000, jerk: 3.0e+5}, modes: []}\n"
+    )
+    code, out = command("machine", "test-program", "-m", "m.yaml", "-o", "t.ngc")
+    assert (code, "--axis B" in out) == (1, True)
+    assert not (tmp_path / "t.ngc").exists()
+    assert command("machine", "test-program", "-m", "m.yaml", "--axis", "B", "-o", "t.ngc")[0] == 0

@@ -7,6 +7,7 @@ every read of the program, into every write of the output.
 import errno
 import os
 import random
+import shlex
 import signal
 import subprocess
 import sys
@@ -391,6 +392,16 @@ def test_standard_output_on_a_full_disk_is_an_error_without_a_traceback(folder):
         assert "No space left on device" in done.stderr
         assert "Traceback" not in done.stderr
         assert "Exception ignored" not in done.stderr
+
+
+def test_standard_output_that_is_closed_is_an_error_where_the_result_goes_there(folder):
+    Path("part.nc").write_bytes(SMALL)
+    for arguments, code in ((["-o", "-"], 1), ([], 0)):
+        shell = f"exec {shlex.join([*map(str, COMMAND), *arguments])} >&-"
+        done = subprocess.run(["sh", "-c", shell], stderr=subprocess.PIPE, text=True, check=False)
+        assert done.returncode == code, done.stderr
+        assert ("standard output cannot be written" in done.stderr) == bool(code)
+    assert Path("part.jerk.nc").exists()
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

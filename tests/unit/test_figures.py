@@ -173,7 +173,7 @@ def test_a_longer_time_is_flagged():
 
 def test_nulls_too_many_to_draw_are_told():
     words = words_of(drawn(surveyed("router", "X", 300.0)))
-    assert "nulls of 9, 32 Hz (Condition III): too many to be drawn" in words
+    assert "nulls of 9, 32 Hz\n(Condition III): too many to be drawn" in words
     assert "null of" not in words
 
 

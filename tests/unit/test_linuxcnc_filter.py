@@ -242,9 +242,26 @@ def test_the_filter_and_the_hal_go_in_and_out_in_any_order(config):
     remove_filter(str(config))
     now = everything(config.parent)
     assert now["mill.ini"] == before["mill.ini"]
-    assert set(now) - set(before) <= {
-        "mill.ini.before-gcodejerk", "mill.ini.before-gcodejerk-filter"
-    }  # fmt: skip
+    assert set(now) == set(before)
+
+
+@pytest.mark.parametrize("suffix", ["", "-filter"])
+def test_a_file_in_the_place_of_the_backup_is_somebodys(config, suffix):
+    own = config.with_name(f"{config.name}.before-gcodejerk{suffix}")
+    own.write_bytes(b"my notes")
+    before = everything(config.parent)
+    with pytest.raises(EmitError, match="not what would be kept there"):
+        install_filter(str(config), COMMAND, "vmc") if suffix else install(
+            str(config), "adaptive-feed", "2.9"
+        )
+    assert everything(config.parent) == before
+
+
+def test_a_backup_stays_where_the_ini_was_edited_since(config):
+    install_filter(str(config), COMMAND, "vmc")
+    config.write_bytes(config.read_bytes() + b"# edited\n")
+    assert "was edited since" in remove_filter(str(config))[-1]
+    assert config.with_name(f"{config.name}.before-gcodejerk-filter").exists()
 
 
 @pytest.mark.parametrize(

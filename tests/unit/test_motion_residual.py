@@ -323,3 +323,19 @@ def test_a_mode_that_dies_soon_costs_the_next_nothing(behind):
     together = profiles_response(profile, poles)[0]
     scale = np.abs(profile.jerk).max() / np.abs(poles) ** 2
     np.testing.assert_allclose(np.abs(together - alone) / scale, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("times", "steps", "said"),
+    [
+        ([], [], "shape"),
+        ([0.0, 0.01, 0.02], [1.0, -1.0], "shape"),
+        ([[0.0, 0.01]], [[1.0, -1.0]], "shape"),
+        ([0.0, np.nan], [1.0, -1.0], "not finite"),
+        ([0.0, 0.01], [1.0, np.inf], "not finite"),
+        ([0.02, 0.0], [1.0, -1.0], "the last time is 0 s, and 0.02 s"),
+    ],
+)
+def test_times_and_steps_of_no_move_are_refused(times, steps, said):
+    with pytest.raises(PlanError, match=said):
+        residual_acceleration(times, steps, 30.0, 0.0)

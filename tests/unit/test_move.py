@@ -196,3 +196,12 @@ def test_a_move_that_the_limits_leave_no_room_for_stays_as_it_is_today():
     assert (plan.planned, plan.reason) == (False, "limits cannot be met")
     assert plan.profile == "conventional"
     np.testing.assert_array_equal(plan.residual, plan.conventional_residual)
+
+
+def test_a_machine_without_modes_is_the_reason_by_its_name():
+    machine = Machine.loads(
+        "interval: 0.001\npositioning: linear\naxes:\n"
+        "  X: {rapid: {velocity: 500, acceleration: 4000, jerk: 2.0e+5}, modes: []}\n"
+    )
+    plan = plan_move({"X": 20.0}, machine)
+    assert (plan.planned, plan.reason) == (False, "no modes in the machine file")

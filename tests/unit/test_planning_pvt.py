@@ -146,6 +146,16 @@ def test_ends_are_those_of_the_program_in_counts_and_never_drift():
     assert ends == [round(10.0137 * (k + 1) * 37.0) for k in kept]
 
 
+@pytest.mark.parametrize("controller", ["csv", "json"])
+@pytest.mark.parametrize(
+    ("begin", "end"), [(2000, 0), (4000, 0), (1900, 0), (0, 4000), (-3999.9, 1)]
+)
+def test_far_starts_are_judged_by_their_own_digits(controller, begin, end):
+    program = f"G21 G90 G94 G17 G40 G49 G80 G54\nG1 X{begin} F600\nG0 X{end}\nM2\n".encode()
+    form = "pvt" if controller == "csv" else "stream"
+    assert process(program, machine(), controller=controller, form=form).planned == 1
+
+
 @pytest.mark.parametrize(
     ("text", "planned"),
     [(b"M2\n", 0), (b"G21 G90 G94\nG1 X0 Y0 F9\nG0 X0\nG0 X0.0000000001\nM2\n", 0)],

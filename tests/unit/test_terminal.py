@@ -59,6 +59,22 @@ def test_no_word_is_broken_and_no_column_vanishes_in_silence(rows, width):
                 assert word in found
 
 
+@pytest.mark.parametrize("width", range(24, 90, 3))
+def test_no_number_is_cut_where_a_screen_is_too_narrow_for_what_may_be_dropped(width):
+    titles = [f"column {k}" for k in range(6)]
+    table = ScreenTable(*((title, "right") for title in titles), drop=titles[4:5])
+    numbers = [f"{371.77 + k:.2f}" for k in range(6)]
+    table.add_row(*numbers)
+    lines = shown(table, width).splitlines()
+    (row,) = (line.split() for line in lines if "371.77" in line)
+    kept = int("".join(lines).count("column 0") > 0) * len(row)
+    assert 0 < len(row) == kept
+    assert set(row) <= set(numbers)
+    missing = " ".join(" ".join(lines).split()).partition("without: ")[2]
+    for title, number in zip(titles, numbers, strict=True):
+        assert (number in row) != (title in missing)
+
+
 @pytest.mark.parametrize("width", [60, 80, 120])
 @pytest.mark.parametrize(
     "arguments",

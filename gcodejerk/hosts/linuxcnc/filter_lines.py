@@ -13,15 +13,15 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from gcodejerk.batch.files import new_file
 from gcodejerk.errors import EmitError, Place
 from gcodejerk.hosts.command import for_shell, one_line
-from gcodejerk.hosts.linuxcnc.ini import is_writable, parse_ini, read_bytes
+from gcodejerk.hosts.linuxcnc.backups import FILTER, backup_of, drop_backups, keep, write
+from gcodejerk.hosts.linuxcnc.ini import is_writable, parse_ini, read_bytes, without_lines
 
 FORM = "filter"
-BACKUP = ".before-gcodejerk-filter"
 ENDINGS = ("ngc", "nc", "tap", "NGC", "NC", "TAP")
 LONGEST = 250
 """LinuxCNC 2.9 reads 255 characters of a line; longer ones are cut there."""
@@ -81,7 +81,7 @@ def install_filter(path: str, command: tuple[str, ...], machine: str) -> list[st
         The configuration does not fit; nothing was changed.
     """
     file, data = Path(path), read_bytes(path)
-    clean = _without_ours(file, data)
+    clean = _without_filter(file, data)
     changed = _with_lines(file, clean, _value(command, machine))
     if changed == data:
         return [f"{path}: the filter is installed already; nothing was changed"]
@@ -92,9 +92,9 @@ def install_filter(path: str, command: tuple[str, ...], machine: str) -> list[st
             Place(path),
         )
     _check_writable(file)
-    backup = Path(f"{path}{BACKUP}")
-    _write(backup, data)
-    _write(file, changed)
+    backup = backup_of(file, FILTER, data, partial(without_all, file))
+    keep(backup, data)
+    write(file, changed)
     return [
         f"{path}: lines of [FILTER] added; it was kept as {backup.name}",
         f"start LinuxCNC anew; programs that end in {', '.join('.' + e for e in ENDINGS)} are then "
@@ -112,19 +112,13 @@ def remove_filter(path: str) -> list[str]:
         What was done.
     """
     file, data = Path(path), read_bytes(path)
-    clean = _without_ours(file, data)
+    clean = _without_filter(file, data)
     if clean == data:
         return [f"{path}: no filter of gcodejerk is installed"]
     _check_writable(file)
-    _write(file, clean)
+    write(file, clean)
     done = [f"{path}: the lines of [FILTER] were taken out"]
-    backup = Path(f"{path}{BACKUP}")
-    if backup.is_file() and backup.read_bytes() == clean:
-        backup.unlink()
-        done.append(f"{backup}: removed, the INI is that again byte for byte")
-    elif backup.is_file():
-        done.append(f"{backup}: kept, the INI was edited since")
-    return done
+    return done + drop_backups(file, clean, FILTER, partial(without_all, file))
 
 
 def _value(command: tuple[str, ...], machine: str) -> str:
@@ -221,14 +215,19 @@ def _put(data: bytes, line: int, entries: list[str]) -> bytes:
     return b"".join([*lines[:line], block, *lines[line:]])
 
 
-def _without_ours(file: Path, data: bytes) -> bytes:
+def without_all(file: Path, data: bytes) -> bytes:
+    """The bytes without lines of gcodejerk of either kind."""
+    return _without_filter(file, without_lines(data))
+
+
+def _without_filter(file: Path, data: bytes) -> bytes:
     """The bytes without our lines; refused where somebody has edited them."""
     for block in (*_BLOCK.finditer(data), *_UNENDED.finditer(data)):
         for text in block[1].splitlines():
             if not _OWN_LINE.fullmatch(text.strip()):
                 raise EmitError(
                     f"a line between the marks of gcodejerk was edited: {text.decode('latin-1')}",
-                    f"put it back as it was, or take the lines out by hand (backup: *{BACKUP})",
+                    f"put it back as it was, or take the lines out by hand (backup: *{FILTER})",
                     Place(str(file), data[: data.find(text, block.start())].count(b"\n") + 1),
                 )
     out = _BLOCK.sub(b"", _UNENDED.sub(b"", data))
@@ -250,9 +249,3 @@ def _check_writable(file: Path) -> None:
                 f"{place} cannot be written to",
                 "copy the configuration to a folder of yours, and name the .ini file there",
             )
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file in one move."""
-    with new_file(str(path), like=str(path) if path.exists() else None) as file:
-        file.write(data)

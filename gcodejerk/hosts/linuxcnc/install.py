@@ -16,11 +16,13 @@ import re
 import shutil
 import subprocess
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from gcodejerk.batch.files import new_file
 from gcodejerk.errors import EmitError, Place
 from gcodejerk.hosts.linuxcnc import hal_files
+from gcodejerk.hosts.linuxcnc.backups import HAL, backup_of, drop_backups, keep, write
+from gcodejerk.hosts.linuxcnc.filter_lines import without_all
 from gcodejerk.hosts.linuxcnc.hal_commands import Hal, read_hal
 from gcodejerk.hosts.linuxcnc.ini import (
     Ini,
@@ -32,7 +34,6 @@ from gcodejerk.hosts.linuxcnc.ini import (
 )
 
 HAL_FILE = "gcodejerk.hal"
-BACKUP = ".before-gcodejerk"
 MEASURED = "2.9"
 """The version of LinuxCNC in which all this was played."""
 _OWN = re.compile(rb"# gcodejerk install ([a-z-]+) sum:([0-9a-f]{16})\n")
@@ -96,14 +97,15 @@ def install(path: str, form: str, version: str | None = None) -> list[str]:
             raise EmitError(
                 f"{file} exists and is not what would be written", "rename or remove it first"
             )
-    backup = Path(f"{ini.path}{BACKUP}")
+    backup = backup_of(ini.path, HAL, ini.data, partial(without_all, ini.path))
     done = [f"{own}: written, the HAL of the form {form}"]
-    _write(own, change.hal)
+    write(own, change.hal)
     if change.script is not None:
-        _write(change.script_path, change.script, mode=0o755)
+        write(change.script_path, change.script)
+        os.chmod(change.script_path, 0o755)
         done.append(f"{change.script_path}: written, the M code M152")
-    _write(backup, ini.data)
-    _write(ini.path, change.ini)
+    keep(backup, ini.data)
+    write(ini.path, change.ini)
     use = f"process programs with --controller linuxcnc-hal --as {form}"
     if form == hal_files.GUARD:
         use = "say controller_options: {override_guard: true} in the machine file, and process "
@@ -143,14 +145,14 @@ def remove(path: str) -> list[str]:
         if keys not in (["HALFILE"], ["HALUI", "HALFILE"], ["USER_M_PATH"]):
             raise EmitError(
                 f"the lines between the marks of gcodejerk were edited: {lines}",
-                f"put them back as they were, or take them out by hand (backup: *{BACKUP})",
+                f"put them back as they were, or take them out by hand (backup: *{HAL})",
                 ini.place(),
             )
     for place in (ini.path, ini.folder):
         if not is_writable(place):
             raise EmitError(f"{place} cannot be written to", "change its permissions")
     script = _script_path(parse_ini(ini.path, clean))
-    _write(ini.path, clean)
+    write(ini.path, clean)
     done = [f"{ini.path}: the marked lines were taken out"]
     others = [other for other in sorted(ini.folder.glob("*.ini")) if _names_ours(other)]
     if others:
@@ -160,13 +162,7 @@ def remove(path: str) -> list[str]:
     if script.is_file() and script.read_bytes() == _script():
         script.unlink()
         done.append(f"{script}: removed")
-    backup = Path(f"{ini.path}{BACKUP}")
-    if backup.is_file() and backup.read_bytes() == clean:
-        backup.unlink()
-        done.append(f"{backup}: removed, the INI is that again byte for byte")
-    elif backup.is_file():
-        done.append(f"{backup}: kept, the INI was edited since")
-    return done
+    return done + drop_backups(ini.path, clean, HAL, partial(without_all, ini.path))
 
 
 def _names_ours(path: Path) -> bool:
@@ -245,10 +241,26 @@ def _check_version(version: str | None) -> None:
         )
 
 
+def _check_motion(ini: Ini) -> None:
+    """Refuse another motion module than motmod, and arguments that stand in the INI."""
+    found = ini.all("EMCMOT", "EMCMOT")
+    words = found[0].value.split() if found else []
+    if words == ["motmod"]:
+        return
+    place = ini.place(found[0].line if found else None)
+    if words[:1] == ["motmod"]:
+        raise EmitError(
+            f"[EMCMOT] EMCMOT gives motmod arguments: {' '.join(words[1:])}",
+            "give them behind `loadrt [EMCMOT]EMCMOT` in the HAL file, where they are read",
+            place,
+        )
+    named = words[0] if words else "missing"
+    raise EmitError(f"[EMCMOT] EMCMOT is {named}, not motmod", "only motmod was played", place)
+
+
 def _change(ini: Ini, form: str) -> Change:
     """What would be written into a configuration without ours."""
-    if ini.value("EMCMOT", "EMCMOT") != "motmod":
-        raise EmitError("[EMCMOT] EMCMOT is not motmod", "only motmod was played", ini.place())
+    _check_motion(ini)
     hal = read_hal(ini, HAL_FILE)
     _check_hal(ini, hal, form)
     script_path = _script_path(ini)
@@ -440,11 +452,3 @@ def _script_path(ini: Ini) -> Path:
 
 def _sum(data: bytes) -> bytes:
     return hashlib.blake2b(data, digest_size=8).hexdigest().encode()
-
-
-def _write(path: Path, data: bytes, mode: int | None = None) -> None:
-    """Write a file in one move."""
-    with new_file(str(path), like=str(path) if path.exists() else None) as file:
-        file.write(data)
-    if mode is not None:
-        os.chmod(path, mode)

@@ -127,7 +127,7 @@ def _framed(move: Move, i: int, file: RowsFile, rapids: Rapids, found: Findings)
         return None
     if not _timed(move, steps, complain):
         return None
-    near = 1e-4 * step + 1e-12 * np.abs(end) + 1e-13
+    near = 1e-4 * step + 1e-12 * np.maximum(np.abs(begin), np.abs(end)) + 1e-13
     for what, kind, row, wanted, told in (
         ("begins", Kind.START, 0, begin, start),
         ("ends", Kind.END, -1, end, target),
