@@ -24,7 +24,7 @@ from gcodejerk.planning.solution_cache import cache_folder
 DIGEST = 16
 """BLAKE2b. [bytes]"""
 MOST = 1 << 16
-"""Copies that are remembered; the older half is forgotten at the next one: 2 MB at most."""
+"""Lines of the file; beyond them the older half of the copies is forgotten: 2 MB at most."""
 
 
 def remember_copy(path: str) -> None:
@@ -34,19 +34,18 @@ def remember_copy(path: str) -> None:
         return
     with contextlib.suppress(OSError, GcodejerkError):
         line = _digest(path) + b"\n"
-        known = _known(place)
-        if line in known:
-            return
         place.parent.mkdir(parents=True, exist_ok=True)
-        if len(known) >= MOST:
-            with new_file(str(place)) as file:
-                file.write(b"".join(known[MOST // 2 :]))
         # One write at the end of the file: several runs may do so at a time.
-        file_number = os.open(place, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        number = os.open(place, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
         try:
-            os.write(file_number, line)
+            os.write(number, line)
+            full = os.fstat(number).st_size > MOST * len(line)
         finally:
-            os.close(file_number)
+            os.close(number)
+        if full:
+            latest = [*dict.fromkeys(reversed(_known(place)))][: MOST // 2]
+            with new_file(str(place), like=str(place)) as file:
+                file.write(b"".join(reversed(latest)))
 
 
 def is_copy(path: str) -> bool:

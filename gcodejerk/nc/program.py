@@ -198,7 +198,8 @@ def open_reader(
         reader = FollowingReader(name, chosen, start, None, Elsewhere())
     elif not refers(chosen):
         reader = Reader(name, chosen, start)
-        if chosen.text.o_word == "flow":
+        # A stream without an end is not kept; what is rewritten is a file.
+        if chosen.text.o_word == "flow" and (file.seekable() or start.positions or start.startup):
             file = seekable(file)
             if begins_again(file, name, chosen):
                 reader.forget_start(None, left_on(file, chosen, name))

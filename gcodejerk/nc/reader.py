@@ -330,6 +330,7 @@ class Reader:
     def _finish_log(self) -> None:
         """Say what only the whole program tells."""
         log = self.log
+        log.stops |= self.flow.leads_elsewhere
         log.dark = darkness(self.dialect, self._spindle, log.habits, log.outputs)
 
     def findings(self, rapids: Rapids) -> tuple[Finding, ...]:

@@ -61,12 +61,15 @@ def test_without_a_place_to_remember_everything_works(command, tmp_path, monkeyp
         assert process(command)[0] == 1
 
 
-def test_what_was_remembered_first_is_forgotten_first(tmp_path, monkeypatch):
+def test_what_was_remembered_first_is_forgotten_first(tmp_path, monkeypatch, cache):
     monkeypatch.setattr(copies, "MOST", 4)
-    names = [str(tmp_path / f"{k}.nc") for k in range(5)]
+    names = [str(tmp_path / f"{k}.nc") for k in range(4)]
     for name in names:
         (tmp_path / name).write_bytes(b"G1 X1\n")
-        for _ in range(2):  # known already: once is enough
-            remember_copy(name)
-    assert [is_copy(name) for name in names] == [False, False, True, True, True]
+    for k in (0, 1, 0, 2):
+        remember_copy(names[k])
+    assert [is_copy(name) for name in names] == [True, True, True, False]
+    remember_copy(names[3])
+    assert [is_copy(name) for name in names] == [False, False, True, True]
     assert not is_copy(str(tmp_path / "nothing.nc"))
+    assert len((cache / "copies-1.txt").read_bytes().splitlines()) == 2

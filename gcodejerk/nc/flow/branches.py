@@ -25,6 +25,8 @@ class Flow:
         self._standing: Counter[tuple[str, str]] = Counter()
         """How often each is in the stack, which may be as deep as the file is long."""
         self._program_number = False
+        self.leads_elsewhere = False
+        """A program was called that is not followed."""
 
     @property
     def inside(self) -> bool:
@@ -64,6 +66,7 @@ class Flow:
             return self._close(state, keyword[3:], name)
         if keyword not in _INNER or self._before is None:
             # a call, a return from the main program, or something that we do not know
+            self.leads_elsewhere = True
             state.forget()
             return state
         state.forget()

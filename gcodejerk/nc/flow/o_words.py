@@ -357,6 +357,7 @@ class Passes:
         name = plain_name(node.line.block.o_name)
         sub = None if name is None else self._sub(name)
         if sub is None:
+            self.runner.log.stops = True
             self.lose()
             self._uncertain()
             state.forget()

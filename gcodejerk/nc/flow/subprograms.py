@@ -63,6 +63,7 @@ class Calls:
         body = None if found is None else self._body(found[0])
         if found is None or body is None or self._depth >= MOST_CALLS or self._lost_way(call, body):
             self.lose()
+            runner.log.stops = True
             runner.log.feed_event(USES_FEED)
             runner.state.forget()
             runner.executor.lengths.clear()

@@ -84,13 +84,6 @@ def barred(state: State) -> Reason | None:
     return Reason.LIMIT_SET if any(map(math.isnan, state.path_limits.values())) else None
 
 
-def path_unknown(state: State, dialect: Dialect) -> bool:
-    """Whether points could end in exact stops: what has not been followed may have left G61."""
-    if dialect.path_has_to_be_stated:
-        return not state.path
-    return state.path is None and "path" in dialect.groups.values()
-
-
 @dataclass(frozen=True, slots=True)
 class Call:
     """``M98 P1000 L3``."""
@@ -265,7 +258,7 @@ def _check_known_move(
     """Find what forbids to replace a move of which both ends are known."""
     if dialect.lengths_only and state.feed_unit != state.unit:
         return Reason.FEED_UNIT
-    if path_unknown(state, dialect):
+    if dialect.path_has_to_be_stated and not state.path:
         return Reason.PATH_UNKNOWN
     if step.way_unknown:
         return Reason.ROTARY_WAY

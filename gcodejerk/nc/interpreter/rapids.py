@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.interpreter.visits import Row, Visits
+from gcodejerk.nc.interpreter.visits import LOST_PATH, Row, Visits
 from gcodejerk.nc.text.block import ELSEWHERE
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.storage import Growing, alike, kept
@@ -120,9 +120,15 @@ def _column(rows: list[Row], name: str, dtype: type) -> NDArray[Any]:
 
 
 class RapidLog:
-    """Collects rapids in the order of the file."""
+    """Collects rapids in the order of the file.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    stoppable : bool
+        A path mode that something may have changed may be an exact stop.
+    """
+
+    def __init__(self, stoppable: bool = False) -> None:
         self._parts = {
             name: Growing(dtype, width, once=name not in DIFFER)
             for name, (dtype, width) in _TYPES.items()
@@ -133,6 +139,9 @@ class RapidLog:
         self.habits = self.outputs = False
         """Blocks were seen that do what `beams` looks for."""
         self.dark = ""
+        self.stops = False
+        """The program has exact stops (G61), or runs others that may."""
+        self.stoppable = stoppable
         """See `beams.Dark`."""
         self.visits = Visits()
         """Rapids of lines that may run more than once."""
@@ -230,6 +239,11 @@ class RapidLog:
         unknown = (mode == 0) | ((mode != 93) & columns["feed_needed"] & np.isnan(feed))
         reason = columns["reason"]
         reason[(reason == CERTAIN) & unknown] = FEED_UNKNOWN
+        lost = columns["path"] == LOST_PATH
+        if lost.any():
+            columns["path"] = np.where(lost, np.uint8(0), columns["path"])
+            stops = self.stops and self.stoppable
+            reason[(reason == CERTAIN) & lost & stops] = _INDEX[Reason.PATH_UNKNOWN]
         if self.dark:
             burns = columns["beam"] | (self.dark == "always")
             reason[(reason == CERTAIN) & burns] = _INDEX[Reason.BEAM]

@@ -16,7 +16,7 @@ from gcodejerk.nc.interpreter.execute import Executor
 from gcodejerk.nc.interpreter.initial import initial_state
 from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
-from gcodejerk.nc.interpreter.visits import Row
+from gcodejerk.nc.interpreter.visits import EXACT, Row
 from gcodejerk.nc.text.block import Line
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
@@ -41,7 +41,8 @@ class Runner:
     def __init__(self, name: str, dialect: Dialect, start: Start) -> None:
         self.name = name
         self.dialect = dialect
-        self.log = RapidLog()
+        stoppable = "path" in dialect.groups.values() and not dialect.path_has_to_be_stated
+        self.log = RapidLog(stoppable=stoppable)
         state = initial_state(dialect, start)
         self.executor = Executor(dialect, state, start)
         self.syntax_problems: list[Finding] = []
@@ -105,6 +106,7 @@ class Runner:
         self.log.outputs |= step.outputs
         if step.limits and self.limited is None:
             self.limited = line
+        self.log.stops |= step.leaves or executor.state.path in EXACT
         if step.leaves:
             self.left()
         if step.rapid:
@@ -183,6 +185,7 @@ class Runner:
         for line in lines:
             if line.number not in self.log.visits.rows and line.block.o_word is None:
                 step = self.executor.run(line.block)
+                self.log.stops |= step.leaves or self.state.path in EXACT
                 if step.rapid:
                     self._rapid(step, line, uncertain=True, visit=False)
         self.state, self.executor.lengths = kept, lengths

@@ -18,7 +18,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LEFT_OVER, LINEAR, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G40, G90, G91
 from gcodejerk.nc.interpreter.arcs import doubtful
-from gcodejerk.nc.interpreter.eligibility import barred, path_unknown
+from gcodejerk.nc.interpreter.eligibility import barred
 from gcodejerk.nc.interpreter.limits import beyond_path
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.rapids import FEED_UNKNOWN, GIVES_FEED, USES_FEED, RapidLog
@@ -354,7 +354,7 @@ def reasons(
         reason[(linear != 0) & (moving != linear)] = _INDEX[Reason.MIXED_AXES]
     if dialect.extrudes and not dialect.uses:
         reason[letters & BIT["E"] != 0] = _INDEX[Reason.OTHER_WORDS]
-    if path_unknown(state, dialect):
+    if dialect.path_has_to_be_stated and not state.path:
         reason[:] = _INDEX[Reason.PATH_UNKNOWN]
     if dialect.lengths_only and state.feed_unit != state.unit:
         reason[:] = _INDEX[Reason.FEED_UNIT]

@@ -19,6 +19,8 @@ from gcodejerk.reasons import CERTAIN, REASONS, Reason
 
 EXACT = (61, 62)
 """Path modes (G61, G61.1) in which no motion blends with the next."""
+LOST_PATH = 255
+"""In the place of a path mode: something may have changed it (`rapids.RapidLog.stops`)."""
 SUBPROGRAM = REASONS.index(Reason.SUBPROGRAM)
 NEAR = 1e-9
 """Sums of increments differ in their last digits from pass to pass. [mm, deg]"""
@@ -62,7 +64,7 @@ class ModeColumns:
             distance_stated=state.distance_stated,
             feed_mode=state.feed_mode or 0,
             feed_mode_stated=state.feed_mode_stated,
-            path=state.path or 0,
+            path=LOST_PATH if state.path is None else state.path,
             path_p=state.path_p,
             path_q=state.path_q,
             lone=state.path not in EXACT,

@@ -42,6 +42,7 @@ class Codes(Known):
     def unknown_call(self) -> None:
         """Whatever a program does that is not followed."""
         self.stray()
+        self.exact = self.exact or "path" in self.dialect.groups.values()
         if self.dialect.diameter_codes:
             self.diameter = None
 
@@ -257,6 +258,7 @@ class Codes(Known):
             self._units(g["units"], beside_feed="F" in values)
         if "path" in g:
             self.path = dialect.paths.get(g["path"])
+            self.exact = self.exact or self.path in (61, 62)
             self.p = values.get("P", NAN) if g["path"] == G64 else NAN
             self.q = values.get("Q", NAN) if g["path"] == G64 else NAN
 

@@ -29,7 +29,7 @@ KINDS = {
     "slow": "least",
     **dict.fromkeys(("feed", "level", "r"), "number"),
     **dict.fromkeys(("p", "q"), "tolerance"),
-    **dict.fromkeys(("doubt", "turns", "habits", "strayed", "rewritten"), "ever"),
+    **dict.fromkeys(("doubt", "turns", "habits", "strayed", "rewritten", "exact"), "ever"),
     **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter"), "mode"),
     **dict.fromkeys(("selected", "told", "added"), "mode"),
     **dict.fromkeys(("cycle", "modal", "feed_whole", "spindle"), "mode"),
@@ -101,6 +101,8 @@ class Known:
         self.feed_mode: int | None = self.mode_of(modes.get("feed mode"))
         self.path: int | None = dialect.paths.get(modes.get("path", -1), 0)
         self.p = self.q = self.feed = NAN
+        self.exact = False
+        """G61 was seen, or a program has run that is not followed."""
         self.feed_whole: bool | None = False
         self.unit: float | None = None
         if "units" in modes:
@@ -417,7 +419,7 @@ class Known:
         """Whether G61 may be in force: it has to be denied, or something may have left it."""
         if self.dialect.path_has_to_be_stated:
             return not self.path
-        return self.path is None and "path" in self.dialect.groups.values()
+        return self.path is None and self.exact
 
     def in_plane(self) -> str:
         """Axes that cutter compensation may displace; nothing here knows Heidenhain's G20."""
