@@ -121,6 +121,9 @@ def _walk(root: str, passed_over: str | None) -> tuple[list[Input], list[Program
                     folders.append(name)
             elif is_program(entry.name) and os.path.isfile(path):
                 found.append(Input(path, name))
+            elif is_program(entry.name) and entry.is_symlink() and not os.path.exists(path):
+                problem = "is a link that leads nowhere"
+                problems.append(ProgramError(f"{path} {problem}", "mend it, or remove it"))
         waiting += reversed(folders)
     return found, problems
 

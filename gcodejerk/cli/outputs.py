@@ -86,6 +86,11 @@ class Outputs:
             raise typer.BadParameter(
                 "--in-place: this controller's streams are a file of their own"
             )
+        if mode == "diff" and not emitter.in_place:
+            raise typer.BadParameter(
+                f"--diff shows what changes in the program: controller {emitter.name} writes "
+                "a file of its own"
+            )
         outputs = [self._output(program, suffix) for program in found]
         if self.report == STANDARD and mode == "write" and STANDARD in outputs:
             raise typer.BadParameter(

@@ -128,6 +128,10 @@ def process(
     outputs = Outputs(output, output_dir, in_place, report, backup, if_changed, called)
     outputs.check(files, told=diff or as_json)
     if revert:
+        _refuse_beside_revert(
+            check=check, diff=diff, strict=strict, json=as_json, in_place=in_place, backup=backup,
+            if_changed=if_changed, output=output, output_dir=output_dir, report=report,
+        )  # fmt: skip
         _revert(files)
         return
     found, problems = find_inputs(files, output_dir)
@@ -163,6 +167,14 @@ def process(
         raise typer.Exit(1)
     if check and tally.changed:
         raise typer.Exit(WOULD_CHANGE)
+
+
+def _refuse_beside_revert(**given: object) -> None:
+    """Refuse options that say what becomes of an output: originals are put back, no more."""
+    for name, value in given.items():
+        if value:
+            option = "-o" if name == "output" else f"--{name.replace('_', '-')}"
+            raise typer.BadParameter(f"--revert puts originals back: no {option} beside it")
 
 
 def _revert(files: list[str]) -> None:

@@ -6,6 +6,7 @@ shown. Nothing here was run in its host: each text says so.
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,7 +101,11 @@ def text_lines(host: str, where: str | None, command: tuple[str, ...], machine: 
     if where is None:
         return [*body.rstrip("\n").split("\n"), "", f"file: {text.file}; what to do:", *steps]
     done = put(_folder(where) / text.file, signed(host, body, text.comment))
-    return [done, *steps, f"`gcodejerk install {host} {where} --remove` takes it out again"]
+    return [
+        done,
+        *steps,
+        f"`gcodejerk install {host} {shlex.quote(where)} --remove` takes it out again",
+    ]
 
 
 def remove_text(host: str, where: str) -> list[str]:

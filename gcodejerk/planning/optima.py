@@ -44,7 +44,7 @@ ARRIVED = 1e-9
 """Error of the end, for the unit length."""
 FEW = 16
 """Fewer problems than this are solved in this process."""
-GENERATION = 8
+GENERATION = 9
 """Counted on whenever the solver answers otherwise: answers of before are not taken."""
 NONE = b"none"
 """In the cache: the problem has no solution."""
@@ -281,7 +281,8 @@ def _holding(optima: list[Optimum], moves: list[Move]) -> NDArray[np.bool_]:
     profiles = optimum_profiles([optima[k] for k in rows], interval)
     V = np.array([moves[k].velocity for k in rows])
     A = np.array([moves[k].acceleration for k in rows])
-    J = np.minimum([moves[k].jerk for k in rows], A / interval)
+    # From one limit of the acceleration to the other within an interval.
+    J = np.minimum([moves[k].jerk for k in rows], 2.0 * A / interval)
     last = profiles.first[1:] - 1
     d, j = profiles.duration[last], profiles.jerk[last]
     a, v, s = profiles.acceleration[last], profiles.velocity[last], profiles.position[last]

@@ -47,6 +47,10 @@ MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
 
 
+GIVEN_T1 = "condition3"
+"""The profile whose T1 may be given."""
+
+
 def plan_moves(
     displacement: Array,
     machine: Machine,
@@ -100,7 +104,12 @@ def plan_moves(
     PlanError
         The profile is unknown, or `time` or `T1` is not possible within the limits.
     """
-    profile = profile or machine.design.profile
+    if T1 is not None and profile not in (None, GIVEN_T1):
+        raise PlanError(
+            f"a T1 makes a profile of four segments, {GIVEN_T1}, and no {profile}",
+            "leave out T1, or the profile",
+        )
+    profile = profile or (machine.design.profile if T1 is None else GIVEN_T1)
     if profile not in PROFILES:
         raise PlanError(
             f"there is no profile {profile!r}",

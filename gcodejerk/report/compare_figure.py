@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from gcodejerk.report import compare_lanes as lanes
 from gcodejerk.report import compare_spectra as spectra
 from gcodejerk.report.compare_shown import OTHERS, TEXT, UM, UNIT, Shown
-from gcodejerk.report.figures import new_figure, save
+from gcodejerk.report.figures import new_figure, save, shown_name
 from gcodejerk.studies.comparison import Comparison
 
 if TYPE_CHECKING:
@@ -119,7 +119,8 @@ def draw_comparison(figure: Figure, shown: Shown) -> None:
     )  # fmt: skip
     tolerance = UM * shown.comparison.machine.design.tolerance
     figure.suptitle(
-        f"{shown.moved} — {shown.comparison.machine.name}; settled: below {tolerance:g} {UNIT}",
+        f"{shown.moved} — {shown_name(shown.comparison.machine.name, 50)}; "
+        f"settled: below {tolerance:g} {UNIT}",
         fontsize=TEXT + 0.5,
     )
     # Once more for what depends on where the first time put it.

@@ -21,6 +21,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.report.compare_shown import MS, TEXT, UM, UNIT, Shown
+from gcodejerk.report.figures import shown_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -195,7 +196,10 @@ def name_modes(axes: Axes, shown: Shown) -> None:
     width = axes.bbox.width / pixel
     low, high = np.log(axes.get_xlim())
     centres = np.array([(np.log(m.frequency) - low) / (high - low) * width for m in modes])
-    full = [m.name if m.name.endswith("Hz") else f"{m.name} {m.frequency:g} Hz" for m in modes]
+    full = [
+        shown_name(m.name) if m.name.endswith("Hz") else f"{shown_name(m.name)} {m.frequency:g} Hz"
+        for m in modes
+    ]
     for words in (
         full,
         [f"{m.frequency:g} Hz" for m in modes],

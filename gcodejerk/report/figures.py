@@ -6,12 +6,14 @@ the error names the remedy.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import EmitError
+from gcodejerk.machine import Machine
 from gcodejerk.motion import sample_profiles
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.planning.move import Plan
@@ -25,6 +27,8 @@ TODAY, PLANNED = "#c44e52", "#1f5fa8"
 """Colours that differ in print and for colour-blind eyes."""
 HATCH = 0.6
 """Width of the lines of hatches. [pt]"""
+LONGEST_NAME = 80
+"""Letters of a name that the page has room for."""
 FINE = 8
 """Points of a curve for each interval."""
 PERIODS = 4.0
@@ -86,6 +90,20 @@ def save(figure: Figure, file: BinaryIO, suffix: str) -> None:
         figure.savefig(file, format=suffix.lower().removeprefix("."), dpi="figure")
 
 
+def shown_name(name: str, most: int = LONGEST_NAME) -> str:
+    """A name of the user's for a picture: no longer than there is room, and no mathematics."""
+    short = name if len(name) <= most else f"{name[: most - 1].rstrip()}…"
+    return short.replace("$", r"\$")
+
+
+def moved_words(displacement: Mapping[str, float], machine: Machine) -> str:
+    """What moves, and how far: ``X 100 mm, B 90 deg``."""
+    return ", ".join(
+        f"{axis} {length:g} {'deg' if machine.axis(axis).rotary else 'mm'}"
+        for axis, length in displacement.items()
+    )
+
+
 def label_part(axes: Axes, title: str, x: str, y: str) -> None:
     """Give a part of a page its title and units, a light grid, and no box."""
     axes.set_title(title, fontsize=8.5, loc="left")
@@ -119,10 +137,14 @@ def plot_move(plan: Plan, file: BinaryIO, suffix: str) -> None:
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
     for curve in shown:
         curve.draw(upper, middle, lower)
-    moved = ", ".join(f"{axis} {length:g} mm" for axis, length in plan.displacement.items())
-    figure.suptitle(f"{moved} in {plan.time * 1e3:g} ms on {plan.machine.name}", fontsize=11)
-    upper.set_ylabel("acceleration [mm/s²]")
-    middle.set_ylabel("velocity [mm/s]")
+    unit = "deg" if all(plan.machine.axis(axis).rotary for axis in plan.displacement) else "mm"
+    figure.suptitle(
+        f"{moved_words(plan.displacement, plan.machine)} in {plan.time * 1e3:g} ms\n"
+        f"{shown_name(plan.machine.name)}",
+        fontsize=11,
+    )
+    upper.set_ylabel(f"acceleration [{unit}/s²]")
+    middle.set_ylabel(f"velocity [{unit}/s]")
     lower.set_ylabel("vibration of the tool [µm]")
     lower.set_xlabel("time [ms]")
     for axes in (upper, middle, lower):

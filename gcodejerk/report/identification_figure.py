@@ -13,7 +13,7 @@ import numpy as np
 
 from gcodejerk.identification import Decay, Identification, Peaks, Record
 from gcodejerk.motion.profiles.profile import Array
-from gcodejerk.report.figures import PLANNED, TODAY, label_part, new_figure, save
+from gcodejerk.report.figures import PLANNED, TODAY, label_part, new_figure, save, shown_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +72,7 @@ def plot_identification(
         _spectrum(parts["spectrum"], record, c, decay, found, band)
     held = len(found.held)
     modes = f"{held or 'no'} mode{'' if held == 1 else 's'} of {found.axis} identified"
-    figure.suptitle(f"{Path(record.name).name}: {modes}", fontsize=10)
+    figure.suptitle(f"{shown_name(Path(record.name).name)}: {modes}", fontsize=10)
     save(figure, file, suffix)
 
 
@@ -246,7 +246,9 @@ def plot_peaks(
         inside = (f >= band[0]) & (f <= band[1])
         for name, values in zip(one.spectrum.channels, one.spectrum.values, strict=True):
             if len(one.spectrum.channels) > 1:
-                axes.plot(f[inside], values[inside], linewidth=0.8, label=name, alpha=0.75)
+                axes.plot(
+                    f[inside], values[inside], linewidth=0.8, label=shown_name(name), alpha=0.75
+                )
         axes.plot(f[inside], one.total[inside], color=PLANNED, linewidth=1.4, label="together")
         for peak in one.peaks:
             k = int(np.argmin(np.abs(f - peak.frequency)))
@@ -259,5 +261,7 @@ def plot_peaks(
         axes.legend(frameon=False, fontsize=7.5)
         axes.ticklabel_format(axis="y", style="plain")
         axes.set_yticks([])
-        label_part(axes, Path(one.spectrum.name).name, "frequency [Hz]", "power density")
+        label_part(
+            axes, shown_name(Path(one.spectrum.name).name), "frequency [Hz]", "power density"
+        )
     save(figure, file, suffix)

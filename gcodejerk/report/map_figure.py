@@ -7,11 +7,10 @@ This module owns the page: size, title, colour bar and legend. What stands in a 
 from __future__ import annotations
 
 from dataclasses import replace
-from textwrap import shorten
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from gcodejerk.motion.profiles.conditions import Condition
-from gcodejerk.report.figures import new_figure, save
+from gcodejerk.report.figures import new_figure, save, shown_name
 from gcodejerk.report.map_panel import (
     MS,
     T_SUM,
@@ -32,10 +31,6 @@ POINTS = 700
 """Of each axis of a picture."""
 ONE, THREE = (7.4, 6.0), (10.8, 5.2)
 """Width and height of a map and of three. [inch]"""
-
-
-LINE = 80
-"""Letters of a machine's name that a title has room for."""
 
 
 def plot_map(
@@ -105,7 +100,7 @@ def draw_map(
     _colour_bar(figure, survey, image, axes, 0.04)
     axes.set_title(
         f"{_moved(survey)}, Condition {survey.condition}, {_judged(survey)}\n"
-        f"{shorten(survey.machine.name, LINE, placeholder=' …')}",
+        f"{shown_name(survey.machine.name)}",
         fontsize=10.5, loc="left",
     )  # fmt: skip
     entries = dict(panel.entries)
@@ -140,7 +135,7 @@ def draw_conditions(
     _colour_bar(figure, survey, image, list(every), 0.012)
     figure.suptitle(
         f"{_moved(survey)}, {_judged(survey)}; {_shortest_segment(survey)} — "
-        f"{shorten(survey.machine.name, LINE, placeholder=' …')}",
+        f"{shown_name(survey.machine.name)}",
         fontsize=10.5,
         wrap=True,
     )
@@ -202,4 +197,4 @@ def _judged(survey: Survey) -> str:
         return f"all {len(survey.modes)} modes that {survey.axis.name} excites"
     if mode.name == f"{mode.frequency:g} Hz":
         return f"mode of {mode.frequency:g} Hz, damping {mode.damping:g}"
-    return f"mode {mode.name}, {mode.frequency:g} Hz, damping {mode.damping:g}"
+    return f"mode {shown_name(mode.name, 40)}, {mode.frequency:g} Hz, damping {mode.damping:g}"

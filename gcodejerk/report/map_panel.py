@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.machine import Mode
+from gcodejerk.report.figures import shown_name
 from gcodejerk.studies.amplitude_map import Chosen, Survey
 
 if TYPE_CHECKING:
@@ -214,7 +215,7 @@ class MapPanel:
                     zorder=3 if first else 2.5, **style,
                 )  # fmt: skip
             own = mode.name == f"{mode.frequency:g} Hz"
-            named = mode.name if own else f"{mode.name}, {mode.frequency:g} Hz"
+            named = mode.name if own else f"{shown_name(mode.name, 24)}, {mode.frequency:g} Hz"
             # On the colour that it has in the map, where white is seen.
             patch = Patch(facecolor=DARK, edgecolor="none")
             self.entries[f"null of {named} (without damping)"] = (patch, line)

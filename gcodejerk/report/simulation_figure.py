@@ -11,7 +11,15 @@ import numpy as np
 
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Program
-from gcodejerk.report.figures import PLANNED, TODAY, label_part, new_figure, save
+from gcodejerk.report.figures import (
+    PLANNED,
+    TODAY,
+    label_part,
+    moved_words,
+    new_figure,
+    save,
+    shown_name,
+)
 from gcodejerk.simulation.programs import Simulation
 from gcodejerk.simulation.single import MoveSimulation
 
@@ -51,6 +59,8 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
     times = found.times()
     axis = max(found.moving, key=lambda name: abs(found.plan.displacement[name]))
     u = found.watch.equations.axes.index(axis)
+    rotary = found.machine.axis(axis).rotary
+    unit, thousandth = ("deg", "deg/1000") if rotary else ("mm", "µm")
     parts = figure.subplots(3, 2)
     command, lag, tool = parts[:, 0]
     told, left, machine = parts[:, 1]
@@ -69,11 +79,11 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
         told.semilogx(frequency, found.table_spectrum(way, frequency, axis), **thin)
         left.loglog(frequency, UM * found.tool_spectrum(way, frequency), **style)
     _machine(machine, found, frequency, axis)
-    label_part(command, f"(a) acceleration told to {axis}", "time [ms]", "[mm/s²]")
+    label_part(command, f"(a) acceleration told to {axis}", "time [ms]", f"[{unit}/s²]")
     label_part(
-        told, "(b) its spectrum; thin: what the table makes of it", "frequency [Hz]", "[mm/s]"
+        told, "(b) its spectrum; thin: what the table makes of it", "frequency [Hz]", f"[{unit}/s]"
     )
-    label_part(lag, f"(c) lag of {axis}'s table", "time [ms]", "[µm]")
+    label_part(lag, f"(c) lag of {axis}'s table", "time [ms]", f"[{thousandth}]")
     label_part(left, "(d) spectrum of the tool behind the move", "frequency [Hz]", "[µm s]")
     label_part(tool, "(e) tool from its place, behind the move", "time [ms]", "[µm]")
     density = left.get_ylim()[1]
@@ -83,8 +93,11 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
     for axes in (command, lag, tool):
         axes.axvline(MS * found.steps["planned"].end, color="0.6", linewidth=0.8, linestyle=":")
         axes.set_xlim(0.0, MS * times[-1])
-    moved = ", ".join(f"{name} {length:g} mm" for name, length in found.plan.displacement.items())
-    figure.suptitle(f"{moved} on {found.machine.name}, simulated", fontsize=10)
+    figure.suptitle(
+        f"{moved_words(found.plan.displacement, found.machine)}, simulated\n"
+        f"{shown_name(found.machine.name)}",
+        fontsize=10,
+    )
     handles, labels = command.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
     save(figure, file, suffix)
@@ -118,8 +131,9 @@ def _machine(axes: Axes, found: MoveSimulation, frequency: Array, axis: str) -> 
         )  # fmt: skip
     low, high = axes.get_ylim()
     axes.set_ylim(low, high * 2.0)
+    unit = "deg" if found.machine.axis(axis).rotary else "mm"
     of = f"force to tool, along {axis}" if force else f"acceleration told to {axis}, to tool"
-    label_part(axes, f"(f) {of}", "frequency [Hz]", "[µm/N]" if force else "[µm/(mm/s²)]")
+    label_part(axes, f"(f) {of}", "frequency [Hz]", "[µm/N]" if force else f"[µm/({unit}/s²)]")
 
 
 def _stands_out(response: Array, k: int) -> bool:
@@ -184,7 +198,8 @@ def plot_program_simulation(
     lower.set_xlim(0, len(found))
     lower.locator_params(axis="x", integer=True)
     figure.suptitle(
-        f"{program.name}: {len(found)} rapids simulated, {found.saved:.3g} s of waiting saved",
+        f"{shown_name(program.name)}: {len(found)} rapids simulated, {found.saved:.3g} s of "
+        "waiting saved",
         fontsize=10,
     )
     handles, labels = upper.get_legend_handles_labels()

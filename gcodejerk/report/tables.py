@@ -63,13 +63,23 @@ def rapids_table(record: Record) -> ScreenTable:
             str(row["line"]),
             _position(row["start"], unit),
             _position(row["end"], unit),
-            "" if row["length"] is None else f"{row['length'] / unit.mm:{unit.digits}}",
+            _length(row, unit),
             _ms(row["conventional_time"], ".1f"),
             _ms(row["time"], ".0f"),
             _worst(row["residual"], unit) if planned else "",
             Text(status, style="" if planned else "yellow"),
         )
     return table
+
+
+def _length(row: Record, unit: _Unit) -> str:
+    """How long a rapid is: in degrees where only rotary axes move."""
+    if row["length"] is None:
+        return ""
+    moved = [a for a, end in row["end"].items() if end is not None and end != row["start"].get(a)]
+    if moved and all(axis in "ABC" for axis in moved):
+        return f"{row['length']:.3f} deg"
+    return f"{row['length'] / unit.mm:{unit.digits}}"
 
 
 def summary_line(name: str, summary: Record) -> str:
@@ -167,16 +177,18 @@ def move_tables(record: Record, conventional: Record) -> list[ScreenTable]:
     list of ScreenTable
     """
     row, usual = record["rapids"][0], conventional
+    turning = [axis in "ABC" for axis in row["peak"]]
+    unit = "deg" if all(turning) else "mm or deg" if any(turning) else "mm"
     table = ScreenTable(
         ("profile", "left"),
         ("T_SUM\n[ms]", "right"),
         ("segments\n[ms]", "left"),
         ("axis", "left"),
-        ("velocity\n[mm/s]", "right"),
-        ("acceleration\n[mm/s^2]", "right"),
-        ("jerk\n[mm/s^3]", "right"),
+        (f"velocity\n[{unit}/s]", "right"),
+        (f"acceleration\n[{unit}/s^2]", "right"),
+        (f"jerk\n[{unit}/s^3]", "right"),
         wrap=("segments\n[ms]",),
-        drop=("jerk\n[mm/s^3]", "velocity\n[mm/s]", "segments\n[ms]"),
+        drop=(f"jerk\n[{unit}/s^3]", f"velocity\n[{unit}/s]", "segments\n[ms]"),
     )
     for name, motion in ((row["profile"], row), ("conventional today", usual)):
         for k, (axis, peak) in enumerate(motion["peak"].items()):

@@ -13,7 +13,7 @@ import numpy as np
 from gcodejerk.parameters import Tuning
 from gcodejerk.parameters.groups import concerned
 from gcodejerk.parameters.tuning import SPREAD
-from gcodejerk.report.figures import PLANNED, TODAY, new_figure, save
+from gcodejerk.report.figures import PLANNED, TODAY, new_figure, save, shown_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,7 +67,8 @@ def plot_tuning(tuning: Tuning, file: BinaryIO, suffix: str) -> None:
         axes.spines["top"].set_visible(False)
         axes.set_axisbelow(True)
     figure.suptitle(
-        f"{tuning.scheme.controller}: {tuning.scheme.title}\n{tuning.machine.name}", fontsize=11
+        f"{tuning.scheme.controller}: {tuning.scheme.title}\n{shown_name(tuning.machine.name)}",
+        fontsize=11,
     )
     save(figure, file, suffix)
 

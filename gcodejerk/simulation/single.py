@@ -149,15 +149,16 @@ class MoveSimulation:
         rows = [response.seen(row) for row in self.watch.places]
         # Of a real part of c e^(lambda t): half of c and half of its conjugate.
         poles = response.poles[:, np.newaxis]
-        density = [
-            np.abs(
-                (
-                    0.5 * (row * left)[:, np.newaxis] / (s - poles)
-                    + 0.5 * np.conj(row * left)[:, np.newaxis] / (s - np.conj(poles))
-                ).sum(axis=0)
-            )
-            for row in rows
-        ]
+        with np.errstate(divide="ignore", invalid="ignore"):  # at a mode without damping
+            density = [
+                np.abs(
+                    (
+                        0.5 * (row * left)[:, np.newaxis] / (s - poles)
+                        + 0.5 * np.conj(row * left)[:, np.newaxis] / (s - np.conj(poles))
+                    ).sum(axis=0)
+                )
+                for row in rows
+            ]
         largest: Array = np.max(density, axis=0)
         return largest
 
@@ -182,7 +183,7 @@ class MoveSimulation:
             return self._told_to(equations.deviation(axis), frequency, axis) / s**2
         seen = (equations.table[axis] + equations.vibration[axis]).state
         eye, pushed = np.eye(len(equations.A)), equations.pushed[axis]
-        return np.array([seen @ np.linalg.solve(one * eye - equations.A, pushed) for one in s])
+        return np.array([seen @ _solved(one * eye - equations.A, pushed) for one in s])
 
     def _told_to(self, row: Row, frequency: Array, axis: str) -> Complex:
         """From where an axis is told to be to what a row sees, shape (f,)."""
@@ -192,6 +193,14 @@ class MoveSimulation:
         for s in 2j * np.pi * frequency:
             told = np.array([1.0, s, s * s])
             forced = np.einsum("j,js->s", told, equations.B[:, :, u])
-            state = np.linalg.solve(s * eye - equations.A, forced)
+            state = _solved(s * eye - equations.A, forced)
             out.append(row.state @ state + row.command[:, u] @ told)
         return np.array(out)
+
+
+def _solved(matrix: Complex, right: Array | Complex) -> Complex:
+    """The solution; NaN at the very frequency of a mode without damping, where there is none."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.complex128)
+    except np.linalg.LinAlgError:
+        return np.full(right.shape, np.nan, dtype=np.complex128)

@@ -72,7 +72,13 @@ def test_links_do_not_lead_round_in_circles(tree, tmp_path):
     (tmp_path / "s" / "self.nc").symlink_to("self.nc")
     (tmp_path / "s" / "nowhere.nc").symlink_to("nothing")
     (tmp_path / "s" / "link.nc").symlink_to("../other/c.nc")
-    assert [below for _, below in names("s")] == ["link.nc", "a/b.nc"]
+    found, problems = find_inputs(["s"], None)
+    assert [one.below for one in found] == ["link.nc", "a/b.nc"]
+    assert sorted(str(problem).split(" ")[0] for problem in problems) == [
+        "s/nowhere.nc",
+        "s/self.nc",
+    ]
+    assert all("leads nowhere" in str(problem) for problem in problems)
 
 
 def test_a_link_to_a_folder_is_walked_where_it_is_named(tree, tmp_path):

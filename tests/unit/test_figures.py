@@ -397,3 +397,20 @@ def test_a_measured_spectrum_is_drawn(tmp_path):
     draw_comparison(figure, shown)
     assert_readable(figure)
     assert "grey: measured spectrum" in words_of(figure)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("plan", "Z=1", "--plot"), ("compare", "Z=1", "--plot"), ("simulate", "Z=1", "--plot"),
+        ("map", "--axis", "Z", "--length", "1", "-o"),
+    ],
+)  # fmt: skip
+def test_names_are_no_mathematics_and_no_longer_than_the_page(command, tmp_path, arguments):
+    (tmp_path / "m.yaml").write_text(
+        f"name: 'Mill $_$ {25 * 'wide '}'\ninterval: 0.001\npositioning: linear\naxes:\n"
+        "  Z: {rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}, modes: "
+        "[{name: 'a $_{ mode$', frequency: 30, damping: 0, participation: 1}]}\n"
+    )
+    assert command(*arguments, "p.png", "-m", "m.yaml")[0] == 0
+    assert (tmp_path / "p.png").stat().st_size > 10_000

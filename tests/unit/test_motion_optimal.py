@@ -154,6 +154,17 @@ def test_no_linear_programme_finds_less_and_none_finds_much_more():
     assert nulls > 3, "too few of the drawn cases have a null"
 
 
+def test_where_no_jerk_is_limited_none_finds_less_either():
+    for n, V, A, _, f, zeta, w in drawn_cases(8):
+        rows = rows_of(n, f, zeta, w)
+        # From one limit of the acceleration to the other within an interval.
+        least = by_linear_programme(n, V, A, 2.0 * A / MS, rows)
+        optimum = least_residual(move_of(n, V, A, np.inf, f, zeta, w), 1.0)
+        assert (optimum is None) == (least is None)
+        if optimum is not None:
+            assert least * 0.998 - 1e-7 <= optimum.worst <= least * 1.02 + 1e-7
+
+
 def test_over_a_band_the_worst_is_that_of_a_dense_scan():
     for n, V, A, J, f, zeta, w in drawn_cases(12):
         band = 0.06

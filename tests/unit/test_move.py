@@ -205,3 +205,21 @@ def test_a_machine_without_modes_is_the_reason_by_its_name():
     )
     plan = plan_move({"X": 20.0}, machine)
     assert (plan.planned, plan.reason) == (False, "no modes in the machine file")
+
+
+@pytest.mark.parametrize("profile", ["optimal", "cascade", "shortest"])
+def test_a_given_t1_is_that_of_condition_three(profile):
+    with pytest.raises(PlanError, match="condition3, and no"):
+        plan_move({"Z": 1.0}, PAPER, profile, T1=0.001)
+    assert plan_move({"Z": 1.0}, PAPER, T1=0.001).profile == "condition3"
+
+
+@pytest.mark.parametrize("length", [0.02, 0.05, 0.0566, 0.06, 0.0872])
+def test_what_is_as_short_as_an_interval_is_not_planned(length):
+    machine = Machine.loads(
+        "interval: 0.004\npositioning: linear\naxes:\n  X: {resolution: 0.001, rapid: {velocity: "
+        "350, acceleration: 15000, planner: trapezoidal}, limit: {velocity: 420, acceleration: "
+        "60000, jerk: 5.0e+5}, modes: [{frequency: 1.7, damping: 0.02, participation: 1}]}\n"
+        "design: {tolerance: 0.001}\n"
+    )
+    assert not plan_move({"X": length}, machine, "shortest").planned

@@ -164,3 +164,14 @@ def test_nothing_to_do_is_a_head_alone(text, planned):
     result = process(text, machine(), controller="csv", form="pvt")
     assert result.planned == planned
     assert result.output == b"block,t,X,X_velocity,Y,Y_velocity\n"
+
+
+def test_axes_on_their_own_may_take_far_less_than_today():
+    described = Machine.loads(
+        "interval: 0.001\npositioning: independent\naxes:\n  X: {resolution: 1.0e-4, rapid: "
+        "{velocity: 150, acceleration: 1400, jerk: 1.0e+4}, limit: {velocity: 150, acceleration: "
+        "1400, jerk: 8.0e+5}, modes: [{frequency: 120, damping: 0.02, participation: 0.1}]}\n"
+        "program: {start: {X: 0}}\nspindle: mill\n"
+    )
+    program = b"G21 G90 G94 G64\nG0 X0.5\nG4 P0.1\nG0 X3\nG4 P0.1\nG0 X5\nM2\n"
+    assert process(program, described, controller="csv", profile="shortest").planned == 3

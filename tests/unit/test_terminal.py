@@ -213,6 +213,23 @@ def test_the_original_is_kept_and_comes_back(command, tmp_path):
     assert (code, "no a.ngc.orig" in out) == (1, True)
 
 
+@pytest.mark.parametrize("option", [["--check"], ["--diff"], ["-o", "b.ngc"], ["--json"]])
+def test_putting_originals_back_takes_no_option_of_outputs(command, tmp_path, option):
+    (tmp_path / "a.ngc").write_bytes(METRIC)
+    assert command("process", "-q", "a.ngc", "-m", "vmc", "--in-place", "--backup")[0] == 0
+    made = (tmp_path / "a.ngc").read_bytes()
+    code, out = command("process", "--revert", "a.ngc", *option)
+    assert (code, option[0] in out) == (2, True)
+    assert (tmp_path / "a.ngc").read_bytes() == made
+    assert (tmp_path / "a.ngc.orig").read_bytes() == METRIC
+
+
+def test_there_is_no_difference_where_the_program_stays_as_it_is(command, tmp_path):
+    (tmp_path / "a.ngc").write_bytes(METRIC)
+    code, out = command("process", "a.ngc", "-m", "vmc", "--controller", "csv", "--diff")
+    assert (code, "--diff" in out) == (2, True)
+
+
 def test_an_edited_output_does_not_give_way(command, tmp_path):
     (tmp_path / "a.ngc").write_bytes(b"G0 X1 (edited by hand)\n")
     (tmp_path / "a.ngc.orig").write_bytes(METRIC)

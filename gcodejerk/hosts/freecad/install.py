@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import sys
 from html import unescape
@@ -72,6 +73,7 @@ def install_post(
         What was done, and what to do next.
     """
     data = signed("freecad", post_text(command, machine, base))
+    of = [] if where is None else [where]
     done = []
     for folder in macro_folders(where):
         if where is None:
@@ -81,7 +83,7 @@ def install_post(
         *done,
         f"in the job choose the post-processor `gcodejerk`: it posts with {base}, then rewrites "
         f"for {machine}; others: --base NAME, --machine FILE in the job's arguments",
-        "`gcodejerk install freecad --remove` takes it out again",
+        f"`{shlex.join(['gcodejerk', 'install', 'freecad', *of, '--remove'])}` takes it out again",
     ]
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -88,7 +89,7 @@ def install_filter(path: str, command: tuple[str, ...], machine: str) -> list[st
     if clean != data:
         raise EmitError(
             "another filter of gcodejerk is installed, or the configuration was changed since",
-            f"run `gcodejerk install linuxcnc {path} --form filter --remove`, then install again",
+            f"run `{_way_back(path)}`, then install again",
             Place(path),
         )
     _check_writable(file)
@@ -99,8 +100,12 @@ def install_filter(path: str, command: tuple[str, ...], machine: str) -> list[st
         f"{path}: lines of [FILTER] added; it was kept as {backup.name}",
         f"start LinuxCNC anew; programs that end in {', '.join('.' + e for e in ENDINGS)} are then "
         "processed when they are opened, the files themselves stay as they are",
-        f"`gcodejerk install linuxcnc {path} --form filter --remove` takes it out again",
+        f"`{_way_back(path)}` takes it out again",
     ]
+
+
+def _way_back(path: str) -> str:
+    return shlex.join(["gcodejerk", "install", "linuxcnc", path, "--form", "filter", "--remove"])
 
 
 def remove_filter(path: str) -> list[str]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shlex
 import shutil
 import subprocess
 from dataclasses import dataclass
@@ -114,8 +115,12 @@ def install(path: str, form: str, version: str | None = None) -> list[str]:
         *done,
         f"{ini.path}: {len(marked(change.ini))} marked block(s) of lines added; it was kept as "
         f"{backup.name}",
-        f"{use}; `gcodejerk install linuxcnc {path} --remove` takes all of it out again",
+        f"{use}; `{_way_back(path)}` takes all of it out again",
     ]
+
+
+def _way_back(path: str) -> str:
+    return shlex.join(["gcodejerk", "install", "linuxcnc", path, "--remove"])
 
 
 def remove(path: str) -> list[str]:
@@ -190,7 +195,7 @@ def _again(ini: Ini, own: Path, change: Change, before: str, form: str) -> str:
     if before != form:
         raise EmitError(
             f"the form {before} is installed already",
-            f"run `gcodejerk install linuxcnc {ini.path} --remove` first",
+            f"run `{_way_back(str(ini.path))}` first",
             ini.place(),
         )
     _check_untouched(own)
@@ -201,7 +206,7 @@ def _again(ini: Ini, own: Path, change: Change, before: str, form: str) -> str:
     if not same:
         raise EmitError(
             "another version of this is installed, or the configuration was changed since",
-            f"run `gcodejerk install linuxcnc {ini.path} --remove`, then install again",
+            f"run `{_way_back(str(ini.path))}`, then install again",
             ini.place(),
         )
     return f"{ini.path}: the form {form} is installed already; nothing was changed"

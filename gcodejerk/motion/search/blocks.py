@@ -255,7 +255,8 @@ class Blocks:
             knots=self.knots,
             velocity=move.velocity * T,
             acceleration=move.acceleration * T**2,
-            jerk=min(move.jerk, move.acceleration / move.interval) * T**3,
+            # From one limit of the acceleration to the other within an interval: no more matters.
+            jerk=min(move.jerk, 2.0 * move.acceleration / move.interval) * T**3,
             rows=self.rows,
             group=self.cone[rows],
             cap=cap[self.owner[used]],

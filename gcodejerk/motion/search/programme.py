@@ -123,7 +123,9 @@ class Rows:
         self.bounds: list[Array] = []
 
     def add(self, terms: list[tuple[Any, Any]], bound: Any) -> None:
-        """As many rows as the terms' columns (a number is one) have entries."""
+        """As many rows as the terms' columns (a number is one) have entries; maybe none."""
+        if any(np.size(column) == 0 for column, _ in terms):
+            return
         count = max([1, *(np.size(column) for column, _ in terms)])
         row = self.count + np.arange(count)
         for column, value in terms:

@@ -55,6 +55,8 @@ def check_axes(
     # An axis that would not gain keeps the control's own profile, whatever the others get.
     mirrored = machine.design.profile in SYMMETRIC and is_mirrored(machine)
     low, high = (1.0, 1.0) if mirrored else MIDDLE
+    if machine.design.profile == "shortest":
+        low = 0.0  # it may take far less than the control's own rapid
     out = []
     for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
         D = np.abs(paths.displacement[:, a])
