@@ -92,11 +92,6 @@ EXPLAINED: dict[Reason, Explanation] = {
         "the notes name the line: correct it, say how the program is written (`--dialect`), "
         "declare a harmless code (`program.harmless`), or state G40 and the other modes behind it",
     ),
-    Reason.LINES_READ: Explanation(
-        "LinuxCNC: `#<_line>` stands in the program, and lines that are put in front of it change "
-        "what it says",
-        "take it out of the program",
-    ),
     Reason.EXPRESSION: Explanation(
         "an axis word is a variable or an expression; where it ends is known if every variable is",
         "let the program set its variables, to whole increments (LinuxCNC: to numbers of at most "
@@ -160,6 +155,11 @@ EXPLAINED: dict[Reason, Explanation] = {
         "kin: by what share, is not known",
         "LinuxCNC: end it in front of the rapids (M52 P0), Marlin too (M220 S100); Siemens: take "
         "OVR out",
+    ),
+    Reason.LINES_READ: Explanation(
+        "LinuxCNC: `#<_line>` stands in the program, and lines that are put in front of it change "
+        "what it says",
+        "take it out of the program",
     ),
     Reason.OVERRIDES_OFF: Explanation(
         "Fanuc and its kin, behind G63 (tapping) or `#3004` set to anything but 0: feed override "

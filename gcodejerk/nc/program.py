@@ -7,6 +7,7 @@ line through the careful tokenizer and `execute`. Which way a line took shows no
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -198,11 +199,8 @@ def open_reader(
         reader = FollowingReader(name, chosen, start, None, Elsewhere())
     elif not refers(chosen):
         reader = Reader(name, chosen, start)
-        # A stream without an end is not kept; what is rewritten is a file.
-        if chosen.text.o_word == "flow" and (file.seekable() or start.positions or start.startup):
-            file = seekable(file)
-            if begins_again(file, name, chosen):
-                reader.forget_start(None, left_on(file, chosen, name))
+        if chosen.text.o_word == "flow":
+            file = _with_its_start(reader, file)
     else:
         file = source = seekable(file)
         origin = source.tell()
@@ -232,6 +230,18 @@ def open_reader(
     if chosen.note:
         reader.runner.syntax_problems.append(Finding(None, f"dialect {chosen.name}: {chosen.note}"))
     return reader, file
+
+
+def _with_its_start(reader: Reader, file: BinaryIO) -> BinaryIO:
+    """Forget what the last line may leave to the first one, where O words are of flow."""
+    # A stream without an end is not kept; what is rewritten is a file.
+    state = reader.state
+    if not file.seekable() and state.unit is None and all(map(math.isnan, state.position)):
+        return file
+    file = seekable(file)
+    if begins_again(file, reader.name, reader.dialect):
+        reader.forget_start(None, left_on(file, reader.dialect, reader.name))
+    return file
 
 
 def follow(

@@ -317,7 +317,7 @@ AGAIN = {
 @pytest.mark.parametrize("case", AGAIN)
 def test_a_program_of_linuxcnc_that_begins_again_begins_nowhere_known(case):
     end, first = AGAIN[case]
-    text = b"G21 G90 G17 G40 G94 G54 G49\nG0 X5\nG1 X6 F100\nG0 X9\n" + end + b"\n"
+    text = b"G21 G90 G17 G40 G94 G54 G49 G64\nG0 X5\nG1 X6 F100\nG0 X9\n" + end + b"\n"
     known = {"positions": HOME, "offsets": OFFSETS}
     why, rapids = read(text, "linuxcnc", **known)
     assert why == [first, None]

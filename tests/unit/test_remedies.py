@@ -169,7 +169,15 @@ CASES = [
     ),
     Case(
         Reason.NOT_FOLLOWED, "the modes behind it", FANUC, KNOWN + "M98 P7\n" + AT,
-        KNOWN + "M98 P7\n" + KNOWN + AT,
+        KNOWN + "M98 P7\n" + KNOWN + "G64\n" + AT,
+    ),
+    Case(
+        Reason.LINES_READ, "without it", LINUXCNC,
+        KNOWN + AT + "G1 Y#<_line> F100\n", KNOWN + AT + "G1 Y7 F100\n",
+    ),
+    Case(
+        Reason.PATH_UNKNOWN, "G64 behind what may be skipped", LINUXCNC,
+        KNOWN + "/G61\n" + AT, KNOWN + "/G61\nG64\n" + AT,
     ),
     Case(
         Reason.NOT_FOLLOWED, "synchronized actions", SIEMENS,

@@ -24,7 +24,8 @@ class Changing(io.BytesIO):
     def seek(self, offset, whence=io.SEEK_SET):
         if (offset, whence) == (0, io.SEEK_SET):
             self.rewinds += 1
-            if self.rewinds == 3:  # for a look at its beginning, to be read, to be copied
+            # For a look at its beginning, one whether it begins again, to be read; then twice more.
+            if self.rewinds == 4:
                 self.change(self)
         return super().seek(offset, whence)
 

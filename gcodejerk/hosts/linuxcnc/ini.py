@@ -123,6 +123,23 @@ def parse_ini(path: Path, data: bytes) -> Ini:
     return Ini(path, data, tuple(entries), tuple(sections))
 
 
+def check_motion(ini: Ini) -> None:
+    """Refuse another motion module than motmod, and arguments that stand in the INI."""
+    found = ini.all("EMCMOT", "EMCMOT")
+    words = found[0].value.split() if found else []
+    if words == ["motmod"]:
+        return
+    place = ini.place(found[0].line if found else None)
+    if words[:1] == ["motmod"]:
+        raise EmitError(
+            f"[EMCMOT] EMCMOT gives motmod arguments: {' '.join(words[1:])}",
+            "give them behind `loadrt [EMCMOT]EMCMOT` in the HAL file, where they are read",
+            place,
+        )
+    named = words[0] if words else "missing"
+    raise EmitError(f"[EMCMOT] EMCMOT is {named}, not motmod", "only motmod was played", place)
+
+
 def without_lines(data: bytes) -> bytes:
     """The bytes of an INI without marked lines.
 

@@ -27,6 +27,7 @@ from gcodejerk.hosts.linuxcnc.filter_lines import without_all
 from gcodejerk.hosts.linuxcnc.hal_commands import Hal, read_hal
 from gcodejerk.hosts.linuxcnc.ini import (
     Ini,
+    check_motion,
     is_writable,
     marked,
     parse_ini,
@@ -246,26 +247,9 @@ def _check_version(version: str | None) -> None:
         )
 
 
-def _check_motion(ini: Ini) -> None:
-    """Refuse another motion module than motmod, and arguments that stand in the INI."""
-    found = ini.all("EMCMOT", "EMCMOT")
-    words = found[0].value.split() if found else []
-    if words == ["motmod"]:
-        return
-    place = ini.place(found[0].line if found else None)
-    if words[:1] == ["motmod"]:
-        raise EmitError(
-            f"[EMCMOT] EMCMOT gives motmod arguments: {' '.join(words[1:])}",
-            "give them behind `loadrt [EMCMOT]EMCMOT` in the HAL file, where they are read",
-            place,
-        )
-    named = words[0] if words else "missing"
-    raise EmitError(f"[EMCMOT] EMCMOT is {named}, not motmod", "only motmod was played", place)
-
-
 def _change(ini: Ini, form: str) -> Change:
     """What would be written into a configuration without ours."""
-    _check_motion(ini)
+    check_motion(ini)
     hal = read_hal(ini, HAL_FILE)
     _check_hal(ini, hal, form)
     script_path = _script_path(ini)

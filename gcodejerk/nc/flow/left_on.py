@@ -51,6 +51,7 @@ class LeftOn(NamedTuple):
 NOTHING = LeftOn()
 
 
+# Complex: one line for each kind of code.
 def left_on(file: BinaryIO, dialect: Dialect, name: str) -> LeftOn:
     """Look a file through, and go back to where it stood.
 

@@ -17,8 +17,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect, Effect
 from gcodejerk.nc.dialects.gcodes import G17, G43, G49, G54_1, G90
 from gcodejerk.units import MM_PER_INCH as INCH
-from gcodejerk.verification.second_reading.common import common
 from gcodejerk.verification.second_reading.computing import is_local
+from gcodejerk.verification.second_reading.joining import common
 from gcodejerk.verification.second_reading.reading import NAN
 
 KINDS = {

@@ -441,8 +441,7 @@ class Tracker(Circling):
         """Whether a limit of the path is certainly in the way."""
         moved = {axis: self.at[k] - seen.start[k] for k, axis in enumerate(AXES)}
         moved = {a: way for k, (a, way) in enumerate(moved.items()) if seen.axes >> k & 1 and way}
-        known = all(way == way for way in moved.values())
-        facts = self.facts
+        facts, known = self.facts, all(way == way for way in moved.values())
         return known and too_fast(self.slow, moved, facts.limits, facts.straight, facts.along)
 
 
