@@ -7,7 +7,6 @@ line through the careful tokenizer and `execute`. Which way a line took shows no
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -200,7 +199,7 @@ def open_reader(
     elif not refers(chosen):
         reader = Reader(name, chosen, start)
         if chosen.text.o_word == "flow":
-            file = _with_its_start(reader, file)
+            file = _with_its_start(reader, file, bool(start.positions or start.startup))
     else:
         file = source = seekable(file)
         origin = source.tell()
@@ -232,11 +231,13 @@ def open_reader(
     return reader, file
 
 
-def _with_its_start(reader: Reader, file: BinaryIO) -> BinaryIO:
-    """Forget what the last line may leave to the first one, where O words are of flow."""
-    # A stream without an end is not kept; what is rewritten is a file.
-    state = reader.state
-    if not file.seekable() and state.unit is None and all(map(math.isnan, state.position)):
+def _with_its_start(reader: Reader, file: BinaryIO, assumes: bool) -> BinaryIO:
+    """Forget what the last line may leave to the first one, where O words are of flow.
+
+    A stream that may have no end is not kept, unless something is assumed of its start: what is
+    rewritten is a file.
+    """
+    if not assumes and not file.seekable():
         return file
     file = seekable(file)
     if begins_again(file, reader.name, reader.dialect):

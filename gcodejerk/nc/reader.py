@@ -285,6 +285,7 @@ class Reader:
         if block.assigns:
             self.state.forget_variables()
         self.runner.state = self.flow.apply(self.state, block.o_word, block.o_name, first)
+        self.log.stops |= self.flow.leads_elsewhere
         if block.o_word == "" and not first:
             self.state.ended = False  # what stands here may be called
 
@@ -330,7 +331,6 @@ class Reader:
     def _finish_log(self) -> None:
         """Say what only the whole program tells."""
         log = self.log
-        log.stops |= self.flow.leads_elsewhere
         log.dark = darkness(self.dialect, self._spindle, log.habits, log.outputs)
 
     def findings(self, rapids: Rapids) -> tuple[Finding, ...]:
