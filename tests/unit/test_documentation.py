@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import gcodejerk
 from gcodejerk.batch.inputs import SUFFIXES
 from gcodejerk.cli import app, machine_app
 from gcodejerk.machine import machine_schema
@@ -133,3 +134,8 @@ def test_the_stream_that_is_shown_is_the_samples():
             place = [k for k in range(at, len(output)) if alike(output[k], line.encode())]
             assert place, line
             at = place[0] + 1
+
+
+def test_the_api_page_has_every_public_name_and_no_other():
+    listed = re.findall(r"^        - (\w+)$", (ROOT / "docs" / "api.md").read_text(), re.MULTILINE)
+    assert sorted(listed) == sorted(gcodejerk.__all__)

@@ -415,7 +415,7 @@ function describeViews(scene) {
   space.setAttribute("aria-label", `Tool path in space. ${what} Arrow keys turn the view, plus and minus zoom.`);
   const hidden = rapids.count - scene.drawn.length;
   document.getElementById("drawn").textContent =
-    hidden ? `Not drawn: ${grouped(hidden)} rapids whose start or end is not known.` : "";
+    hidden ? `Not drawn: ${grouped(hidden)} ${hidden === 1 ? "rapid" : "rapids"} whose start or end is not known.` : "";
 }
 
 if (!rapids.after.some((x) => x === x))
