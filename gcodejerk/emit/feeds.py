@@ -6,9 +6,9 @@ written, over its time.
 Rule 1: F counts along the axes that it refers to: the first of XYZ, UVW, ABC that moves.
 Rule 2: equal blocks have equal F: none corrects what the digits of the one before left open. Half
 of F's last digit is 1.7 nm in 2 ms (42 nm in inches), so that a block of one step of 0.0001 mm
-lasts its 2 ms within 33 ns, and a faster one is nearer still. For finer steps F has more decimals:
-a block of one step lasts its time to 0.01 % in any case. What all blocks of a rapid add up to is
-right to the same share, were all of them that slow, and mostly to nanoseconds.
+lasts its 2 ms within 33 ns, and a faster one is nearer still. For finer steps and slower blocks F
+has more decimals: every block lasts its time to 0.01 % in any case. What all blocks of a rapid add
+up to is right to the same share, were all of them that slow, and mostly to nanoseconds.
 Rule 3: no F has more digits than the control reads in a number: a fast one has fewer decimals.
 """
 
@@ -90,8 +90,8 @@ def mean_feeds(batch: Batch, rapids: Rapids, digits: int = 15) -> Feeds:
         own = np.where(inch & (group != "ABC"), MM_PER_INCH, 1.0)
         unit = np.where(first, own[:, np.newaxis], unit)
     time = np.maximum(batch.times, 1) * batch.grid.interval
-    decimals = _decimals(batch, inch)
     speed = np.where(batch.times > 0, length / time / unit, np.nan)
+    decimals = _decimals(batch, inch, speed)
     # Backwards first: what is left without a length stands behind all motion.
     speed = _filled(_filled(speed[:, ::-1])[:, ::-1])
     return Feeds(_in_digits(speed, decimals, digits), decimals, digits)
@@ -113,12 +113,19 @@ def _in_digits(
     return out
 
 
-def _decimals(batch: Batch, inch: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Decimals of each stream's F, by the coarsest step of the axes that move."""
+def _decimals(
+    batch: Batch, inch: NDArray[np.bool_], speed: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Decimals of each stream's F, by the coarsest step of the axes that move.
+
+    And by its slowest block: a finely stepped axis may creep where a coarse one pauses.
+    """
     moving = batch.plans.displacement[batch.moves] != 0.0
     step = np.where(moving, batch.number_format.step, 0.0).max(axis=1)
     block = np.maximum(batch.grid.knots[:, -1] - batch.grid.knots[:, -2], 1) * batch.grid.interval
     least = per_minute(1.0) * step / np.where(inch, MM_PER_INCH, 1.0) / block
+    slowest = np.where(speed > 0.0, speed, np.inf).min(axis=1)
+    least = np.minimum(least, per_minute(slowest))
     needed = np.ceil(-np.log10(STEP_KNOWN * least) - 1e-9).astype(np.int64)
     decimals: NDArray[np.int64] = np.maximum(needed, FEED_DECIMALS)
     return decimals

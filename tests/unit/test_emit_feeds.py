@@ -297,3 +297,26 @@ def test_no_dwell_counts_turns_of_a_spindle_that_may_stand(dialect, mode):
     assert lines.index(b"G94") + 1 == lines.index(b"G4 P1")
     swapped = made.output.replace(b"G94\nG4 P1\n", b"G4 P1\nG94\n")
     assert not verify(data, swapped, MACHINE, controller="fanuc", dialect=dialect).ok
+
+
+def test_a_creeping_axis_beside_a_coarser_one_keeps_its_time():
+    machine = Machine.loads(
+        "controller: grbl\ninterval: 0.001\npositioning: linear\naxes:\n"
+        "  X: {resolution: 1.0e-5, rapid: {velocity: 212.3, acceleration: 608.3, jerk: 9.0e+4}, "
+        "limit: {velocity: 254.8, acceleration: 1216.6, jerk: 4.4e+5}, "
+        "modes: [{frequency: 7.182, damping: 0, participation: 0.3}]}\n"
+        "  Y: {resolution: 1.0e-4, rapid: {velocity: 118.1, acceleration: 971.2, jerk: 7.7e+4}, "
+        "limit: {velocity: 118.1, acceleration: 971.2, jerk: 2.9e+6}, "
+        "modes: [{frequency: 174.6, damping: 0.15, participation: 0.1}]}\n"
+        "design: {band: 0.05}\nspindle: mill\nprogram: {start: {X: 0, Y: 0}}\n"
+    )
+    program = b"G20 G90 G17 G94\nG0 X10.8268 Y1.7547\nG4 P0.1\nG0 X10.8165 Y1.7630\nM2\n"
+    result = process(program, machine, profile="shortest")
+    here, slowest = np.array([10.8268, 1.7547]), np.inf
+    time = 0.0
+    for row in streams_of(result.output)[1]:
+        there = np.array([row.get("X", here[0]), row.get("Y", here[1])])
+        time += np.hypot(*(there - here)) / (row["F"] / 60.0)
+        here, slowest = there, min(slowest, row["F"])
+    assert slowest < 0.005, "nothing creeps"
+    assert time == pytest.approx(result.rapids[1].time, rel=1e-4)
