@@ -139,10 +139,10 @@ class RapidLog:
         self.habits = self.outputs = False
         """Blocks were seen that do what `beams` looks for."""
         self.dark = ""
+        """See `beams.Dark`."""
         self.stops = False
         """The program has exact stops (G61), or runs others that may."""
         self.stoppable = stoppable
-        """See `beams.Dark`."""
         self.visits = Visits()
         """Rapids of lines that may run more than once."""
 
