@@ -29,7 +29,7 @@ from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.neighbours import with_neighbours
 from gcodejerk.nc.interpreter.rapids import Rapids
 from gcodejerk.nc.interpreter.runner import Finding, Runner
-from gcodejerk.nc.reader import Reader
+from gcodejerk.nc.reader import SHORT_RUN, Reader
 from gcodejerk.nc.text.block import Block, Line
 from gcodejerk.nc.text.chunks import BYTE_ORDER_MARK, Chunk, read_chunks
 from gcodejerk.nc.text.lexer import read_lines
@@ -41,8 +41,6 @@ from gcodejerk.start import NOTHING_KNOWN, Start
 STAMP_LINES = 50
 """A stamp comment is looked for in this many lines at the top."""
 _STAMP = re.compile(rb"[(;][ \t]*gcodejerk stamp", re.IGNORECASE)
-SHORT_RUN = 24
-"""Fewer plain lines than this between careful ones go the careful way; arrays would not pay."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -316,12 +314,16 @@ def read_chunk(reader: Reader, chunk: Chunk, lines: Lines | None) -> None:
                 # the run each time would take quadratic time: double the distance instead.
                 by_hand = at + patience
                 patience *= 2
-        else:
-            begin, ended = int(lines.begin[at]), int(lines.terminator[at] != 0)
-            last = at + 1 == len(lines)
-            end = len(chunk.data) - ended if last else int(lines.begin[at + 1]) - 1
-            reader.read_line(chunk.data[begin:end], chunk.offset + begin, chunk.line + at, ended)
-            at += 1
+            continue
+        behind = reader.read_computed(chunk.data, lines, at, place)
+        if behind > at:
+            at = behind
+            continue
+        begin, ended = int(lines.begin[at]), int(lines.terminator[at] != 0)
+        last = at + 1 == len(lines)
+        end = len(chunk.data) - ended if last else int(lines.begin[at + 1]) - 1
+        reader.read_line(chunk.data[begin:end], chunk.offset + begin, chunk.line + at, ended)
+        at += 1
 
 
 def trace(

@@ -20,6 +20,7 @@ from gcodejerk.nc.flow.o_words import Passes
 from gcodejerk.nc.flow.structures import Collector, Node
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.interpreter.beams import darkness
+from gcodejerk.nc.interpreter.computed import Computed, Form, form_of
 from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, MODES, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.interpreter.runner import Finding, Runner
@@ -38,6 +39,10 @@ _FILE_NAME = re.compile(
 
 REMEMBERED, SHORT = 1 << 12, 80
 """Lines that are remembered in parts, and how long they are at most. [bytes]"""
+SHORT_RUN = 24
+"""Fewer plain lines than this between careful ones go the careful way; arrays would not pay."""
+FEWEST_COMPUTED, MOST_COMPUTED = 12, 1 << 12
+"""Lines of a run whose numbers are computed: fewer go the careful way, more are another run."""
 
 
 class Reader:
@@ -59,6 +64,10 @@ class Reader:
         """A line that is not blank has been read."""
         self._structure = Collector()
         self._parsed: dict[bytes, Block] = {}
+        self._forms: dict[bytes, Form | None] = {}
+        """The same lines, as runs hold them."""
+        self._by_hand, self._patience = 0, FEWEST_COMPUTED
+        """Up to this line no numbers are computed ahead; and for how many lines then."""
         self._targets: frozenset[int] | None = None
         self._plain = True
 
@@ -147,6 +156,7 @@ class Reader:
         if len(text) <= SHORT:
             if len(self._parsed) >= REMEMBERED:
                 self._parsed.clear()
+                self._forms.clear()
             self._parsed[text] = block
         return block
 
@@ -180,11 +190,11 @@ class Reader:
     def can_run(self) -> bool:
         """Whether the lines that follow may be taken as a run."""
         alone = self._plain and not self.flow.inside and not self._structure
+        if not (self.dialect.quick and self.started and alone):
+            return False
         if self._unfed:
-            able = self.runner.executor.told_unfed and can_run_unfed(self.state, self.dialect)
-        else:
-            able = can_run(self.state, self.dialect)
-        return self.dialect.quick and self.started and alone and able
+            return self.runner.executor.told_unfed and can_run_unfed(self.state, self.dialect)
+        return can_run(self.state, self.dialect)
 
     @property
     def _unfed(self) -> bool:
@@ -203,6 +213,58 @@ class Reader:
         if certain is not None:
             self.runner.ask(certain)
         return stop
+
+    def read_computed(self, data: bytes, lines: Lines, first: int, place: tuple[int, int]) -> int:
+        """Take lines of a chunk whose numbers are computed; the first that was not taken."""
+        number = place[0] + first
+        if number < self._by_hand or self.dialect.text.klartext or not self.can_run():
+            return first
+        said = self._computable(data, lines, first)
+        if len(said) < FEWEST_COMPUTED:
+            self._by_hand = number + len(said) + 1
+            return first
+        computed = Computed([form for _, form in said], self.state, self.dialect)
+        spelled = computed.lines(lines, first)
+        last = len(spelled)
+        if spelled.careful.any():
+            last = int(np.argmax(spelled.careful))
+            self._forms[said[last][0]] = None
+        stop = self.read_run(spelled, 0, last, (number, place[1])) if last else 0
+        computed.take_back(stop)
+        if stop < FEWEST_COMPUTED:
+            # Were every other line one that is not sure, looking ahead each time would be for
+            # nothing: double the distance instead.
+            self._by_hand = number + stop + self._patience
+            self._patience *= 2
+        else:
+            self._patience = FEWEST_COMPUTED
+        return first + stop
+
+    def _computable(self, data: bytes, lines: Lines, first: int) -> list[tuple[bytes, Form]]:
+        """Lines from one on that a run may hold, up to where many plain ones follow."""
+        last = min(first + MOST_COMPUTED, len(lines))
+        places = zip(lines.begin[first:last].tolist(), lines.end[first:last].tolist(), strict=True)
+        said: list[tuple[bytes, Form]] = []
+        plain = 0
+        for begin, end in places:
+            text = data[begin:end]
+            form = self._form(text)
+            if form is None:
+                break
+            said.append((text, form))
+            plain = 0 if form.computes else plain + 1
+            if plain == SHORT_RUN:
+                return said[:-plain]
+        return said
+
+    def _form(self, text: bytes) -> Form | None:
+        """What a run may make of a line, as it is remembered."""
+        if text in self._forms:
+            return self._forms[text]
+        form = form_of(self._parsed.get(text) or self._parse(text), self.dialect)
+        if len(text) <= SHORT:
+            self._forms[text] = form
+        return form
 
     def _run(self, line: Line, first: bool = False) -> None:
         """Execute a line of the main program."""

@@ -4,6 +4,7 @@ import io
 import math
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -61,6 +62,58 @@ def test_quick_and_careful_reading_agree_where_runs_are_long(data, times):
 @given(MESSY)
 def test_quick_and_careful_reading_of_messy_lines_agree(data):
     assert differences(CALM + data + b"\n" + b"X1Y1\n" * 30 + data, Start()) == []
+
+
+# Lines by variables of which runs are made, and lines that are doubtful in one way or the other:
+# variables of the control, unknown ones, numbers that are not certain, and lines of any kind.
+RUNS = [
+    *("#1=5.", "#2=[#1*2.5]", "#3=[#3+1]", "#1=#2", "#100=-.5", "N10 #1=1.", "#1 = 2. (so)"),
+    *("G0 X[#1+#2]", "G1 Y[#1*2.] F100.", "X#1 Z[-#1]", "G0 Z[5.0-#1]", "G0 X#100", "G0 X-#1"),
+    *("G0 X1.5 Y#1", "G0 X5.", "G1 Z-3.25", "", "(rest)", "g0 x#1 (a) y2.", "G0 X 5. Y #1"),
+]
+DOUBTS = [
+    *("#4=#5221", "#2=[1/0]", "#0=1", "#[#1]=2", "#5221=1", "#3004=1", "#3003=0", "#4109=3"),
+    *("#501=#501", "#1=1. #2=#1", "#1=1. G0 X1.", "#30=123456.789", "/#1=2", "#5=[#1/3]"),
+    *("G1 X#100 F#4", "Y#9", "G0 X#30 Y[#30*1000]", "G0 X[#1/3]", "G0X[ROUND[#1]]", "G#1 X1."),
+    *("G1 X1. F#4109", "F#1", "F-#1", "G0 A#1", "G0 X[#1] X1.", "G2 X#1 Y0. I[#1/2.] J0.", "M#1"),
+    *("N#1 G0 X1.", "S#1", "R#1", "G0 X#<depth>", "#<depth>=4.", "G65 P9 A1.", "M6 T1", "G91"),
+    *("G90", "G20", "G21", "M98 P1", "M30", "G92 X#1", "G0 X+#1 Y--#1", "G0 Y[#1 EQ 5.]"),
+    *("G1 X5", "Z1E#1", "G0 X#3 Y#2", "G0 X1E9 Y#1", "U#1", "G53 Z#1", "G61", "G64", "G28 Z0."),
+]
+R_RUNS = [
+    *("R1=5", "R2=R1*2.5", "R3=R3+1", "N10 R1=2", "R1=R2 ; so", "G0 X=R1", "G0 X=R1+R2 Y5"),
+    *("G1 Y=(R1*2) F100", "G0 X=5", "G0 X5 Y7.5", "G1 Z-3", "", "; rest", "X=-R1"),
+]
+R_DOUBTS = [
+    *("R5=R1/3", "R1=1 R2=R1", "R9=$AA_IM[X]", "R[R1]=2", "$P_UIFR[1,X,TR]=1", "DEPTH=5"),
+    *("DEF REAL DEPTH=2", "R4=SET(1,2)", "X=IC(R1)", "G0 X=R5", "G0 Z=DEPTH", "F=R1", "G0 X1=R1"),
+    *("S1=R1", "T=R1", "G0 X=AC(R1)", "G2 X=R1 Y0 I=R1/2 J0", "MCALL", "TRANS X=R1", "G0 X=R9"),
+    *("G91", "G90", "G0 A=R1", "G0 X=R3", "ROT RPL=R1", "G70", "G71", "SUPA Z=R1"),
+]
+BY_VARIABLES = [
+    *((name, RUNS, DOUBTS) for name in ("linuxcnc", "fanuc", "haas", "mach", "centroid")),
+    *((name, RUNS, DOUBTS) for name in ("fanuc-lathe-b", "mitsubishi", "edingcnc", "grbl")),
+    ("siemens", R_RUNS, R_DOUBTS),
+]
+
+
+@QUICK
+@pytest.mark.parametrize(("dialect", "sure", "doubtful"), BY_VARIABLES)
+@given(data=st.data())
+def test_quick_and_careful_reading_agree_of_programs_by_variables(dialect, sure, doubtful, data):
+    run = st.lists(st.sampled_from(sure), min_size=8, max_size=40)
+    odd = st.lists(st.sampled_from(doubtful), max_size=2)
+    begin = ["G21 G90 G94 G17 G40 G49 G80", "G0 X0. Y0. Z0.", "G1 X1. F100."]
+    known = ["#1=5.", "#2=2.", "#3=1.", "#100=1."]
+    if "lathe" in dialect:
+        begin[0] = "G21 G90 G94 G40"
+    elif dialect == "siemens":
+        begin[0], known = "G71 G90 G94 G17 G40 G64 D1", ["R1=5", "R2=2", "R3=1"]
+    parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
+    lines = [*begin, *known, *(line for run, odd in parts for line in (*run, *odd))]
+    end = data.draw(st.sampled_from(["\n", "\r\n"]))
+    start = Start(decimal_point=data.draw(st.sampled_from([None, "calculator"])))
+    assert differences(f"{end.join(lines)}{end}".encode(), start, dialect) == []
 
 
 @QUICK

@@ -123,7 +123,7 @@ def test_what_is_taken_at_once_is_confirmed_as_one_by_one(rapids, monkeypatch):
     assert count > 70
     assert not violations
     seen = []
-    monkeypatch.setattr(agreement, "_disagreement", lambda *a: seen.append(a) or "")
+    monkeypatch.setattr(agreement, "disagreement", lambda *a: seen.append(a) or "")
     compared(rapids)
     assert len(seen) < 3
     monkeypatch.setattr(PlainLines, "ready", lambda *a: False)

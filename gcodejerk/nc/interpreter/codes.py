@@ -13,7 +13,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import HARMLESS, Dialect
 from gcodejerk.nc.dialects.gcodes import G80
 from gcodejerk.nc.interpreter.modal import NAN
-from gcodejerk.nc.interpreter.variables import before_block, word_value
+from gcodejerk.nc.interpreter.variables import before_block, word_value, written_out
 from gcodejerk.nc.text.block import Block, Name, Word
 
 _LENGTHS = frozenset("XYZABCUVWR")
@@ -21,10 +21,6 @@ _LENGTHS = frozenset("XYZABCUVWR")
 _INCREMENT = 0.001
 """Least input increment of the IS-B system: 0.001 mm, 0.001 deg, or 0.0001 inch."""
 _GROUPED_M = frozenset({"stop", "spindle", "coolant", "tool"})
-
-
-_DECIMALS = 6
-"""Of a computed number where the control rounds none."""
 
 
 @dataclass(slots=True)
@@ -131,11 +127,6 @@ def sort_words(
     return codes
 
 
-def _is_written_out(value: float) -> bool:
-    """Whether a number is the one that its first decimals say, to the last bit."""
-    return value == float(f"{value:.{_DECIMALS}f}")
-
-
 class _Sorter:
     """Puts the words of a block where they belong, one by one."""
 
@@ -160,7 +151,7 @@ class _Sorter:
         inch = self._inch and not _states_units(self._block, self._dialect)
         value = word_value(word, known, rules, inch)
         # A position of whole increments can be written as a number; a quotient can not.
-        exact = rules.exact and not _is_written_out(value)
+        exact = rules.exact and not written_out(value)
         codes.expression = codes.expression or exact or value != value
         return value
 

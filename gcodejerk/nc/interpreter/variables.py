@@ -19,6 +19,8 @@ from gcodejerk.nc.text.cursor import LARGEST
 
 _INCREMENT_DECIMALS = (3, 4)
 """Of the least increment: 0.001 mm or degrees, 0.0001 inch."""
+_DECIMALS = 6
+"""Of a computed number where the control rounds none."""
 _POSITIONS = frozenset("XYZABCUVWIJKR")
 _SHARED = re.compile(r"R[0-9]+")
 """R parameters of Siemens, which all programs of a control have in common."""
@@ -57,6 +59,11 @@ def _can_be_known(name: str, rules: Arithmetic) -> bool:
     if rules.q_parameters:
         return _OF_PROGRAMS.fullmatch(name) is not None
     return not (name.startswith("<_") and name[2:-1] in _READ_ONLY)
+
+
+def is_own(target: str, rules: Arithmetic) -> bool:
+    """Whether what a block sets is surely a variable of the program, and does nothing else."""
+    return bool(target) and not target.startswith("$") and _can_be_known(_name(target), rules)
 
 
 def assigned_values(block: Block, state: State, rules: Arithmetic) -> list[float]:
@@ -206,6 +213,12 @@ def word_value(word: Word, variables: Mapping[str, float], rules: Arithmetic, in
     if math.isclose(value, whole, rel_tol=0.0, abs_tol=1e-9):
         return float(whole)
     return NAN if abs(value - whole) < 1e-3 else value
+
+
+def written_out(value: float) -> str:
+    """Write a computed number with some decimals; empty where that is another one, or none."""
+    text = f"{value:.{_DECIMALS}f}"
+    return text if float(text) == value else ""
 
 
 def _if_short(value: float, decimals: int) -> float:

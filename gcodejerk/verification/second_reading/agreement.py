@@ -18,20 +18,20 @@ from functools import partial
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
-from gcodejerk.storage import gathered, kept, release
-from gcodejerk.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from gcodejerk.storage import kept, release
 from gcodejerk.verification.findings import Findings, Kind
+from gcodejerk.verification.second_reading.ahead import Ahead
+from gcodejerk.verification.second_reading.comparing import Columns, disagreement, is_known
 from gcodejerk.verification.second_reading.elsewhere import lines_behind
 from gcodejerk.verification.second_reading.known import NEAR, Facts, Observation
 from gcodejerk.verification.second_reading.looking import begins_again, jumps_back
 from gcodejerk.verification.second_reading.reading import Line, Text, pieces
 from gcodejerk.verification.second_reading.routes import LostError, calls, flows
 from gcodejerk.verification.second_reading.stepping import Stepper
-from gcodejerk.verification.second_reading.straight import Column, PlainLines, Straight, follow
+from gcodejerk.verification.second_reading.straight import PlainLines
 from gcodejerk.verification.second_reading.tracking import Tracker
 from gcodejerk.verification.second_reading.walking import Walker, given_up
 
@@ -75,71 +75,17 @@ def confirm(
     if not len(index):
         return 0
     confirmed = 0
-    plain = _Plain(rapids, index)
+    plain = Columns(rapids, index)
     lines = array("q", plain.line.tobytes())
     for k, seen in observations(original, find_dialect(dialect), start, lines, plain):
         i = int(index[k])
         follows = k > 0 and index[k - 1] == i - 1 and rapids.line[i - 1] + 1 == rapids.line[i]
-        problem = _disagreement(seen, rapids, i, bool(follows))
+        problem = disagreement(seen, rapids, i, bool(follows))
         if problem:
             advice = "leave this rapid alone, and report the program: one of two readings is wrong"
             _differ(found, int(rapids.line[i]), problem, advice)
-        confirmed += not problem and _is_known(seen, rapids, i)
+        confirmed += not problem and is_known(seen, rapids, i)
     return confirmed + plain.confirmed
-
-
-class _Plain:
-    """Compares rapids in plain lines, many at once."""
-
-    def __init__(self, rapids: Rapids, index: NDArray[np.int64]) -> None:
-        self.rapids, self.index = rapids, index
-        self.line = gathered(rapids.line, index)
-        self.confirmed = 0
-
-    def agrees(self, run: Straight, number: int, tracker: Tracker) -> bool:
-        """Compare those of some lines; whether the two readings agree in every one of them.
-
-        Parameters
-        ----------
-        run : Straight
-            The lines.
-        number : int
-            Of the first of them in the file, from 1.
-        tracker : Tracker
-            What is in force in them.
-        """
-        first, last = np.searchsorted(self.line, [number, number + len(run)])
-        i, at = self.index[first:last], self.line[first:last] - number
-        rapids, axes = self.rapids, run.axes[at]
-        good = run.rapid[at] & (axes == rapids.words[i])
-        known = np.ones(len(i), dtype=np.bool_)
-        for mine, theirs in ((run.start[at], rapids.start), (run.end[at], rapids.target)):
-            for k in range(mine.shape[1]):
-                used, place = axes >> k & 1 != 0, mine[:, k]
-                off = np.abs(place - theirs[i, k])
-                good &= ~(used & (off > NEAR * np.maximum(1.0, np.abs(place) / 1e3)))
-                known &= ~used | ~np.isnan(place)
-        force = tracker.in_force() | {
-            "F": run.feed[at],
-            "speed": run.feed[at] * (tracker.unit or math.nan) / SECONDS_PER_MINUTE,
-            "F without a point": np.where(np.isnan(run.feed[at]), np.nan, run.whole[at]),
-            "motion": 0,
-        }
-        for name, told in _told_columns(rapids, i).items():
-            value = force[name]
-            a = np.broadcast_to(np.nan if value is None else np.asarray(value, float), told.shape)
-            same = np.abs(a - told) <= 1e-12 * np.maximum(np.abs(a), np.abs(told))
-            good &= same | np.isnan(a) | np.isnan(told)
-            known &= np.isnan(told) | ~np.isnan(a)
-        if tracker.path:
-            for own, column in ((tracker.p, rapids.path_p), (tracker.q, rapids.path_q)):
-                told = column[i]
-                none = np.isnan(told) & (own != own)
-                good &= (told == own) | none | (rapids.path[i] == 0)
-        if not good.all():
-            return False
-        self.confirmed += int(np.count_nonzero(known))
-        return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +154,7 @@ def observations(
     dialect: Dialect,
     start: Start,
     lines: Sequence[int],
-    plain: _Plain | None = None,
+    plain: Columns | None = None,
 ) -> Iterator[tuple[int, Observation]]:
     """What the second reading sees in these lines.
 
@@ -245,7 +191,9 @@ def observations(
     if dialect.dark_rapids and start.spindle == "mill" and lines:
         tracker.dark = _behaves_like_a_laser(original, dialect, start)
         original.seek(begin)
-    yield from _from_above(original, stepper, tracker, PlainLines(dialect, decimals), lines, plain)
+    agrees = None if plain is None else plain.agrees
+    ahead = Ahead(stepper, tracker, PlainLines(dialect, decimals), agrees)
+    yield from _from_above(original, stepper, tracker, ahead, lines)
 
 
 def _as_it_flows(
@@ -271,26 +219,23 @@ def _from_above(
     original: BinaryIO,
     stepper: Stepper,
     tracker: Tracker,
-    plain_lines: PlainLines,
+    ahead: Ahead,
     lines: Sequence[int],
-    plain: _Plain | None,
 ) -> Iterator[tuple[int, Observation]]:
     """What is seen in a program that is read from its first line to its last; as `observations`."""
     text, number, following = stepper.text, 1, 0
     line = lines[0] if lines else math.inf
     for data in pieces(original):
         release()
-        at, size, behind = 0, len(data), -1
+        at, size = 0, len(data)
+        ahead.begin()
         while at < size:
-            ready = plain is not None and at >= behind and plain_lines.ready(tracker)
-            taken = plain_lines.take(data, at, tracker) if ready else None
-            if taken is not None and plain is not None and plain.agrees(taken[0], number, tracker):
-                follow(tracker, taken[0])
-                number, at = number + len(taken[0]), taken[1]
+            taken = ahead.take(data, at, number)
+            if taken is not None:
+                number, at = taken
                 following = bisect_left(lines, number, following)
                 line = lines[following] if following < len(lines) else math.inf
                 continue
-            behind = behind if taken is None else taken[1]
             run = tracker.take_run(text, data, at)
             if run is not None:
                 tracker.run(run[0])
@@ -358,92 +303,6 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
         tracker.follow(Line(words=words))
     tracker.place()
     return tracker
-
-
-def _disagreement(seen: Observation, rapids: Rapids, i: int, follows: bool) -> str:
-    """In what the two readings differ, of a rapid that follows a stream or not; else empty."""
-    if seen.against:
-        return f"this rapid had to be left alone, since {seen.against}"
-    if seen.entered and follows and not rapids.entered[i]:
-        return "a jump or a call leads to it, and its stream begins without a standstill"
-    if not seen.modes:
-        return ""
-    if seen.sure and seen.axes != int(rapids.words[i]):
-        return f"the block names {_names(seen.axes)}, not {_names(int(rapids.words[i]))}"
-    for what, places, other in (
-        ("starts", seen.start, rapids.start[i]),
-        ("ends", seen.end, rapids.target[i]),
-    ):
-        for k, place in enumerate(places):
-            if seen.axes >> k & 1 and abs(place - other[k]) > NEAR * max(1.0, abs(place) / 1e3):
-                return f"{AXES[k]} {what} at {place:.6g}, not at {float(other[k]):.6g} [mm or deg]"
-    for name, told in _told(rapids, i).items():
-        mine = seen.modes[name]
-        known = mine is not None and mine == mine and told is not None and told == told
-        if known and not math.isclose(mine, told, rel_tol=1e-12):
-            return f"{name} is {mine:g}, not {told:g}"
-    return _tolerances(seen, rapids, i)
-
-
-def _told_columns(rapids: Rapids, i: NDArray[np.int64]) -> dict[str, Column]:
-    """The same of many rapids; NaN where it does not know."""
-    feed, words = rapids.feed[i], rapids.words[i]
-    return {
-        "unit": np.where(rapids.inch[i], MM_PER_INCH, 1.0),
-        "incremental": rapids.incremental[i].astype(np.float64),
-        "diameter": np.where(words & 1 != 0, rapids.diameter[i], np.nan),
-        "feed mode": np.where(rapids.feed_mode[i] == 0, np.nan, rapids.feed_mode[i]),
-        "F": feed,
-        "F without a point": np.where(np.isnan(feed), np.nan, rapids.feed_whole[i]),
-        "path": np.where(rapids.path[i] == 0, np.nan, rapids.path[i]),
-        "speed": rapids.speed[i],
-        "motion": rapids.fed[i].astype(np.float64),
-    }
-
-
-def _tolerances(seen: Observation, rapids: Rapids, i: int) -> str:
-    """P and Q of G64, which may be absent."""
-    if seen.modes["path"] is None or not rapids.path[i]:
-        return ""
-    for letter, told in (("P", float(rapids.path_p[i])), ("Q", float(rapids.path_q[i]))):
-        mine = seen.modes[letter]
-        if mine != told and (mine == mine or told == told):
-            return f"G64 has {letter} {mine:g}, not {told:g}"
-    return ""
-
-
-def _told(rapids: Rapids, i: int) -> dict[str, Any]:
-    """What `nc` says is in force behind a rapid; None and NaN where it does not know."""
-    feed = float(rapids.feed[i])
-    return {
-        "unit": MM_PER_INCH if rapids.inch[i] else 1.0,
-        "incremental": bool(rapids.incremental[i]),
-        "diameter": bool(rapids.diameter[i]) if int(rapids.words[i]) & 1 else None,
-        "feed mode": int(rapids.feed_mode[i]) or None,
-        "F": feed,
-        "F without a point": bool(rapids.feed_whole[i]) if feed == feed else None,
-        "path": int(rapids.path[i]) or None,
-        "speed": float(rapids.speed[i]),
-        "motion": 1 if rapids.fed[i] else 0,
-    }
-
-
-def _is_known(seen: Observation, rapids: Rapids, i: int) -> bool:
-    """Whether the second reading knows all that `nc` says of a rapid."""
-    if not seen.sure:
-        return False
-    named = [k for k in range(len(AXES)) if seen.axes >> k & 1]
-    if any(math.isnan(seen.start[k]) or math.isnan(seen.end[k]) for k in named):
-        return False
-    for name, told in _told(rapids, i).items():
-        mine = seen.modes[name]
-        if told is not None and told == told and (mine is None or mine != mine):
-            return False
-    return True
-
-
-def _names(axes: int) -> str:
-    return ", ".join(axis for k, axis in enumerate(AXES) if axes >> k & 1) or "no axis"
 
 
 begin_tracker = _begin

@@ -163,6 +163,11 @@ class Known:
         self.strayed = False
         """A program has run that is not followed."""
 
+    @property
+    def inch(self) -> bool:
+        """Whether lengths are known to be inches."""
+        return self.unit is not None and self.unit != 1.0
+
     def mode_of(self, code: int | None) -> int | None:
         """93, 94 or 95 by its code."""
         return None if code is None else self.dialect.feed_modes.get(code, code // 10)

@@ -45,14 +45,11 @@ class Stepper:
                 if b"Q" in bare.upper()
                 else (tracker.follow(text.read(bare, not tracker.begun)))
             )
-        named = self.computer.named
-        says = b"=" in bare or _DECLARES.match(bare) is not None if named else b"#" in bare
-        if not self._computes or not (says or b"[" in bare):
+        if not self.computes(bare):
             return tracker.follow(text.read(bare, not tracker.begun))
         upper = self.upper(bare)
         settings = self.computer.settings(upper, variables)
-        inch = tracker.unit is not None and tracker.unit != 1.0
-        spelled, relative = self.computer.spelled(upper, variables, inch)
+        spelled, relative = self.computer.spelled(upper, variables, tracker.inch)
         line = text.read(spelled, not tracker.begun)
         line.relative = relative
         seen = tracker.follow(line)
@@ -61,14 +58,33 @@ class Stepper:
             seen.sure = False
         return seen
 
+    def computes(self, bare: bytes) -> bool:
+        """Whether a line may hold a variable, or a number that is computed by `computer`."""
+        if self._parameters is not None or not self._computes:
+            return False
+        if self.computer.named:
+            return b"=" in bare or b"[" in bare or _DECLARES.match(bare) is not None
+        return b"#" in bare or b"[" in bare
+
+    def is_silent(self, bare: bytes) -> bool:
+        """Whether a line does nothing, but that it may set variables of the program."""
+        text, relative = bare, dict[str, str]()
+        if self.computes(bare):
+            text, relative = self.computer.spelled(self.upper(bare), {}, inch=False)
+        line = self.text.read(text, first=False)
+        says = (
+            *(line.effects, line.percent, line.deleted, line.offsets, line.limits, line.frame),
+            *(line.group, line.cycle, relative, line.flow is not None, line.switched is not None),
+        )
+        return line.understood and not any(says) and all(word[0] == "N" for word in line.words)
+
     def _step_with(self, parameters: Parameters, tracker: Tracker, bare: bytes) -> Observation:
         """Run one line with Q parameters."""
         text, variables = self.text, tracker.variables
         said = self.upper(bare).replace(b"\0", b" ")
         found = None if is_cut(bare, self.dialect) else parameters.setting(said, variables)
         if found is None:
-            inch = tracker.unit is not None and tracker.unit != 1.0
-            spelled = parameters.in_words(said, variables, inch=inch)
+            spelled = parameters.in_words(said, variables, inch=tracker.inch)
             line = text.read(bare if is_cut(bare, self.dialect) else spelled, not tracker.begun)
             return tracker.follow(line)
         rest, settings = found
