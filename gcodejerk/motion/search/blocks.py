@@ -66,9 +66,7 @@ class Ringing:
         rings = cls(poles, first, last, count)
         if len(poles) * (last - first + 1) > MOST_KNOWN:
             return rings
-        every = rings._at(np.arange(first, last + 1)).T
-        known = np.ascontiguousarray(every.real), np.ascontiguousarray(every.imag)
-        return cls(poles, first, last, count, known)
+        return cls(poles, first, last, count, rings._everywhere())
 
     def left(self, knots: Index, parts: int) -> Array:
         """What a unit jerk in each block leaves, shape (parts * p, k).
@@ -107,6 +105,21 @@ class Ringing:
         every = np.arange(self.first, self.last + 1)
         sums: Array = -np.diff((of_each @ self._at(every, used)).real)
         return sums
+
+    def _everywhere(self) -> tuple[Array, Array]:
+        """What rings from the ends of all intervals, shape (last - first + 1, p): two parts.
+
+        A power of what an interval does is that of a few intervals times that of many: both are
+        short lists.
+        """
+        ends = self.last - self.first + 1
+        few = int(np.ceil(np.sqrt(ends)))
+        rate = self.poles / self.count
+        centre = 1j * self.poles.imag * (0.5 * (self.first + self.last) - self.last) / self.count
+        near = np.exp(np.arange(few)[:, np.newaxis] * rate)
+        far = np.exp(few * np.arange(-(-ends // few))[:, np.newaxis] * rate + centre)
+        every = (far[:, np.newaxis] * near).reshape(-1, len(rate))[ends - 1 :: -1]
+        return np.ascontiguousarray(every.real), np.ascontiguousarray(every.imag)
 
     def _at(self, knots: Index, some: slice | Flags = slice(None)) -> Complex:
         """What rings from each knot, of some poles, shape (q, k + 1)."""

@@ -63,6 +63,9 @@ NEAR, IDLE = 0.1, 0.3
 are rows of jerks that are so much below the peak."""
 EXACT = 1e-7
 """Rows that are not held are kept to this much of their length."""
+SMALL_PIVOT = 1e-9
+"""Of rows that are held: from less the solver puts them into another order, which costs as much as
+beginning anew. Its own 1e-8 is met at every change where the jerk has no limit, or next to none."""
 UNEVEN, CLOSE = 1e-3, 1e-3
 """A jerk may exceed the peak by so much of it, within the limit; and speeds that are so close to
 theirs where another programme has ended are held from the beginning."""
@@ -232,7 +235,7 @@ class Cutting:
             linear[-1] -= LIGHT * self.peak
             x, _, status, info = daqp.solve(
                 squares, linear, matrix, upper, lower, kind,
-                primal_tol=EXACT, dual_start=multipliers,
+                primal_tol=EXACT, pivot_tol=SMALL_PIVOT, dual_start=multipliers,
             )  # fmt: skip
             solved = status == SOLVED and _kept(x, matrix, lower, upper)
             if solved:

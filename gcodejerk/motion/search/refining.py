@@ -36,7 +36,7 @@ MOST_CUTS = 80
 """Steps of each programme at most."""
 LITTLE, NOTHING = 3e-3, 1e-4
 """A plane is added where the residual is so much above what planes say: of that, and at least."""
-ROUGH, NEARLY = 0.15, 0.2
+ROUGH, NEARLY = 0.25, 0.2
 """Blocks that are refined need the least of theirs to this share only; and where planes say that
 what is allowed is within reach, so much of it may be unknown."""
 CUT = 0.99
