@@ -18,6 +18,7 @@ import typer
 
 from gcodejerk._version import __version__
 from gcodejerk.batch.signals import exit_on
+from gcodejerk.cli.common import Once
 from gcodejerk.cli.controllers import controllers
 from gcodejerk.cli.hosts import filter_program, install
 from gcodejerk.cli.identification import identify
@@ -48,25 +49,25 @@ machine_app = typer.Typer(
 )
 app.add_typer(machine_app, name="machine")
 
-app.command("process")(process)
-app.command("inspect")(inspect)
-app.command("verify")(verify)
-app.command("plan")(plan)
-app.command("map")(map_amplitudes)
-app.command("compare")(compare)
-app.command("parameters")(parameters)
-app.command("simulate")(simulate)
-app.command("identify")(identify)
-app.command("controllers")(controllers)
-app.command("filter")(filter_program)
-app.command("install")(install)
-machine_app.command("new")(machine_new)
-machine_app.command("check")(machine_check)
-machine_app.command("reduce")(machine_reduce)
-machine_app.command("list")(machine_list)
-machine_app.command("show")(machine_show)
-machine_app.command("test-program")(machine_test_program)
-machine_app.command("schema")(machine_schema)
+app.command("process", cls=Once)(process)
+app.command("inspect", cls=Once)(inspect)
+app.command("verify", cls=Once)(verify)
+app.command("plan", cls=Once)(plan)
+app.command("map", cls=Once)(map_amplitudes)
+app.command("compare", cls=Once)(compare)
+app.command("parameters", cls=Once)(parameters)
+app.command("simulate", cls=Once)(simulate)
+app.command("identify", cls=Once)(identify)
+app.command("controllers", cls=Once)(controllers)
+app.command("filter", cls=Once)(filter_program)
+app.command("install", cls=Once)(install)
+machine_app.command("new", cls=Once)(machine_new)
+machine_app.command("check", cls=Once)(machine_check)
+machine_app.command("reduce", cls=Once)(machine_reduce)
+machine_app.command("list", cls=Once)(machine_list)
+machine_app.command("show", cls=Once)(machine_show)
+machine_app.command("test-program", cls=Once)(machine_test_program)
+machine_app.command("schema", cls=Once)(machine_schema)
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
+from typer.core import TyperCommand
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
@@ -63,6 +64,30 @@ ProfileOption = Annotated[
         "condition1 or 2",
     ),
 ]
+
+
+class Once(TyperCommand):
+    """A command whose options each have one value: of two, one would do nothing."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The same, where no option stands twice but those that may."""
+        if not ctx.resilient_parsing:
+            _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+            seen = set()
+            for one in order:
+                of_one = one.param_type_name == "option" and not getattr(one, "is_flag", False)
+                if of_one and one in seen and not getattr(one, "multiple", False):
+                    word = max(one.opts, key=len)
+                    ctx.fail(f"{word} stands twice, and one of the two would do nothing: say one")
+                seen.add(one)
+        rest: list[str] = super().parse_args(ctx, args)
+        return rest
+
+
+def said(ctx: typer.Context, name: str) -> bool:
+    """Whether an option stands on the command line: the environment may have it by itself."""
+    source = ctx.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
 
 
 def load_machine(name: str | None, programs: Sequence[str] = ()) -> Machine:

@@ -90,6 +90,9 @@ def install(
     """Install what a program needs to call gcodejerk, or take it out again; or say how."""
     from gcodejerk.hosts.catalogue import HOSTS, Request, host_lines
 
+    told = (machine, form, base, remove or None, linuxcnc_version)
+    if host is None and any(one is not None for one in told):
+        raise typer.BadParameter("name the host: `gcodejerk install` alone lists them")
     if host is None:
         _print(host_lines(), as_json)
         return

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gcodejerk.cli.common import MachineOption, console, load_machine, say
+from gcodejerk.cli.common import MachineOption, console, load_machine, said, say
 from gcodejerk.cli.moves import FIGURES
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ REACH = 0.4
 
 
 def identify(
+    ctx: typer.Context,
     records: Annotated[
         list[str],
         typer.Argument(metavar="RECORD...", help="accelerations over time, or spectra (CSV)"),
@@ -39,7 +40,10 @@ def identify(
     machine: MachineOption = None,
     program: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="what ran; for participations, with --machine"),
+        typer.Option(
+            metavar="FILE",
+            help="what ran, with --machine: which motions are the axis's, and participations",
+        ),
     ] = None,
     time: Annotated[
         str | None, typer.Option(metavar="NAME", help="column of times, its name or number")
@@ -81,6 +85,13 @@ def identify(
     )
 
     name = _checked(axis, unit, rate, band, plot)
+    if program is None and (channel is not None or said(ctx, "machine")):
+        what = "--channel" if channel is not None else "--machine"
+        raise typer.BadParameter(
+            f"{what} is for participations, which need what ran too: --program FILE"
+        )
+    if rate is not None and time is not None:
+        raise typer.BadParameter("--rate is for records without a column of --time: choose one")
     outputs = [one for one in (as_json, plot, output) if one is not None]
     if len(set(outputs)) < len(outputs):
         raise typer.BadParameter("--json, --plot and -o are files of their own")
@@ -94,6 +105,9 @@ def identify(
     spectra = [one for one in read if isinstance(one, Spectrum)]
     responses = [one for one in read if isinstance(one, FrequencyResponse)]
     taken = [make_record(one, unit) for one in read if isinstance(one, Samples)]
+    if spectra or responses:
+        idle = {"--program": program, "--unit": unit, "--rate": rate, "--time": time}
+        _refuse_beside_spectra([option for option, value in idle.items() if value is not None])
     kinds = [one for one in (spectra, responses, taken) if one]
     if len(kinds) > 1:
         raise RecordError(
@@ -106,6 +120,14 @@ def identify(
         _show(*_responses(responses, name, band or BAND), as_json, plot, output)
     else:
         _show(*_records(taken, name, channel, described, moves, band), as_json, plot, output)
+
+
+def _refuse_beside_spectra(idle: list[str]) -> None:
+    """Refuse what is of records over time alone."""
+    if idle:
+        raise typer.BadParameter(
+            f"{idle[0]} is of records over time, and these are spectra: leave {idle[0]} out"
+        )
 
 
 def _checked(

@@ -129,10 +129,12 @@ def machine_test_program(
         float, typer.Option(metavar="S", min=0.1, max=60.0, help="behind every rapid")
     ] = DEFAULT_DWELL,
     output: Annotated[
-        str, typer.Option("-o", "--output", metavar="FILE", help="- is standard output")
-    ] = "-",
+        str | None,
+        typer.Option("-o", "--output", metavar="FILE", help="standard output (-) by default"),
+    ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="print the lengths in place of the program")
+        bool,
+        typer.Option("--json", help="print the lengths, as JSON; the program with -o FILE only"),
     ] = False,
 ) -> None:
     """Write a program of rapids and dwells, to record the machine's vibration with."""
@@ -140,6 +142,10 @@ def machine_test_program(
     from gcodejerk.errors import MachineError
     from gcodejerk.identification import excitation, rapids_program
 
+    if as_json and output == "-":
+        raise typer.BadParameter(
+            "standard output holds one: the program or --json; name a file with -o"
+        )
     described = load_machine(machine)
     refuse_clashes([output], [described.source])
     chosen = [name.upper() for name in axis or ()] or [
@@ -154,6 +160,10 @@ def machine_test_program(
         excitation(described, described.axis(name).name, room, lengths)
         for name in dict.fromkeys(chosen)
     ]
+    if output is not None or not as_json:
+        with new_file(output or "-") as file:
+            program = rapids_program(described, rapids, repeats, dwell)
+            file.write(program.encode("ascii", "replace"))
     if as_json:
         rows = [
             {
@@ -164,12 +174,15 @@ def machine_test_program(
             }
             for one in rapids
         ]
-        print(json.dumps({"machine": described.source, "rapids": rows}, indent=1))
-        return
-    text = rapids_program(described, rapids, repeats, dwell)
-    with new_file(output) as file:
-        file.write(text.encode("ascii", "replace"))
-    if output != "-":
+        record = {
+            "machine": described.source,
+            "program": output,
+            "repeats": repeats,
+            "dwell": dwell,
+            "rapids": rows,
+        }
+        print(json.dumps(record, indent=1))
+    elif output not in (None, "-"):
         print(
             f"{output}: {', '.join(_said(one) for one in rapids)}; {repeats} times there and back"
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -291,7 +292,11 @@ def _survey(
         return survey
     chosen = survey.dominant
     if len(survey.modes) > 1:
-        print(f"mode {chosen.name}, {chosen.frequency:g} Hz; choose another one with --mode")
+        # Standard output may be the table itself, or JSON.
+        print(
+            f"mode {chosen.name}, {chosen.frequency:g} Hz; choose another one with --mode",
+            file=sys.stderr,
+        )
     return Survey.of(machine, axis, length, condition, chosen.name)
 
 

@@ -73,6 +73,8 @@ def machine_new(
     from gcodejerk.errors import MachineError
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
 
+    if force and output == "-":
+        raise typer.BadParameter("--force replaces a file: name the file with -o")
     refuse_clashes([output], files)
     if output != "-" and os.path.lexists(output) and not force:
         raise MachineError(

@@ -19,6 +19,7 @@ from gcodejerk.batch.jobs import Job
 from gcodejerk.emit import load_controller
 from gcodejerk.machine import Machine
 from gcodejerk.report.page import SUFFIX
+from gcodejerk.rewrite.control_settings import PARAMETERS
 from gcodejerk.rewrite.pipeline import Settings
 
 
@@ -40,18 +41,30 @@ class Outputs:
         """The folder of the reports, where one was named."""
         return self.report if self.report is not None and self.report.endswith("/") else None
 
-    def check(self, files: list[str], told: bool) -> None:
+    def check(self, files: list[str], *, trial: str = "", as_json: bool = False) -> None:
         """Refuse options that contradict each other or the inputs, as wrong usage.
 
-        `told`: the command prints something on standard output by itself.
+        `trial`: the option by which nothing is written, empty where there is none. --output-dir
+        and --in-place may stand beside it: they say which programs a run would take, and for what.
         """
-        if told and self.report == STANDARD:
+        if self.report == STANDARD and (trial == "--diff" or as_json):
             raise typer.BadParameter("--report - has standard output to itself: no --diff, --json")
+        if trial:
+            self._check_trial(trial)
+        if as_json and trial == "--diff":
+            raise typer.BadParameter("standard output holds one: the difference or --json")
         if sum(map(bool, (self.output, self.output_dir, self.in_place))) > 1:
             raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
         if "-" in files and len(files) > 1:
             raise typer.BadParameter("standard input (-) is one program: give it alone")
-        if self.if_changed and (self.in_place or self.output == STANDARD):
+        if "-" in files and self.output_dir is not None:
+            raise typer.BadParameter("standard input has no name to keep in a folder: say -o FILE")
+        piped = self.output == STANDARD or (self.output is None and STANDARD in files)
+        if as_json and not trial and piped:
+            raise typer.BadParameter(
+                "standard output holds one: the program or --json; name a file with -o"
+            )
+        if self.if_changed and (self.in_place or piped):
             raise typer.BadParameter("--if-changed compares a program with its output: name one")
         if self.if_changed and self.report == STANDARD:
             raise typer.BadParameter(
@@ -61,6 +74,19 @@ class Outputs:
             raise typer.BadParameter("--backup is of --in-place: elsewhere the original stays")
         if self.in_place and "-" in files:
             raise typer.BadParameter("--in-place needs a file, not standard input")
+
+    def _check_trial(self, trial: str) -> None:
+        """Refuse what would be written beside an option by which nothing is."""
+        if self.report is not None:
+            raise typer.BadParameter(
+                f"{trial} writes nothing: leave --report out; `gcodejerk inspect FILE --json` "
+                "prints the report on what would become of a program"
+            )
+        for option, value in (
+            ("-o", self.output), ("--backup", self.backup), ("--if-changed", self.if_changed)
+        ):  # fmt: skip
+            if value:
+                raise typer.BadParameter(f"{trial} writes nothing: leave {option} out")
 
     def check_single(self, many: bool) -> None:
         """Refuse names of single files where many programs are given, and reports of no name."""
@@ -82,6 +108,16 @@ class Outputs:
         """One job for each program; two outputs of one name are wrong usage."""
         emitter = load_controller(settings.controller or machine.controller)
         suffix, beside = emitter.suffix, emitter.beside
+        if settings.form == PARAMETERS and settings.profile is not None:
+            raise typer.BadParameter(
+                "--as parameters sets the control, whose own rapids have no profile of ours: leave "
+                "--profile out"
+            )
+        if not settings.comments and (settings.form == PARAMETERS or not emitter.in_place):
+            what = "--as parameters" if emitter.in_place else f"controller {emitter.name}"
+            raise typer.BadParameter(
+                f"{what} replaces no blocks that comments could name: leave --no-comments out"
+            )
         if suffix and self.in_place:
             raise typer.BadParameter(
                 "--in-place: this controller's streams are a file of their own"

@@ -17,6 +17,7 @@ from gcodejerk.cli.common import (
     console,
     load_machine,
     progress,
+    said,
     say,
 )
 from gcodejerk.cli.rapid_feed import ClearanceOption, RapidFeedOption, counting
@@ -31,6 +32,7 @@ WOULD_CHANGE = 3
 
 
 def process(
+    ctx: typer.Context,
     files: Annotated[
         list[str],
         typer.Argument(
@@ -126,14 +128,13 @@ def process(
     # A slicer gives the program a name for the time being, and says the user's.
     called = output_name() if in_place and len(files) == 1 else None
     outputs = Outputs(output, output_dir, in_place, report, backup, if_changed, called)
-    outputs.check(files, told=diff or as_json)
     if revert:
-        _refuse_beside_revert(
-            check=check, diff=diff, strict=strict, json=as_json, in_place=in_place, backup=backup,
-            if_changed=if_changed, output=output, output_dir=output_dir, report=report,
-        )  # fmt: skip
-        _revert(files)
+        _refuse_beside_revert(ctx)
+        _revert(files, quiet)
         return
+    outputs.check(files, trial="--diff" if diff else "--check" if check else "", as_json=as_json)
+    if as_json and verbose:
+        raise typer.BadParameter("--json has no lines of rapids: -v, or --report FILE.json")
     found, problems = find_inputs(files, output_dir)
     many = len(found) + len(problems) > 1
     outputs.check_single(many or any(map(os.path.isdir, files)))
@@ -150,9 +151,10 @@ def process(
     )
     described = counting(load_machine(machine, files), rapid_feed, rapid_clearance)
     described = calling(described, subprograms)
-    mode = "check" if check else "diff" if diff else "write"
+    mode = "diff" if diff else "check" if check else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
-    aside = diff or any(STANDARD in (job.output, job.report) for job in batch)
+    held = (STANDARD in (job.output, job.report) for job in batch)
+    aside = diff or (mode == "write" and any(held))
     tally = _Tally(mode, quiet, aside=aside, many=many, as_json=as_json, verbose=verbose)
     for problem in problems:
         tally.fail(str(problem))
@@ -169,22 +171,28 @@ def process(
         raise typer.Exit(WOULD_CHANGE)
 
 
-def _refuse_beside_revert(**given: object) -> None:
-    """Refuse options that say what becomes of an output: originals are put back, no more."""
-    for name, value in given.items():
-        if value:
-            option = "-o" if name == "output" else f"--{name.replace('_', '-')}"
+BESIDE_REVERT = ("files", "revert", "quiet")
+
+
+def _refuse_beside_revert(ctx: typer.Context) -> None:
+    """Refuse options that say what becomes of a program: originals are put back, no more."""
+    for one in ctx.command.params:
+        name = one.name or ""
+        if said(ctx, name) and name not in BESIDE_REVERT:
+            option = "-o" if name == "output" else max(one.opts, key=len)
             raise typer.BadParameter(f"--revert puts originals back: no {option} beside it")
 
 
-def _revert(files: list[str]) -> None:
+def _revert(files: list[str], quiet: bool) -> None:
     """Put originals back in the place of what was made of them."""
     from gcodejerk.batch.originals import put_back
 
     failed = False
     for name in files:
         try:
-            print(f"{name}: the original is back, from {put_back(name)}")
+            kept = put_back(name)
+            if not quiet:
+                print(f"{name}: the original is back, from {kept}")
         except GcodejerkError as error:
             failed = True
             print(error, file=sys.stderr)

@@ -53,12 +53,15 @@ def verify(
     from gcodejerk.batch.files import open_input
     from gcodejerk.rewrite.expanded import Front, verify_written
     from gcodejerk.verification import verify_files
+    from gcodejerk.verification.bytes.alignment import ALIGNED
     from gcodejerk.verification.bytes.hal import CONTROLLER
     from gcodejerk.verification.proof import beside_of
     from gcodejerk.verification.reported import read_reported
     from gcodejerk.verification.rows.files import rows_format, stated_profile
     from gcodejerk.verification.table import is_table
 
+    if as_json and quiet:
+        raise typer.BadParameter("--json prints, and -q is the exit status alone: choose one")
     if original == processed == "-":
         raise typer.BadParameter("only one of the two can be standard input")
     described = counting(load_machine(machine, [original]), rapid_feed, rapid_clearance)
@@ -82,6 +85,11 @@ def verify(
         described, dialect, front = _said(
             other, processed, described, profile, dialect, controller, front
         )
+        if report is not None and (table or front or described.controller not in ALIGNED):
+            raise typer.BadParameter(
+                "--report holds streams for LinuxCNC in the original's own lines to their "
+                f"profiles, and {processed} has none: leave --report out"
+            )
         samples = beside_of(processed) if described.controller == CONTROLLER else None
         beside = files.enter_context(open_input(samples)) if samples is not None else None
         if front:

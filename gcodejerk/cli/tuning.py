@@ -87,8 +87,17 @@ def parameters(
         raise typer.BadParameter("give programs, or --lengths FROM:TO such as 1:500, and not both")
     if goal not in GOALS:
         raise typer.BadParameter(f"--goal {goal}: choose {' or '.join(GOALS)}")
+    if lengths is not None and dialect is not None:
+        raise typer.BadParameter(
+            "--dialect is of programs, and --lengths has none: leave --dialect out"
+        )
     own = _numbers(tried or [])
     written = _written(output, as_json, plot, no_curve=no_curve)
+    if own and "-" in written:
+        raise typer.BadParameter(
+            "--try shows its numbers beside the others, where standard output is free: leave --try "
+            "out, or name a file in place of -"
+        )
     programs = files or []
     described = load_machine(machine, programs)
     refuse_clashes(written, [described.source, *programs])

@@ -31,6 +31,10 @@ class Request:
     def problem(self) -> str | None:
         """What is wrong with the words of the command, None where nothing is."""
         takes = HOSTS[self.host].takes
+        if self.remove:
+            for option, value in (("--machine", self.machine), ("--base", self.base)):
+                if value is not None:
+                    return f"--remove takes out what is there: leave {option} out"
         if self.host == "linuxcnc":
             return self._linuxcnc_problem()
         if self.form is not None or self.linuxcnc_version is not None:
@@ -55,6 +59,8 @@ class Request:
             return "--base is not for the host linuxcnc"
         if self.form is not None and self.form not in _FORMS:
             return f"--form {self.form}: choose one of {', '.join(_FORMS)}"
+        if self.linuxcnc_version is not None and (self.remove or self.form == filter_lines.FORM):
+            return "--linuxcnc-version is for putting HAL in: leave --linuxcnc-version out"
         if self.form == filter_lines.FORM:
             if self.machine is None and not self.remove:
                 return "--form filter: name the machine file with --machine"

@@ -210,7 +210,7 @@ class _Table:
                 "its header and its rows have to agree",
             )
         if names[0].lower().lstrip("#") in ("freq", "frequency", "freq (hz)", "frequency [hz]"):
-            return self._spectrum(names, values)
+            return self._spectrum(names, values, columns)
         at = None if rate is not None and time is None else self._time_column(names, time)
         chosen = self._chosen(names, columns, at)
         times = None
@@ -272,9 +272,10 @@ class _Table:
                     )
         return None
 
-    def _spectrum(self, names: list[str], values: Array) -> Spectrum:
+    def _spectrum(self, names: list[str], values: Array, columns: Sequence[str]) -> Spectrum:
         axes = [k for k, name in enumerate(names) if re.fullmatch(r"psd_[xyz]", name.lower())]
-        chosen = axes or list(range(1, values.shape[1]))
+        chosen = [self._index(names, column) for column in columns]
+        chosen = chosen or axes or list(range(1, values.shape[1]))
         # The scores of shapers stand beside what was scaled for them: `mzv(54.2)`.
         shapers = any(re.fullmatch(r"\w+\([\d.]+\)", name) for name in names)
         scaled = shapers or "calibration" in Path(self.name).name

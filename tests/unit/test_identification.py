@@ -617,7 +617,10 @@ def test_the_block_leaves_participation_to_the_user(command, tmp_path):
         (["--axis", "Z", "--unit", "mg"], "--unit mg"),
         (["--axis", "Z", "--band", "50", "20"], "--band"),
         (["--axis", "Z", "--band", "5", "900"], "reaches to 320 Hz"),
-        (["--axis", "Z", "--channel", "ax"], "no channel 'ax'"),
+        (
+            ["--axis", "Z", "--channel", "ax", "-m", "vmc33", "--program", "r.ngc"],
+            "no channel 'ax'",
+        ),
         (["--axis", "Z", "--column", "ax"], "no column 'ax'"),
         (["--axis", "Z", "--rate", "-1"], "--rate"),
         (["--axis", "Z", "--plot", "a.gif"], "--plot"),
@@ -625,7 +628,8 @@ def test_the_block_leaves_participation_to_the_user(command, tmp_path):
     ],
 )
 def test_wrong_options_are_said(command, tmp_path, options, says):
-    (tmp_path / "r.csv").write_bytes((SAMPLES / "ringing.csv").read_bytes())
+    for suffix in ("csv", "ngc"):
+        (tmp_path / f"r.{suffix}").write_bytes((SAMPLES / f"ringing.{suffix}").read_bytes())
     status, said = command("identify", "r.csv", *options)
     assert status != 0
     assert says in said
