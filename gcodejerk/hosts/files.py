@@ -1,7 +1,8 @@
 """Files of ours in the folder of a host: put there, recognised, and taken away again.
 
 Rule: the first line says what a file is and carries the sum of the rest. A file without that line
-is somebody else's, one with another sum was edited: both are left alone.
+is somebody else's, one with another sum was edited, one of another host serves that: all are left
+alone.
 """
 
 from __future__ import annotations
@@ -43,11 +44,16 @@ def put(path: Path, data: bytes) -> str:
     EmitError
         Something else is there, or the folder cannot be written to; nothing was changed.
     """
-    old = _read(path)
+    old, host = _read(path), _host(data)
     if old == data:
         return f"{path}: is installed already; nothing was changed"
     if old is not None:
         _check_ours(path, old)
+        if _host(old) != host:
+            raise EmitError(
+                f"{path} was installed for {_host(old)}",
+                f"put that for {host} into another folder, or take the other one out first",
+            )
     if not is_writable(path.parent):
         raise EmitError(f"{path.parent} cannot be written to", "change its permissions")
     with new_file(str(path)) as file:
@@ -55,8 +61,8 @@ def put(path: Path, data: bytes) -> str:
     return f"{path}: {'written' if old is None else 'written anew'}"
 
 
-def take(path: Path) -> str | None:
-    """Take a signed file away; None where there is none.
+def take(path: Path, host: str) -> str | None:
+    """Take the signed file of a host away; None where there is none.
 
     Raises
     ------
@@ -64,7 +70,7 @@ def take(path: Path) -> str | None:
         It is not ours, or was edited.
     """
     old = _read(path)
-    if old is None:
+    if old is None or _host(old) not in (host, None):
         return None
     _check_ours(path, old)
     try:
@@ -98,6 +104,12 @@ def _check_ours(path: Path, data: bytes) -> None:
             f"{path} was edited after it was installed",
             "keep a copy under another name, then remove it",
         )
+
+
+def _host(data: bytes) -> str | None:
+    """What a file was signed for, None where nobody signed it."""
+    found = _OWN.match(data)
+    return None if found is None else found[1].decode()
 
 
 def _sum(data: bytes) -> str:

@@ -27,6 +27,8 @@ class Text:
     """Begins a comment in the language of the file."""
     steps: tuple[str, ...]
     """What to do with it."""
+    former: str = ""
+    """A name that the file had before, and that is another host's now."""
 
 
 _BATCH = (
@@ -45,7 +47,7 @@ TEXTS = {
         ),
     ),
     "mastercam": Text("drop.bat", "gcodejerk.bat", "@rem", _BATCH),
-    "solidcam": Text("drop.bat", "gcodejerk.bat", "@rem", _BATCH),
+    "solidcam": Text("drop.bat", "gcodejerk_solidcam.bat", "@rem", _BATCH, "gcodejerk.bat"),
     "vectric": Text(
         "in_place.bat", "gcodejerk_run.bat", "@rem",
         (
@@ -71,8 +73,9 @@ TEXTS = {
         ),
     ),
     "bcnc": Text(
-        "bcnc.py", "gcodejerk.py", "#",
+        "bcnc.py", "gcodejerk_bcnc.py", "#",
         ("the folder is `plugins` in bCNC's; the button is then on the CAM ribbon",),
+        "gcodejerk.py",
     ),
 }  # fmt: skip
 
@@ -100,9 +103,11 @@ def text_lines(host: str, where: str | None, command: tuple[str, ...], machine: 
     steps = [f"- {step}" for step in text.steps]
     if where is None:
         return [*body.rstrip("\n").split("\n"), "", f"file: {text.file}; what to do:", *steps]
-    done = put(_folder(where) / text.file, signed(host, body, text.comment))
+    folder = _folder(where)
+    done = put(folder / text.file, signed(host, body, text.comment))
     return [
         done,
+        *_former(host, folder),
         *steps,
         f"`gcodejerk install {host} {shlex.quote(where)} --remove` takes it out again",
     ]
@@ -110,8 +115,18 @@ def text_lines(host: str, where: str | None, command: tuple[str, ...], machine: 
 
 def remove_text(host: str, where: str) -> list[str]:
     """Take the file of a host away."""
-    place = _folder(where) / TEXTS[host].file
-    return [take(place) or f"{place}: nothing of gcodejerk is installed"]
+    folder = _folder(where)
+    place = folder / TEXTS[host].file
+    done = [take(place, host), *_former(host, folder)]
+    said = [line for line in done if line is not None]
+    return said or [f"{place}: nothing of gcodejerk is installed"]
+
+
+def _former(host: str, folder: Path) -> list[str]:
+    """Take away what an earlier version has put there under another name."""
+    former = TEXTS[host].former
+    done = take(folder / former, host) if former else None
+    return [] if done is None else [done]
 
 
 def _folder(where: str) -> Path:

@@ -76,6 +76,50 @@ def test_files_go_in_once_and_out_again(command, tmp_path, host):
     assert command("install", host, tmp_path / "none", "-m", "vmc")[0] == 1
 
 
+def test_in_one_folder_no_host_takes_the_place_of_another(command, tmp_path):
+    for host in TEXTS:
+        assert command("install", host, tmp_path, "-m", "vmc")[0] == 0
+    installed = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert len(installed) == len({str(path).lower() for path in installed}) + 1, "Cura's own name"
+    assert len(installed) == len(TEXTS)
+    for host in TEXTS:
+        assert "nothing was changed" in command("install", host, tmp_path, "-m", "vmc")[1]
+        assert command("install", host, tmp_path, "--remove")[0] == 0
+        installed = {path: data for path, data in installed.items() if path.exists()}
+        assert all(path.read_bytes() == data for path, data in installed.items())
+    assert not installed
+
+
+@pytest.mark.parametrize("host", [name for name, text in TEXTS.items() if text.former])
+def test_a_file_under_its_former_name_goes_and_that_of_another_host_stays(command, tmp_path, host):
+    text = TEXTS[host]
+    assert command("install", host, tmp_path, "-m", "vmc")[0] == 0
+    (tmp_path / text.file).rename(tmp_path / text.former)
+    status, said = command("install", host, tmp_path, "-m", "router")
+    assert (status, f"{text.former}: removed" in said) == (0, True)
+    assert [path.name for path in tmp_path.iterdir()] == [text.file]
+    (tmp_path / text.file).rename(tmp_path / text.former)
+    assert command("install", host, tmp_path, "--remove")[0] == 0
+    assert list(tmp_path.iterdir()) == []
+    (other,) = (name for name, one in TEXTS.items() if one.file == text.former)
+    assert command("install", other, tmp_path, "-m", "vmc")[0] == 0
+    before = (tmp_path / text.former).read_bytes()
+    assert command("install", host, tmp_path, "-m", "vmc")[0] == 0
+    assert command("install", host, tmp_path, "--remove")[0] == 0
+    assert (tmp_path / text.former).read_bytes() == before
+
+
+def test_a_name_that_is_another_hosts_file_is_refused(command, tmp_path):
+    # Cura's Gcodejerk.py and OctoPrint's gcodejerk.py, where systems take them for one name.
+    assert command("install", "octoprint", tmp_path, "-m", "vmc")[0] == 0
+    (tmp_path / "gcodejerk.py").rename(tmp_path / "Gcodejerk.py")
+    before = (tmp_path / "Gcodejerk.py").read_bytes()
+    status, said = command("install", "cura", tmp_path, "-m", "vmc")
+    assert (status, "for octoprint" in said, "another folder" in said) == (1, True, True)
+    assert "nothing of gcodejerk" in command("install", "cura", tmp_path, "--remove")[1]
+    assert (tmp_path / "Gcodejerk.py").read_bytes() == before
+
+
 @pytest.mark.parametrize("host", [*SLICERS, *WATCHED])
 def test_hosts_without_a_file_take_no_folder(command, tmp_path, host):
     assert command("install", host, tmp_path, "-m", "vmc")[0] == 2

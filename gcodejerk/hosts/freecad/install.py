@@ -90,7 +90,7 @@ def install_post(
 def remove_post(where: str | None) -> list[str]:
     """Take the post-processor out."""
     folders = macro_folders(where)
-    done = [take(folder / POST) for folder in folders]
+    done = [take(folder / POST, "freecad") for folder in folders]
     shown = ", ".join(map(str, folders))
     return [line for line in done if line] or [f"{shown}: nothing of gcodejerk is installed"]
 
