@@ -174,14 +174,32 @@ class Bar:
 
     def __call__(self, step: str, done: int, total: int) -> None:
         """Show how far a step is."""
+        self.live.update(self.task, description=step, completed=done, total=max(total, 1))
+        self._show()
+
+    def wait(self, step: str) -> None:
+        """Show that a step is at work that does not know how far it is."""
+        self.live.remove_task(self.task)
+        self.task = self.live.add_task(step, total=None)
+        self._show()
+
+    def _show(self) -> None:
         if not self.live.live.is_started:
             self.live.start()
-        self.live.update(self.task, description=step, completed=done, total=max(total, 1))
 
     def clear(self) -> None:
         """Take it from the screen until it is called again."""
         if self.live.live.is_started:
             self.live.stop()
+
+
+@contextmanager
+def waiting(step: str, silent: bool = False) -> Iterator[None]:
+    """The same for one step that does not know how far it is."""
+    with progress(silent) as show:
+        if show is not None:
+            show.wait(step)
+        yield
 
 
 @contextmanager

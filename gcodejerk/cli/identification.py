@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gcodejerk.cli.common import MachineOption, console, load_machine, said, say
+from gcodejerk.cli.common import MachineOption, console, load_machine, said, say, waiting
 from gcodejerk.cli.moves import FIGURES
 
 if TYPE_CHECKING:
@@ -97,11 +97,12 @@ def identify(
         raise typer.BadParameter("--json, --plot and -o are files of their own")
     described, moves = _told(machine, program, name)
     _keep_apart(outputs, [*records, program], described)
-    read = [
-        found
-        for one in records
-        for found in read_records(one, time=time, columns=column or (), rate=rate)
-    ]
+    with waiting("reading"):
+        read = [
+            found
+            for one in records
+            for found in read_records(one, time=time, columns=column or (), rate=rate)
+        ]
     spectra = [one for one in read if isinstance(one, Spectrum)]
     responses = [one for one in read if isinstance(one, FrequencyResponse)]
     taken = [make_record(one, unit) for one in read if isinstance(one, Samples)]
@@ -114,12 +115,14 @@ def identify(
             f"{kinds[0][0].name} and {kinds[1][0].name} are not of one kind",
             "give records over time, or spectra, or frequency responses",
         )
-    if spectra:
-        _show(*_spectra(spectra, name, band or BAND), as_json, plot, output)
-    elif responses:
-        _show(*_responses(responses, name, band or BAND), as_json, plot, output)
-    else:
-        _show(*_records(taken, name, channel, described, moves, band), as_json, plot, output)
+    with waiting("searching"):
+        if spectra:
+            result = _spectra(spectra, name, band or BAND)
+        elif responses:
+            result = _responses(responses, name, band or BAND)
+        else:
+            result = _records(taken, name, channel, described, moves, band)
+    _show(*result, as_json, plot, output)
 
 
 def _refuse_beside_spectra(idle: list[str]) -> None:

@@ -17,6 +17,7 @@ from gcodejerk.cli.common import (
     console,
     load_machine,
     progress,
+    waiting,
 )
 
 if TYPE_CHECKING:
@@ -71,18 +72,20 @@ def plan(
     emitter = load_controller(described.controller)
     # LinuxCNC follows the profile between the points: judged at every interval, like a table.
     held = emitter.play is Play.HELD
-    planned = plan_move(
-        displacement_of(moves),
-        described,
-        profile,
-        time=time,
-        T1=t1,
-        stride=emitter.stride(described.interval) if held else 1,
-        play=Play.HELD if held else Play.TABLE,
-    )
-    if not planned.planned:
-        raise not_planned(planned.reason or "")
-    record = move_record(planned)
+    move = displacement_of(moves)
+    with waiting("planning"):
+        planned = plan_move(
+            move,
+            described,
+            profile,
+            time=time,
+            T1=t1,
+            stride=emitter.stride(described.interval) if held else 1,
+            play=Play.HELD if held else Play.TABLE,
+        )
+        if not planned.planned:
+            raise not_planned(planned.reason or "")
+        record = move_record(planned)
     with ExitStack() as outputs:
         if csv is not None:
             outputs.enter_context(new_file(csv)).write(stream_csv(planned))
@@ -158,16 +161,20 @@ def map_amplitudes(
     if as_json:
         from gcodejerk.report.map_record import map_record
 
-        print(json.dumps(map_record(survey), indent=1, ensure_ascii=False, allow_nan=False))
+        with waiting("mapping"):
+            record = map_record(survey)
+        print(json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False))
     elif output is None:
         from gcodejerk.report.tables import map_tables
 
+        with waiting("mapping"):
+            tables = map_tables(survey)
         screen = console()
-        for table in map_tables(survey):
+        for table in tables:
             screen.print(table)
     if output is None:
         return
-    with new_file(output) as file:
+    with waiting("mapping", silent=output == STANDARD), new_file(output) as file:
         if suffix == TABLE:
             from gcodejerk.report.map_csv import map_csv
 
@@ -251,7 +258,7 @@ def compare(
             described,
             time=time,
             shaper_damping=damping,
-            progress=None if show is None else lambda done, total: show("optima", done, total),
+            progress=show,
         )
     with ExitStack() as outputs:
         if as_json is not None:

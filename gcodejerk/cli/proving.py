@@ -6,11 +6,18 @@ import json
 import sys
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
-from gcodejerk.cli.common import JsonOption, MachineOption, ProfileOption, load_machine
+from gcodejerk.cli.common import (
+    JsonOption,
+    MachineOption,
+    ProfileOption,
+    load_machine,
+    progress,
+)
 from gcodejerk.cli.rapid_feed import ClearanceOption, RapidFeedOption, counting
 from gcodejerk.cli.subprograms import SubprogramsOption, calling
 
@@ -92,16 +99,20 @@ def verify(
             )
         samples = beside_of(processed) if described.controller == CONTROLLER else None
         beside = files.enter_context(open_input(samples)) if samples is not None else None
+        show = files.enter_context(progress(quiet))
+        if show is not None:
+            show.wait("reading")
+        tell = None if show is None else partial(show, "verifying")
         if front:
             found, written = verify_written(
                 one, other, described, front, names=names, dialect=dialect, most=most,
-                beside=beside,
+                beside=beside, progress=tell,
             )  # fmt: skip
             told = written.told
         else:
             found = verify_files(
                 one, other, described, names=names, dialect=dialect, most=most, table=table,
-                beside=beside, reported=reported,
+                beside=beside, reported=reported, progress=tell,
             )  # fmt: skip
     if as_json:
         print(json.dumps(_findings(found, original, processed), indent=1, ensure_ascii=False))

@@ -21,6 +21,7 @@ from gcodejerk.cli.common import (
     load_machine,
     progress,
     say,
+    waiting,
 )
 from gcodejerk.cli.moves import FIGURES, displacement_of
 from gcodejerk.errors import EmitError, PlanError
@@ -150,10 +151,10 @@ def _move(
     if written:
         emitter = load_controller(machine.controller)
         played = {"stride": emitter.stride(machine.interval), "play": _played(emitter)}
-    plan = plan_move(
-        displacement_of(moves), machine, profile, time=time, T1=t1, as_played=written, **played
-    )
-    found = MoveSimulation(plan, written=written)
+    move = displacement_of(moves)
+    with waiting("simulating"):
+        plan = plan_move(move, machine, profile, time=time, T1=t1, as_played=written, **played)
+        found = MoveSimulation(plan, written=written)
     free = files.write(
         lambda: move_simulation_record(found),
         lambda: move_simulation_csv(found),

@@ -108,9 +108,13 @@ def parameters(
             "`gcodejerk controllers` shows which have the form parameters",
         )
     with progress(False) as show:
+        if show is not None:
+            show.wait("reading")
         moves, of = _moves(programs, lengths, described, dialect)
         scheme = emitter.scheme(described, settings)
         scheme.checked(own)
+        if show is not None:
+            show.wait("searching")
         found = tune(
             scheme, moves, described, goal=goal, time=time, curve=not no_curve,
             progress=None if show is None else lambda done, total: show("searching", done, total),

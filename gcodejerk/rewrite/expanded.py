@@ -277,6 +277,7 @@ def verify_written(
     dialect: str | None = None,
     most: int = 100,
     beside: BinaryIO | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Verification, WrittenOut]:
     """Prove that a program is another one with blocks written out and its rapids re-timed.
 
@@ -299,6 +300,8 @@ def verify_written(
         Violations after which it stops.
     beside : BinaryIO, optional
         The file of samples beside the processed program.
+    progress : callable, optional
+        As `verify_files` has it.
 
     Returns
     -------
@@ -314,8 +317,9 @@ def verify_written(
         prove=lambda found: first.extend(found.violations), most=most,
     ) as (between, written):  # fmt: skip
         found = verify_files(
-            between, processed, machine, names=names, dialect=dialect, most=most, beside=beside
-        )
+            between, processed, machine, names=names, dialect=dialect, most=most, beside=beside,
+            progress=progress,
+        )  # fmt: skip
     later = (_in_original(violation, written.map) for violation in found.violations)
     violations = (*first, *later)[:most]
     return replace(found, violations=violations), written

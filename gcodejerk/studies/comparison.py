@@ -32,17 +32,22 @@ from gcodejerk.planning.bounds import known_limits
 from gcodejerk.planning.conventional import least_time
 from gcodejerk.planning.designs import condition1, condition2
 from gcodejerk.planning.move import check_time, displacement_row, not_planned
-from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plan import MOST_INTERVALS, plan_moves
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.task import Task
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.studies.families import family_profiles
+from gcodejerk.studies.steps import Progress, Steps
 
 DESIGNED = ("condition3", "symmetric", "cascade", "optimal", "shortest")
 """Profiles that the planner makes, within the limits."""
 CONTENDERS = ("conventional", "condition1", "condition2", *DESIGNED, *SHAPERS)
 """Everyone, in that order."""
+STEPS = {
+    **dict.fromkeys(("conventional", "condition1", "condition2", *DESIGNED, "limits"), 1),
+    **{"optimal": 8, "shortest": 40, "judging": 10},
+}
+"""What is done, and about how long it takes where a move is long and modes are many."""
 SOLVED = ("optimal", "shortest")
 """Profiles that need the solver."""
 NEEDS_SOLVER = "needs gcodejerk[science]"
@@ -189,7 +194,7 @@ def compare_move(
     shaper_damping : float or None, optional
         Damping ratio that shapers are made for; None: that of the mode. [-]
     progress : callable, optional
-        Called while optima are computed.
+        Called with what is being done, how much of the work is, and how much there is.
 
     Returns
     -------
@@ -239,11 +244,12 @@ class _Field:
         self, machine: Machine, row: Array, time: float | None, damping: float | None,
         progress: Progress | None,
     ) -> None:  # fmt: skip
-        self.machine, self.row, self.time, self.progress = machine, row, time, progress
-        self.damping = damping
+        self.machine, self.row, self.time, self.damping = machine, row, time, damping
+        self.told = Steps(progress, STEPS)
+        self.told("conventional")
         self.modes = Modes.of(machine)
         self.share = row if machine.positioning == "linear" else np.diag(row[0])[row[0] != 0.0]
-        task = Task.of(machine, self.modes, self.share, progress=progress)
+        task = Task.of(machine, self.modes, self.share)
         counts = task.counts
         if time is not None:
             given = np.full(len(self.share), time)
@@ -262,6 +268,7 @@ class _Field:
         free = np.full(len(self.share), np.inf)
         unlimited = replace(self.task, limits=(free, free, free))
         for name, design in (("condition1", condition1), ("condition2", condition2)):
+            self.told(name)
             found, worst = design(unlimited)
             if np.isfinite(worst).all():
                 self.profiles[name] = found
@@ -297,9 +304,10 @@ class _Field:
             if name in SOLVED and not solver:
                 self.absent[name] = NEEDS_SOLVER
                 continue
+            self.told(name)
             time = None if name == "shortest" else self.time
             try:
-                plans = plan_moves(self.row, self.machine, name, time=time, progress=self.progress)
+                plans = plan_moves(self.row, self.machine, name, time=time)
             except PlanError as error:
                 refused.append(error)
                 self.absent[name] = error.problem
@@ -342,16 +350,19 @@ class _Field:
     def judged(self, displacement: dict[str, float]) -> Comparison:
         """Everyone's figures."""
         names = [name for name in CONTENDERS if name in self.profiles]
-        limits = known_limits(self._plans(names), self.progress)
-        candidates = tuple(
-            self._candidate(name, np.nan if limits is None else float(limits[k]))
-            for k, name in enumerate(names)
-        )
+        self.told("limits")
+        limits = known_limits(self._plans(names), None)
+        bounds = {} if limits is None else dict(zip(names, limits.tolist(), strict=True))
+        found = {}
+        for done, name in enumerate((*names, *self.families)):
+            self.told("judging", done / (len(names) + len(self.families)))
+            found[name] = self._candidate(name, bounds.get(name, np.nan))
         absent = {name: self.absent[name] for name in CONTENDERS if name in self.absent}
         return Comparison(
-            self.machine, displacement, self.modes, self.share, candidates, absent,
+            self.machine, displacement, self.modes, self.share,
+            tuple(found[name] for name in names), absent,
             float(self.task.total.max()), tuple(self.shaped),
-            tuple(self._candidate(name, np.nan) for name in self.families), self.families_absent,
+            tuple(found[name] for name in self.families), self.families_absent,
         )  # fmt: skip
 
     def _plans(self, names: list[str]) -> Plans:

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import pty
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,9 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from gcodejerk.machine import Machine
+from gcodejerk.machine import Machine, find_machine
 from gcodejerk.report.screen import ScreenTable
 from gcodejerk.studies.amplitude_map import Survey
+
+SAMPLES = Path(__file__).parents[2] / "samples"
 
 INCH = b"G20 G90 G94\nG0 X0 Y0 Z0\nG0 X1\nG1 X2 F20\nG0 Z.5\nM2\n"
 METRIC = b"G21 G90 G94\nG0 X0 Y0 Z0\nG0 X20\nG1 X30 F500\nG0 Z5\nM2\n"
@@ -129,6 +132,42 @@ def test_results_go_to_standard_output_while_a_bar_is_shown(tmp_path):
     # The bar was drawn, and its line erased in the end.
     assert "\x1b[?25l" in screen
     assert screen.rindex("\x1b[2K") > screen.rindex("━")
+
+
+LONG = {
+    "compare -m vmc Z=1": ("conventional", "judging"),
+    "map -m vmc --axis Z --length 1 -o z.png": ("mapping",),
+    "plan -m vmc Z=1 --profile shortest": ("planning",),
+    "simulate -m vmc Z=1": ("simulating",),
+    "parameters -m vmc --controller fanuc a.ngc --no-curve": ("reading", "searching"),
+    "verify a.ngc a.ngc -m vmc": ("reading",),
+    "identify r.csv --axis Z": ("reading", "searching"),
+}
+"""Commands that may last for minutes; their first step, and their last one."""
+
+
+@pytest.mark.parametrize("text", LONG)
+def test_no_command_that_may_last_is_silent_on_a_terminal(tmp_path, text):
+    (tmp_path / "a.ngc").write_bytes(METRIC)
+    shutil.copy(SAMPLES / "ringing.csv", tmp_path / "r.csv")
+    with open(tmp_path / "log", "wb") as log:
+        screen = in_a_terminal(text.split(), tmp_path, log)
+    assert [step for step in LONG[text] if step in screen] == list(LONG[text])
+    assert screen.rindex("\x1b[2K") > screen.rindex(LONG[text][-1])
+
+
+def test_a_comparison_says_what_it_does_from_its_beginning_to_its_end():
+    from gcodejerk.studies.comparison import CONTENDERS, DESIGNED, compare_move
+
+    told = []
+    compare_move({"Z": 1.0}, Machine.load(find_machine("vmc")), progress=lambda *a: told.append(a))
+    steps = list(dict.fromkeys(step for step, _, _ in told))
+    assert steps == [*CONTENDERS[:3], *DESIGNED, "limits", "judging"]
+    done = [part for _, part, _ in told]
+    assert done == sorted(done)
+    assert done[0] == 0
+    (whole,) = {whole for _, _, whole in told}
+    assert 0.9 * whole < done[-1] < whole
 
 
 def test_long_lines_are_broken_between_words_on_a_terminal(monkeypatch, capsys):
