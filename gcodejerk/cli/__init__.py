@@ -8,6 +8,9 @@ in one module per group; this one puts them together and owns what becomes of an
 
 from __future__ import annotations
 
+from gcodejerk.cli.interrupts import IMPORTING, Noted  # in front of all that takes its time
+
+# isort: split
 import io
 import os
 import signal
@@ -70,8 +73,25 @@ machine_app.command("test-program", cls=Once)(machine_test_program)
 machine_app.command("schema", cls=Once)(machine_schema)
 
 
+IMPORTING.back()
+
+
 def main() -> None:
     """Run the command line; every mistake of a user is a message, every other one a traceback."""
+    interrupt = Noted()
+    try:
+        _run()
+    except KeyboardInterrupt:  # before typer answers to it, or behind
+        sys.exit(128 + signal.SIGINT)
+    except Exception:
+        if not interrupt.came:
+            raise
+        sys.exit(128 + signal.SIGINT)
+    finally:
+        interrupt.back()
+
+
+def _run() -> None:
     _end_in_order()
     # Our matrices are small: threads would wait for each other, on a busy computer for longer than
     # all the rest takes. Read by the libraries as numpy is imported, here and in our processes.

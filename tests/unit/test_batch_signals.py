@@ -64,3 +64,54 @@ def test_other_errors_that_nobody_can_raise_are_told_as_before():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert "ZeroDivisionError" in done.stderr
+
+
+IMPORTED = """
+import os, signal, sys
+
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r}:
+            sys.meta_path.remove(self)
+            {how}
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(10**6):
+        pass
+
+class Hiding:  # up to Python 3.11
+    def __set_name__(self, owner, name):
+        try:
+            interrupt()
+        except BaseException as error:
+            raise RuntimeError("hidden") from error
+
+sys.meta_path.insert(0, Interrupting())
+sys.argv = ["gcodejerk", "machine", "show", "vmc"]
+from gcodejerk.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["typer", "gcodejerk.cli.proving", "gcodejerk.machine"])
+def test_an_interrupt_while_modules_are_imported_is_quiet(name):
+    code = IMPORTED.format(name=name, how="interrupt()")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+@pytest.mark.parametrize("name", ["typer", "gcodejerk.machine"])
+def test_an_interrupt_that_an_import_hides_is_quiet(name):
+    code = IMPORTED.format(name=name, how="type('Made', (), {'one': Hiding()})")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+def test_whoever_imports_the_command_line_keeps_their_answer_to_interrupts():
+    code = (
+        "import signal, sys; "
+        "now = lambda: (signal.getsignal(signal.SIGINT), sys.unraisablehook, sys.excepthook); "
+        "before = now(); import gcodejerk.cli; assert before == now()"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
