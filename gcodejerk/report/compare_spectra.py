@@ -21,7 +21,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.report.compare_shown import MS, TEXT, UM, UNIT, Shown
-from gcodejerk.report.figures import shown_name
+from gcodejerk.report.figures import name_frequencies, shown_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,8 +36,6 @@ WINDOW = 12.0
 """Periods of the lowest mode that a spectrum of the vibration looks at."""
 NOTABLE = 0.1
 """The scale ends where the lines of a spectrum stay below this share of the largest."""
-PREFERRED = (1.0, 2.0, 5.0, 3.0, 7.0, 1.5, 4.0, 6.0, 8.0)
-"""Frequencies that are named, times powers of ten, while there is room; the first ones first."""
 NAMES = 15.0
 """Height of the names of the modes above their part. [pt]"""
 
@@ -197,7 +195,7 @@ def name_modes(axes: Axes, shown: Shown) -> None:
     low, high = np.log(axes.get_xlim())
     centres = np.array([(np.log(m.frequency) - low) / (high - low) * width for m in modes])
     full = [
-        shown_name(m.name) if m.name.endswith("Hz") else f"{shown_name(m.name)} {m.frequency:g} Hz"
+        shown_name(m.name) + ("" if m.name.endswith("Hz") else f" {m.frequency:g} Hz")
         for m in modes
     ]
     for words in (
@@ -295,15 +293,7 @@ def _log_axes(axes: Axes, frequency: Array, low: float, high: float, spacing: fl
     axes.set_xscale("log")
     axes.set_ylim(low, high)
     axes.set_xlim(frequency[0], frequency[-1])
-    ticks: list[float] = []
-    span = float(np.log(frequency[-1] / frequency[0]))
-    for step in PREFERRED:
-        for tick in (step * 10.0**k for k in range(-1, 5)):
-            away = [abs(np.log(tick / other)) >= spacing * span for other in ticks]
-            if frequency[0] <= tick <= frequency[-1] and all(away):
-                ticks.append(tick)
-    axes.set_xticks(sorted(ticks), [f"{tick:g}" for tick in sorted(ticks)])
-    axes.set_xticks([], minor=True)
+    name_frequencies(axes, spacing)
     axes.set_yticks([], minor=True)
     axes.grid(True, color="0.94", linewidth=0.5)
     axes.set_axisbelow(True)

@@ -7,7 +7,9 @@ the error names the remedy.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, BinaryIO
+from unicodedata import east_asian_width
 
 import numpy as np
 
@@ -29,6 +31,8 @@ HATCH = 0.6
 """Width of the lines of hatches. [pt]"""
 LONGEST_NAME = 80
 """Letters of a name that the page has room for."""
+PREFERRED = (1.0, 2.0, 5.0, 3.0, 7.0, 1.5, 4.0, 6.0, 8.0, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 9.0)
+"""Frequencies that are named, times powers of ten, while there is room; the first ones first."""
 FINE = 8
 """Points of a curve for each interval."""
 PERIODS = 4.0
@@ -91,9 +95,29 @@ def save(figure: Figure, file: BinaryIO, suffix: str) -> None:
 
 
 def shown_name(name: str, most: int = LONGEST_NAME) -> str:
-    """A name of the user's for a picture: no longer than there is room, and no mathematics."""
-    short = name if len(name) <= most else f"{name[: most - 1].rstrip()}…"
-    return short.replace("$", r"\$")
+    """A name of the user's for a picture: no longer than there is room, and no mathematics.
+
+    `most`: letters of an average width, of which W takes more room, and i no less.
+
+    Examples
+    --------
+    >>> shown_name("rocking of the column", 14), shown_name("W" * 21, 14)
+    ('rocking of th…', 'WWWWWWW…')
+    """
+    room = list(accumulate(map(_letters, name)))
+    if room and room[-1] > most:
+        kept = sum(width <= most - 1.0 for width in room)
+        name = f"{name[:kept].rstrip()}…"
+    return name.replace("$", r"\$")
+
+
+def _letters(letter: str) -> float:
+    """Width of a letter in DejaVu Sans, in letters of an average one."""
+    if letter in "Wm@%Æ\N{EM DASH}" or east_asian_width(letter) in "WF":
+        return 1.8
+    if letter in "Mwæ":
+        return 1.5
+    return 1.2 if letter.isupper() else 1.0
 
 
 def moved_words(displacement: Mapping[str, float], machine: Machine) -> str:
@@ -104,12 +128,29 @@ def moved_words(displacement: Mapping[str, float], machine: Machine) -> str:
     )
 
 
+def name_frequencies(axes: Axes, spacing: float) -> None:
+    """Name frequencies below a logarithmic scale, no closer than a share of its width.
+
+    matplotlib names powers of ten; of less than a decade, every other step too, over each other.
+    """
+    low, high = axes.get_xlim()
+    ticks: list[float] = []
+    span = float(np.log(high / low))
+    for step in PREFERRED:
+        for tick in (step * 10.0**k for k in range(-1, 5)):
+            away = [abs(np.log(tick / other)) >= spacing * span for other in ticks]
+            if low <= tick <= high and all(away):
+                ticks.append(tick)
+    axes.set_xticks(sorted(ticks), [f"{tick:g}" for tick in sorted(ticks)])
+    axes.set_xticks([], minor=True)
+
+
 def label_part(axes: Axes, title: str, x: str, y: str) -> None:
     """Give a part of a page its title and units, a light grid, and no box."""
     axes.set_title(title, fontsize=8.5, loc="left")
     axes.set_xlabel(x, fontsize=8)
     axes.set_ylabel(y, fontsize=8)
-    axes.tick_params(labelsize=7.5)
+    axes.tick_params(which="both", labelsize=7.5)
     axes.grid(True, color="0.92", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
 

@@ -160,11 +160,15 @@ def _colour_bar(figure: Figure, survey: Survey, image: Any, axes: Any, pad: floa
 
 
 def _legend(figure: Figure, entries: dict[str, Any], columns: int) -> None:
-    """Below the axes, so that it hides nothing."""
-    figure.legend(
-        list(entries.values()), list(entries), loc="outside lower left", ncols=columns,
-        fontsize=TEXT, frameon=False, handlelength=3.2, handleheight=1.1,
-    )  # fmt: skip
+    """Below the axes, so that it hides nothing; in fewer columns where the page is too narrow."""
+    for count in range(columns, 0, -1):
+        legend = figure.legend(
+            list(entries.values()), list(entries), loc="outside lower left", ncols=count,
+            fontsize=TEXT, frameon=False, handlelength=3.2, handleheight=1.1,
+        )  # fmt: skip
+        if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
 
 
 def _name_lines(figure: Figure, panels: list[MapPanel]) -> None:
@@ -197,4 +201,4 @@ def _judged(survey: Survey) -> str:
         return f"all {len(survey.modes)} modes that {survey.axis.name} excites"
     if mode.name == f"{mode.frequency:g} Hz":
         return f"mode of {mode.frequency:g} Hz, damping {mode.damping:g}"
-    return f"mode {shown_name(mode.name, 40)}, {mode.frequency:g} Hz, damping {mode.damping:g}"
+    return f"mode {shown_name(mode.name, 30)}, {mode.frequency:g} Hz, damping {mode.damping:g}"

@@ -16,6 +16,7 @@ from gcodejerk.report.figures import (
     TODAY,
     label_part,
     moved_words,
+    name_frequencies,
     new_figure,
     save,
     shown_name,
@@ -25,11 +26,14 @@ from gcodejerk.simulation.single import MoveSimulation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 STYLE = {
     "today": {"color": TODAY, "linewidth": 1.3, "label": "controller's own G0"},
     "planned": {"color": PLANNED, "linewidth": 1.3, "label": "planned", "linestyle": (0, (5, 1.5))},
 }
+MOVE = (7.2, 8.4)
+"""Size of the page of a move. [inch]"""
 UM, MS = 1e3, 1e3
 LINES = 1500
 """Points of a curve over frequency."""
@@ -55,7 +59,13 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
     EmitError
         The format is unknown, or matplotlib is not installed.
     """
-    figure = new_figure(suffix, (7.2, 8.4), 200)
+    figure = new_figure(suffix, MOVE, 200)
+    draw_move_simulation(figure, found)
+    save(figure, file, suffix)
+
+
+def draw_move_simulation(figure: Figure, found: MoveSimulation) -> None:
+    """Draw a move into an empty figure; as `plot_move_simulation`."""
     times = found.times()
     axis = max(found.moving, key=lambda name: abs(found.plan.displacement[name]))
     u = found.watch.equations.axes.index(axis)
@@ -90,6 +100,9 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
     left.set_ylim(1e-5 * density, density)
     tolerance = UM * found.machine.design.tolerance
     tool.axhspan(-tolerance, tolerance, color="0.85", zorder=0)
+    for axes in (told, left, machine):
+        axes.set_xlim(frequency[0], frequency[-1])
+        name_frequencies(axes, 0.1)
     for axes in (command, lag, tool):
         axes.axvline(MS * found.steps["planned"].end, color="0.6", linewidth=0.8, linestyle=":")
         axes.set_xlim(0.0, MS * times[-1])
@@ -100,7 +113,6 @@ def plot_move_simulation(found: MoveSimulation, file: BinaryIO, suffix: str) -> 
     )
     handles, labels = command.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
-    save(figure, file, suffix)
 
 
 def _frequencies(found: MoveSimulation) -> Array:

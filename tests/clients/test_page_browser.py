@@ -55,6 +55,11 @@ PROGRAMS = {
         VMC.replace(MODES_OF_X, "    spectrum: x.csv\n"),
         {},
     ),
+    "named": (
+        many_rapids(),
+        VMC.replace("name: rocking", f"name: {'rocking_of_the_column_' * 2}W"),
+        {},
+    ),
     "none": (b"G21 G90 G1 X0 F100\nM2\n", VMC, {}),
     "left": (b"G21 G91\nG0 X1\nM2\n", VMC, {}),
 }
@@ -283,6 +288,29 @@ def test_pages_with_little_on_them(browser, pages, name, size):
         choice = browser.one("#axis")
         choice.find_element("css selector", "option:nth-child(2)").click()
         assert "of Y over time" in browser.one("#acceleration").get_attribute("aria-label")
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_a_mode_of_a_long_name_stands_beside_the_head_of_its_curve(browser, pages, size):
+    browser.open(pages["named"][0], size)
+    head, choice = browser.one("#vibration-title"), browser.one("#mode")
+    assert "column_rocking" in choice.get_attribute("title")
+    middle = choice.rect["y"] + choice.rect["height"] / 2
+    assert head.rect["y"] < middle < head.rect["y"] + head.rect["height"]
+    assert browser.js("return document.documentElement.scrollWidth <= innerWidth")
+    assert head.rect["x"] + head.rect["width"] <= choice.rect["x"]
+    assert choice.rect["x"] + choice.rect["width"] <= size[0]
+    assert browser.one("#mode-choice").rect["height"] < choice.rect["height"] + 2
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_the_heads_of_the_table_do_not_run_into_each_other(browser, pages, size):
+    browser.open(pages["many"][0], size)
+    wide = browser.js(
+        "return [...document.querySelectorAll('.rapids thead button')]"
+        ".filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
+    )
+    assert wide == []
 
 
 def response(profiles, k, way, pole, times):

@@ -10,11 +10,14 @@ from matplotlib.text import Text
 
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import Profiles
+from gcodejerk.planning.move import plan_move
 from gcodejerk.report.compare_figure import DPI, draw_comparison, page_size
 from gcodejerk.report.compare_lanes import position_curve
 from gcodejerk.report.compare_shown import Shown
 from gcodejerk.report.compare_spectra import acceleration_spectrum, spread, vibration_spectrum
 from gcodejerk.report.map_figure import ONE, THREE, draw_conditions, draw_map
+from gcodejerk.report.simulation_figure import MOVE, draw_move_simulation
+from gcodejerk.simulation.single import MoveSimulation
 from gcodejerk.studies.amplitude_map import Survey
 from gcodejerk.studies.comparison import CONTENDERS, compare_move
 
@@ -118,6 +121,29 @@ def test_nor_in_maps_of_other_conditions(condition):
 @pytest.mark.parametrize(("name", "axis", "length"), MAPS)
 def test_no_word_of_three_maps_stands_over_another(name, axis, length):
     assert_readable(drawn(surveyed(name, axis, length), draw_conditions, THREE))
+
+
+LONG_NAMES = ("W" * 45, "rocking_of_the_column_about_its_base_with_gui", "MwMmMw " * 7)
+
+
+def named_survey(name, mode="all"):
+    """Three modes of one long name, on a machine of one that is longer still."""
+    modes = ", ".join(
+        f"{{name: '{name[k:]}{k}', frequency: {30 + 17 * k}, damping: 0.02, participation: 1}}"
+        for k in range(3)
+    )
+    text = (
+        f"name: '{name} {name}'\ninterval: 0.001\npositioning: linear\naxes:\n  Z: {{rapid: "
+        f"{{velocity: 600, acceleration: 5000, jerk: 5.0e+5}}, modes: [{modes}]}}\n"
+    )
+    return Survey.of(Machine.loads(text, "m.yaml"), "Z", 1.0, "III", mode)
+
+
+@pytest.mark.parametrize("name", LONG_NAMES)
+def test_long_names_stay_on_the_page(name):
+    assert_readable(drawn(named_survey(name)))
+    assert_readable(drawn(named_survey(name, "1")))
+    assert_readable(drawn(named_survey(name), draw_conditions, THREE))
 
 
 def test_a_map_names_all_that_it_draws():
@@ -397,6 +423,23 @@ def test_a_measured_spectrum_is_drawn(tmp_path):
     draw_comparison(figure, shown)
     assert_readable(figure)
     assert "grey: measured spectrum" in words_of(figure)
+
+
+@pytest.mark.parametrize("frequencies", [(38.0, 52.0), (30.0,), (12.0, 95.0, 110.0), (110.0,)])
+@pytest.mark.parametrize("interval", [0.001, 0.004])
+def test_a_simulation_is_readable_whatever_frequencies_it_spans(frequencies, interval):
+    modes = ", ".join(f"{{frequency: {f}, damping: 0.02, participation: 1}}" for f in frequencies)
+    text = (
+        f"name: Mill\ninterval: {interval}\npositioning: linear\naxes:\n  Z: {{rapid: "
+        f"{{velocity: 600, acceleration: 5000, jerk: 5.0e+5}}, modes: [{modes}]}}\n"
+    )
+    figure = Figure(MOVE, layout="constrained")
+    plan = plan_move({"Z": 20.0}, Machine.loads(text, "m.yaml"))
+    draw_move_simulation(figure, MoveSimulation(plan))
+    figure.draw_without_rendering()
+    assert_readable(figure)
+    for axes in figure.axes[1::2]:
+        assert len(axes.get_xticks()) >= 2
 
 
 @pytest.mark.parametrize(

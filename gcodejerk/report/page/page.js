@@ -329,6 +329,7 @@ function drawVibration(shown, ends, until, mode, frequency) {
   const together = modes.group.filter((g) => g === mode).length > 1;
   document.getElementById("vibration-title").textContent =
     `Vibration [${unit.small}]${together ? ", envelope" : ""}`;
+  document.getElementById("mode").title = modes.name[mode];
   chart("vibration", Array.from(times, (t) => 1e3 * t), series, ends, data.tolerance * unit.smallPerMm);
   const said = series.map((s, k) => {
     const rest = s.values.filter((_, n) => times[n] >= ends[k][1]);
