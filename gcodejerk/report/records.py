@@ -29,6 +29,8 @@ from gcodejerk.rewrite.result import Result
 from gcodejerk.storage import windows
 
 Record = dict[str, Any]
+ROTARY = "ABC"
+"""Letters of rotary axes, where no machine says it."""
 DIGITS = 10
 """Significant digits of a number in a report."""
 
@@ -360,7 +362,20 @@ def report_head(machine: Machine, controller: str, form: str, profile: str) -> R
         "profile": profile,
         "positioning": machine.positioning,
         "interval": machine.interval,
+        "rotary": rotary_axes(machine),
     }
+
+
+def rotary_axes(machine: Machine) -> list[str]:
+    """Axes whose positions and lengths are degrees: those that the machine file says, in order.
+
+    One that it has not, but a program may name, is what its letter says.
+    """
+    return [
+        axis
+        for axis in AXES
+        if (machine.axis(axis).rotary if axis in machine.axis_names else axis in ROTARY)
+    ]
 
 
 def number(value: float) -> float | None:

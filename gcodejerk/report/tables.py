@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rich.text import Text
 
 from gcodejerk.reasons import Reason
+from gcodejerk.report.records import ROTARY
 from gcodejerk.report.screen import ScreenTable
 from gcodejerk.units import MM_PER_INCH, percent
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from gcodejerk.studies.amplitude_map import Survey
 
 UM_PER_MM = 1000.0
-ROTARY = "ABC"
 MS_PER_S = 1000.0
 MOST_SEGMENTS = 9
 """More are counted, not listed."""
@@ -42,7 +42,7 @@ def rapids_table(record: Record) -> ScreenTable:
     -------
     ScreenTable
     """
-    unit = _Unit.of(record["summary"])
+    unit, rotary = _Unit.of(record["summary"]), _rotary(record)
     length = f"length\n[{unit.length}]"
     table = ScreenTable(
         ("line", "right"),
@@ -61,9 +61,9 @@ def rapids_table(record: Record) -> ScreenTable:
         status = row["profile"] if planned else f"left alone: {row['reason']}"
         table.add_row(
             str(row["line"]),
-            _position(row["start"], unit),
-            _position(row["end"], unit),
-            _length(row, unit),
+            _position(row["start"], unit, rotary),
+            _position(row["end"], unit, rotary),
+            _length(row, unit, rotary),
             _ms(row["conventional_time"], ".1f"),
             _ms(row["time"], ".0f"),
             _worst(row["residual"], unit) if planned else "",
@@ -72,12 +72,17 @@ def rapids_table(record: Record) -> ScreenTable:
     return table
 
 
-def _length(row: Record, unit: _Unit) -> str:
+def _rotary(record: Record) -> frozenset[str]:
+    """Axes in degrees: what the machine file says, or their letter in reports of before."""
+    return frozenset(record.get("rotary", ROTARY))
+
+
+def _length(row: Record, unit: _Unit, rotary: frozenset[str]) -> str:
     """How long a rapid is: in degrees where only rotary axes move."""
     if row["length"] is None:
         return ""
     moved = [a for a, end in row["end"].items() if end is not None and end != row["start"].get(a)]
-    if moved and all(axis in "ABC" for axis in moved):
+    if moved and rotary.issuperset(moved):
         return f"{row['length']:.3f} deg"
     return f"{row['length'] / unit.mm:{unit.digits}}"
 
@@ -177,7 +182,8 @@ def move_tables(record: Record, conventional: Record) -> list[ScreenTable]:
     list of ScreenTable
     """
     row, usual = record["rapids"][0], conventional
-    turning = [axis in "ABC" for axis in row["peak"]]
+    rotary = _rotary(record)
+    turning = [axis in rotary for axis in row["peak"]]
     unit = "deg" if all(turning) else "mm or deg" if any(turning) else "mm"
     table = ScreenTable(
         ("profile", "left"),
@@ -394,10 +400,10 @@ _METRIC = _Unit("mm", 1.0, ".3f", "um", UM_PER_MM, 1)
 _INCH = _Unit("inch", MM_PER_INCH, ".4f", "thou", UM_PER_MM / MM_PER_INCH, 2)
 
 
-def _position(position: dict[str, float | None], unit: _Unit) -> str:
+def _position(position: dict[str, float | None], unit: _Unit, rotary: frozenset[str]) -> str:
     """`X1.5 Z?` with a question mark for what is unknown."""
     return " ".join(
-        f"{axis}?" if x is None else f"{axis}{x / (1.0 if axis in ROTARY else unit.mm):.6g}"
+        f"{axis}?" if x is None else f"{axis}{x / (1.0 if axis in rotary else unit.mm):.6g}"
         for axis, x in position.items()
     )
 

@@ -61,6 +61,7 @@ PROGRAMS = {
         {},
     ),
     "none": (b"G21 G90 G1 X0 F100\nM2\n", VMC, {}),
+    "unknown": (b"G21 G90\nG0 X1\nM2\n", VMC, {}),
     "left": (b"G21 G91\nG0 X1\nM2\n", VMC, {}),
 }
 
@@ -311,6 +312,14 @@ def test_the_heads_of_the_table_do_not_run_into_each_other(browser, pages, size)
         ".filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
     )
     assert wide == []
+
+
+def test_a_length_that_is_not_known_has_no_unit(browser, pages):
+    browser.open(pages["unknown"][0])
+    assert browser.column(3) == ["\N{EN DASH}"]
+    browser.one("#table tbody th button").click()
+    assert "not known" in browser.one("#facts").text
+    assert "deg" not in browser.one("#facts").text
 
 
 def response(profiles, k, way, pole, times):

@@ -197,7 +197,7 @@ def test_rotary_axes_and_cycles_are_on_the_page():
     machine = Machine.loads(VMC_TEXT.replace("axes:\n", "axes:\n" + axis))
     program = HEAD.replace(b"Z0", b"Z0 A0") + b"G0 A90\nG81 X9 Y9 Z-5 R2 F100\nG80\n" + TAIL
     result, page = page_of(program, machine, controller="csv")
-    assert data_of(page)["rotary"] == ["A"]
+    assert data_of(page)["rotary"] == ["A", "B", "C"]
     assert result.planned == 1
     result, page = page_of(program.replace(b"G0 A90\n", b""), VMC, expand_cycles=True)
 

@@ -3,19 +3,22 @@
 import gzip
 import io
 import json
+import re
 from importlib.resources import files
 from pathlib import Path
 
 import jsonschema
 import pytest
+from rich.console import Console
 
 from gcodejerk.batch import reports
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.planning.move import plan_move
 from gcodejerk.reasons import Reason
 from gcodejerk.report import columns
-from gcodejerk.report.move_record import move_record, stream_csv
+from gcodejerk.report.move_record import conventional_motion, move_record, stream_csv
 from gcodejerk.report.records import dump, process_record
+from gcodejerk.report.tables import move_tables, rapids_table
 from gcodejerk.rewrite.pipeline import process
 
 SCHEMA = json.loads(files("gcodejerk.report").joinpath("report.schema.json").read_text())
@@ -108,3 +111,53 @@ def test_report_of_a_large_program_says_the_same_line_by_line(machine, monkeypat
     assert json.loads(plain.getvalue()) == json.loads(whole)
     assert gzip.decompress(squeezed.getvalue()) == plain.getvalue()
     assert plain.getvalue().count(b"\n") == len(result.plans) + 2
+
+
+AXIS_A = """axes:
+  A:
+    {kind}
+    resolution: 1.0e-3
+    rapid: {{velocity: 100, acceleration: 1000}}
+    modes: [{{frequency: 30, damping: 0.02, participation: 0.5}}]
+"""
+
+
+KINDS = {"linear": "type: linear", "rotary": "wrap: none"}
+
+
+def machine_with(kind):
+    text = find_machine("vmc").read_text().replace("controller: linuxcnc", "controller: csv")
+    return Machine.loads(text.replace("axes:\n", AXIS_A.format(kind=KINDS[kind]), 1), "m.yaml")
+
+
+def shown(table):
+    out = Console(file=io.StringIO(), width=140)
+    out.print(table)
+    return out.file.getvalue()
+
+
+PROGRAM_A = b"G21 G90 G94\nG1 X0 A0 F10\nG0 A20.\nM2\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "letters", "length"),
+    [("linear", ["B", "C"], "20.000"), ("rotary", ["A", "B", "C"], "20.000 deg")],
+)
+def test_what_turns_the_machine_file_says(kind, letters, length):
+    record = report_of(PROGRAM_A, machine_with(kind))
+    jsonschema.validate(record, SCHEMA)
+    assert record["rotary"] == letters
+    assert re.search(rf"A20 +{length}  ", shown(rapids_table(record)))
+
+
+def test_a_move_is_in_the_unit_that_the_machine_file_says():
+    for kind, unit in (("linear", "[mm/s]"), ("rotary", "[deg/s]")):
+        plan = plan_move({"A": 20.0}, machine_with(kind))
+        assert unit in shown(move_tables(move_record(plan), conventional_motion(plan))[0])
+
+
+def test_in_reports_of_before_letters_say_what_turns():
+    record = report_of(PROGRAM_A, machine_with("rotary"))
+    del record["rotary"]
+    jsonschema.validate(record, SCHEMA)
+    assert "20.000 deg" in shown(rapids_table(record))

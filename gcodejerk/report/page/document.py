@@ -31,7 +31,7 @@ from gcodejerk.report.page.columns import (
     reason_names,
 )
 from gcodejerk.report.page.text import escaped, script_data, visible
-from gcodejerk.report.records import summary_of
+from gcodejerk.report.records import rotary_axes, summary_of
 from gcodejerk.rewrite.result import Result
 
 MARK = "<!doctype html>\n<!-- gcodejerk report"
@@ -102,7 +102,7 @@ def page_html(
         "tolerance": machine.design.tolerance,
         "profile": result.plans.designed,
         "positioning": machine.positioning,
-        "rotary": [axis.name for axis in machine.axes if axis.rotary],
+        "rotary": rotary_axes(machine),
         "reasons": reason_names(),
         "modes": mode_columns(result),
         "rapids": rapid_columns(result, source, figures, rows),

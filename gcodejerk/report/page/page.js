@@ -316,8 +316,8 @@ function drawAcceleration(shown, ends, until) {
     `Acceleration ${along ? "along the path" : `of ${letter}`} over time: ${peaks.join(", ")}.`);
 }
 const rotaryOnly = (i) => {
-  const all = way(i);
-  return [...AXES].every((axis, a) => !all[a] || rotary(axis));
+  const moved = [...AXES].filter((_, a) => way(i)[a]);
+  return moved.length > 0 && moved.every(rotary);
 };
 
 function drawVibration(shown, ends, until, mode, frequency) {
