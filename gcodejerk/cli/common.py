@@ -66,20 +66,28 @@ ProfileOption = Annotated[
 ]
 
 
+OUTPUTS = ("output", "report", "plot", "as_json")
+"""Parameters that name a file to be written."""
+
+
 class Once(TyperCommand):
-    """A command whose options each have one value: of two, one would do nothing."""
+    """A command that writes every file it is told to: of two by one option, one would be missing.
+
+    Of other options the last one counts, as everywhere: so who has the usual ones in an alias, or
+    in a host's settings, can say another.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The same, where no option stands twice but those that may."""
+        """The same, where no option that names an output stands twice."""
         if not ctx.resilient_parsing:
             _, _, order = self.make_parser(ctx).parse_args(args=list(args))
-            seen = set()
-            for one in order:
-                of_one = one.param_type_name == "option" and not getattr(one, "is_flag", False)
-                if of_one and one in seen and not getattr(one, "multiple", False):
+            named = [
+                one for one in order if one.name in OUTPUTS and not getattr(one, "is_flag", False)
+            ]
+            for one in set(named):
+                if named.count(one) > 1:
                     word = max(one.opts, key=len)
-                    ctx.fail(f"{word} stands twice, and one of the two would do nothing: say one")
-                seen.add(one)
+                    ctx.fail(f"{word} stands twice, and only one of the two would be written")
         rest: list[str] = super().parse_args(ctx, args)
         return rest
 

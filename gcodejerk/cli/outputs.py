@@ -44,13 +44,11 @@ class Outputs:
     def check(self, files: list[str], *, trial: str = "", as_json: bool = False) -> None:
         """Refuse options that contradict each other or the inputs, as wrong usage.
 
-        `trial`: the option by which nothing is written, empty where there is none. --output-dir
-        and --in-place may stand beside it: they say which programs a run would take, and for what.
+        `trial`: the option by which nothing is written, empty where there is none. It may be added
+        to any run: the other options say which run that is.
         """
         if self.report == STANDARD and (trial == "--diff" or as_json):
             raise typer.BadParameter("--report - has standard output to itself: no --diff, --json")
-        if trial:
-            self._check_trial(trial)
         if as_json and trial == "--diff":
             raise typer.BadParameter("standard output holds one: the difference or --json")
         if sum(map(bool, (self.output, self.output_dir, self.in_place))) > 1:
@@ -74,19 +72,6 @@ class Outputs:
             raise typer.BadParameter("--backup is of --in-place: elsewhere the original stays")
         if self.in_place and "-" in files:
             raise typer.BadParameter("--in-place needs a file, not standard input")
-
-    def _check_trial(self, trial: str) -> None:
-        """Refuse what would be written beside an option by which nothing is."""
-        if self.report is not None:
-            raise typer.BadParameter(
-                f"{trial} writes nothing: leave --report out; `gcodejerk inspect FILE --json` "
-                "prints the report on what would become of a program"
-            )
-        for option, value in (
-            ("-o", self.output), ("--backup", self.backup), ("--if-changed", self.if_changed)
-        ):  # fmt: skip
-            if value:
-                raise typer.BadParameter(f"{trial} writes nothing: leave {option} out")
 
     def check_single(self, many: bool) -> None:
         """Refuse names of single files where many programs are given, and reports of no name."""
@@ -112,11 +97,6 @@ class Outputs:
             raise typer.BadParameter(
                 "--as parameters sets the control, whose own rapids have no profile of ours: leave "
                 "--profile out"
-            )
-        if not settings.comments and (settings.form == PARAMETERS or not emitter.in_place):
-            what = "--as parameters" if emitter.in_place else f"controller {emitter.name}"
-            raise typer.BadParameter(
-                f"{what} replaces no blocks that comments could name: leave --no-comments out"
             )
         if suffix and self.in_place:
             raise typer.BadParameter(
