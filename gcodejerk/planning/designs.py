@@ -184,12 +184,13 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     profiles, worst = _answered(task, rows, answers(questions, task.progress), profiles, worst)
     found = np.isfinite(worst)
     worst[found] = worst_in_band(task.take(found), profiles.take(found))
-    everything = np.ones(len(task), dtype=bool)
+    # Who leaves no more than the slack cannot be beaten by more than that.
+    beatable = worst > slack
     for rival, where in (
-        (symmetric, everything),
-        (cascade, everything),
-        (condition1, task.counts <= COARSE),
-        (condition2, task.counts <= COARSE),
+        (symmetric, beatable),
+        (cascade, beatable),
+        (condition1, beatable & (task.counts <= COARSE)),
+        (condition2, beatable & (task.counts <= COARSE)),
     ):
         index = np.nonzero(where)[0]
         others, residual = rival(task.take(index))

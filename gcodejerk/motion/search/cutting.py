@@ -72,8 +72,9 @@ theirs where another programme has ended are held from the beginning."""
 STEEPEST, LIGHT = 0.9, 0.01
 """Above this peak jerk what it costs rises no faster; what its own steps cost, beside those of
 accelerations."""
-DAMPINGS = (1.0, 10.0, 100.0)
-"""Of what steps cost: where the solver goes round in circles, shorter ones are asked for."""
+TRIES = ((1.0, EXACT), (1.0, 0.01 * EXACT), (10.0, EXACT), (100.0, EXACT))
+"""Of what steps cost, so many times, and how well rows are kept: where some are lost, the solver is
+asked to look closer; where it goes round in circles, for shorter steps."""
 SMALLEST, STILL = 1e-3, 0.1
 """Peak jerk below which steps cost no less; residual below which their least cost does not fall."""
 FREE = 1e30
@@ -228,14 +229,14 @@ class Cutting:
         curvature = 0.0 if smooth else given / (1.0 - last) ** 2
         slope = 1.0 if smooth else given / (1.0 - last) - curvature * last
         squares, linear = np.eye(len(start)), np.append(-start[:-2], [0.0, 0.0])
-        for damping in DAMPINGS:
+        for damping, exact in TRIES:
             cost = self._cost * damping * (max(self.peak, SMALLEST) if smooth else 1.0)
             squares[-1, -1] = LIGHT + curvature / cost
             linear[-2:] = (0.0 if smooth else 1.0 / cost) - start[-2], slope / cost
             linear[-1] -= LIGHT * self.peak
             x, _, status, info = daqp.solve(
                 squares, linear, matrix, upper, lower, kind,
-                primal_tol=EXACT, pivot_tol=SMALL_PIVOT, dual_start=multipliers,
+                primal_tol=exact, pivot_tol=SMALL_PIVOT, dual_start=multipliers,
             )  # fmt: skip
             solved = status == SOLVED and _kept(x, matrix, lower, upper)
             if solved:

@@ -77,10 +77,12 @@ class Problem:
         """What counts of what `rows` say, shape (n, ...), for each row of a group, (r, ...)."""
         if self.near is None or self.share is None:
             return rows
-        share = self.share if rows.ndim == 1 else self.share[..., np.newaxis]
-        seen: Array = share[:, 0] * rows[self.near[:, 0]]
+        if rows.ndim == 1:
+            seen: Array = np.einsum("rk,rk->r", self.share, rows.take(self.near))
+            return seen
+        seen = self.share[:, :1] * rows[self.near[:, 0]]
         for k in range(1, self.near.shape[1]):
-            seen += share[:, k] * rows[self.near[:, k]]
+            seen += self.share[:, k, np.newaxis] * rows[self.near[:, k]]
         return seen
 
     @property
