@@ -98,6 +98,9 @@ class Start:
     """Rotary axis -> how it goes to an absolute position: ``none``, through all angles, like a
     linear axis; ``shortest``, the shorter way round; ``sign``, forwards to a positive number and
     backwards to a negative one. Of an axis that is not listed, nobody knows."""
+    linear: Mapping[str, bool] = field(default_factory=dict)
+    """Of A, B and C those that slide -> whether 1 is a millimetre in a program in mm. In one in
+    inches nobody knows: LinuxCNC takes their words as they stand, other controls convert them."""
     resume: str | None = None
     """Where the axes stand behind M0 and M1: ``same`` place, ``unknown``; None: as the dialect's
     controls do it."""

@@ -156,6 +156,7 @@ class Machine(Description):
             startup=self.program.startup,
             decimal_point=self.program.decimal_point,
             wraps={axis.name: axis.wrap for axis in self.axes if axis.wrap is not None},
+            linear={a.name: not self.inch for a in self.axes if a.name in "ABC" and not a.rotary},
             resume=self.program.resume_after_stop,
             harmless=frozenset(self.program.harmless),
             home=self.program.home,

@@ -754,7 +754,10 @@ def test_a_tolerance_that_holds_in_one_branch_only_makes_the_path_unknown():
     assert read_program(io.BytesIO(data)).rapids.path[-1] == 0
 
 
-CONSTANT = ("ended", "touched", "fixed", "wraps", "limits", "along", "straight", "line", "lost")
+CONSTANT = {
+    *("ended", "touched", "fixed", "wraps", "slides", "limits", "along", "straight", "line"),
+    "lost",
+}
 
 
 def _different(field, k):
@@ -935,3 +938,22 @@ def test_axes_that_are_smoothed_do_not_move(dialect, words):
     rapids.start[-1, 0] = 0.0  # as if the axis had moved
     confirm(io.BytesIO(data), dialect, Start(), rapids, [len(rapids) - 1], found)
     assert found.violations
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "mach"])
+def test_what_a_word_of_an_a_that_slides_means_in_inches_is_not_known(dialect):
+    slides = {"wraps": {"A": "none"}, "linear": {"A": True}}
+    text = b"G0 A1.\nG0 A2.\nG20\nG0 X1.\nG0 A3.\nG0 X2.\nG21\nG0 A4.\nG0 A5.\n"
+    head = HEADS[dialect].replace(b" A10", b"") + b"G0 A10.\n"
+    expected = [None, None, None, START, None, START, None]
+    assert read(text, dialect, head, **slides) == expected
+    # Where it turns, degrees are degrees.
+    assert START not in read(text, dialect, head, wraps={"A": "none"})
+    also_noticed(head + text, dialect, **slides)
+
+
+def test_an_a_that_slides_is_known_in_no_program_for_a_machine_in_inches():
+    text = "units: {}\ninterval: 0.001\npositioning: linear\naxes:\n  A:\n    type: linear\n"
+    text += "    rapid: {{velocity: 10, acceleration: 50, jerk: 5000}}\n"
+    for units, known in (("mm", True), ("inch", False)):
+        assert Machine.loads(text.format(units)).program_start().linear == {"A": known}

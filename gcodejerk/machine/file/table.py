@@ -183,7 +183,9 @@ _SPECTRUM = Key("spectrum", OrMapping(_FILE, Section(
 _AXIS = Section(
     (
         Key("type", Choice(("linear", "rotary")),
-            "Whether the axis slides [mm] or turns [deg]. Left out: A, B and C turn."),
+            "Whether the axis slides [mm] or turns [deg]. Left out: A, B and C turn. Rapids that "
+            "move one of these which slides are rewritten in programs in mm alone, and with "
+            "units: mm: in inches, controls differ in what their words mean."),
         Key("wrap", Choice(("none", "shortest", "sign")),
             "How a rotary axis goes to an absolute position: none, through all angles like a "
             "linear axis; shortest, the shorter way round (Fanuc 1008 and Haas with roll-over); "

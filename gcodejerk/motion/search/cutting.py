@@ -64,8 +64,8 @@ are rows of jerks that are so much below the peak."""
 EXACT = 1e-7
 """Rows that are not held are kept to this much of their length."""
 SMALL_PIVOT = 1e-9
-"""Of rows that are held: from less the solver puts them into another order, which costs as much as
-beginning anew. Its own 1e-8 is met at every change where the jerk has no limit, or next to none."""
+"""For less, held rows are put into another order, which costs as much as beginning anew: at the
+solver's own 1e-8, every change does where the jerk has no limit, or next to none."""
 UNEVEN, CLOSE = 1e-3, 1e-3
 """A jerk may exceed the peak by so much of it, within the limit; and speeds that are so close to
 theirs where another programme has ended are held from the beginning."""
@@ -73,15 +73,12 @@ STEEPEST, LIGHT = 0.9, 0.01
 """Above this peak jerk what it costs rises no faster; what its own steps cost, beside those of
 accelerations."""
 TRIES = ((1.0, EXACT), (1.0, 0.01 * EXACT), (10.0, EXACT), (100.0, EXACT))
-"""Of what steps cost, so many times, and how well rows are kept: where some are lost, the solver is
-asked to look closer; where it goes round in circles, for shorter steps."""
+"""Times of what steps cost, and how well rows are kept: where some are lost, they are looked at
+closer; where the solver goes round in circles, steps are shorter."""
 SMALLEST, STILL = 1e-3, 0.1
 """Peak jerk below which steps cost no less; residual below which their least cost does not fall."""
-FREE = 1e30
-"""What the solver takes for no bound."""
-EQUALITY = 5
-"""What the solver calls one."""
-SOLVED = 1
+FREE, EQUALITY, SOLVED = 1e30, 5, 1
+"""What the solver takes for no bound, and what it calls an equation, and solved."""
 LOST, TINY = 1e-6, 1e-12
 """What is solved keeps every row to this much of its length; and length of a row at least."""
 

@@ -62,6 +62,7 @@ def _fixed(dialect: Dialect) -> frozenset[str]:
 def _set_frames(state: State, start: Start) -> None:
     """Take what the machine file says of axes and work systems."""
     state.wraps = tuple(start.wraps.get(axis) for axis in AXES)
+    state.slides = tuple(start.linear.get(axis) for axis in AXES)
     state.limits, state.along, state.straight = start.limits, start.along, start.straight
     state.diameter = state.turns = start.diameter
     for system, offsets in start.offsets.items():

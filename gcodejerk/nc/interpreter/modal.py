@@ -92,8 +92,7 @@ FIELDS = (
     ),
     *(Field(name, "mode") for name in ("feed_unit", "compensation", "retract", "system")),
     Field("path", "mode", together="path"),
-    Field("path_p", "number", NAN, together="path"),
-    Field("path_q", "number", NAN, together="path"),
+    *(Field(name, "number", NAN, together="path") for name in ("path_p", "path_q")),
     Field("feed", "number", NAN, together="feed"),
     Field("feed_whole", "mode", False, together="feed"),
     Field("diameter", "mode", only_if="turns"),
@@ -109,13 +108,12 @@ FIELDS = (
     *(Field(name, "table") for name in ("offsets", "variables")),
     *(
         Field(name, "once", False)
-        for name in ("distance_stated", "feed_mode_stated", "rotates", "turns")
+        for name in ("distance_stated", "feed_mode_stated", "rotates", "turns", "restores")
     ),
-    Field("restores", "once", False),
     Field("system_stated", "mode", False),
     *(Field(name, "constant", start) for name, start in (("ended", False), ("touched", None))),
     Field("fixed", "constant", frozenset()),
-    Field("wraps", "constant", (None,) * len(AXES)),
+    *(Field(name, "constant", (None,) * len(AXES)) for name in ("wraps", "slides")),
     Field("limits", "constant", MappingProxyType({})),
     Field("along", "constant", (math.inf,) * 3),
     Field("straight", "constant", True),
@@ -230,7 +228,8 @@ class State:
     lost: dict[str, Loss]
     """Mode that a block made unknown -> which block. Never changed, but made anew."""
     wraps: tuple[str | None, ...]
-    """How each axis turns: see `gcodejerk.start.Start`; None unknown."""
+    slides: tuple[bool | None, ...]
+    """How each axis turns (None: unknown), or slides: see `gcodejerk.start.Start`."""
     limits: Mapping[str, tuple[float, float, float]]
     along: tuple[float, float, float]
     straight: bool
@@ -369,7 +368,8 @@ class State:
     def scale(self, axis: int) -> float:
         """Mm (or deg) per unit of an axis word; NaN if unknown."""
         if not _LINEAR[axis]:
-            return 1.0
+            known = self.slides[axis] is None or (self.slides[axis] and self.unit == 1.0)
+            return 1.0 if known else NAN
         if self.unit is None:
             return NAN
         if axis == 0 and self.diameter is not False:

@@ -295,6 +295,7 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
             start.limits,
             start.along,
             start.straight,
+            start.linear,
             (start.rapid_feed.feed, start.rapid_feed.clearance) if start.rapid_feed else None,
         ),
     )

@@ -57,6 +57,7 @@ class Facts:
     limits: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     along: tuple[float, float, float] = (math.inf, math.inf, math.inf)
     straight: bool = True
+    linear: Mapping[str, bool] = field(default_factory=dict)
     rapid_feed: tuple[float, float] | None = None
     """F and least Z of feed moves that count as rapids. [program's units]"""
 
@@ -245,7 +246,8 @@ class Known:
     def scale(self, axis: str) -> float:
         """Mm or deg for 1 of an axis word."""
         if axis not in LINEAR:
-            return 1.0
+            told = axis not in self.facts.linear or (self.facts.linear[axis] and self.unit == 1.0)
+            return 1.0 if told else NAN
         if self.unit is None or (axis == "X" and self.diameter is None):
             return NAN
         return self.unit / 2.0 if axis == "X" and self.diameter else self.unit
