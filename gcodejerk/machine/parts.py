@@ -402,6 +402,10 @@ class Description:
         """Whether what stands around a rapid changes how the control moves, or what is written."""
         return self.planner == LINUXCNC or self.controller == "linuxcnc"
 
+    def turns(self, name: str) -> bool:
+        """Whether an axis turns; one that the machine lacks is what its letter says."""
+        return self.axis(name).rotary if name in self.axis_names else name in "ABC"
+
     def axis(self, name: str) -> Axis:
         """Find the axis of that letter.
 

@@ -329,16 +329,9 @@ def path_length(displacement: Array, machine: Machine) -> Array:
     ndarray, shape (n,)
         [mm] or [deg]
     """
-    rotary = np.array([_is_rotary(machine, axis) for axis in AXES])
+    rotary = np.array([machine.turns(axis) for axis in AXES])
     with np.errstate(over="ignore"):  # what is too long for a square is for a stream
         linear = np.sqrt((displacement[:, ~rotary] ** 2).sum(axis=1))
         turning = np.sqrt((displacement[:, rotary] ** 2).sum(axis=1))
     length: Array = np.where(linear > STANDSTILL, linear, turning)
     return length
-
-
-def _is_rotary(machine: Machine, axis: str) -> bool:
-    """Whether an axis turns; one that the machine lacks is what its letter says."""
-    if axis in machine.axis_names:
-        return machine.axis(axis).rotary
-    return axis in "ABC"

@@ -367,15 +367,8 @@ def report_head(machine: Machine, controller: str, form: str, profile: str) -> R
 
 
 def rotary_axes(machine: Machine) -> list[str]:
-    """Axes whose positions and lengths are degrees: those that the machine file says, in order.
-
-    One that it has not, but a program may name, is what its letter says.
-    """
-    return [
-        axis
-        for axis in AXES
-        if (machine.axis(axis).rotary if axis in machine.axis_names else axis in ROTARY)
-    ]
+    """Axes whose positions and lengths are degrees, in order."""
+    return [axis for axis in AXES if machine.turns(axis)]
 
 
 def number(value: float) -> float | None:
