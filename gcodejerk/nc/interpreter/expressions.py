@@ -13,11 +13,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 
 from gcodejerk.nc.dialects.dialect import Arithmetic
-from gcodejerk.nc.interpreter.grammar import NamedReader, NotComputableError, Reader
+from gcodejerk.nc.interpreter.grammar import Formula, NamedReader, NotComputableError, Reader
 from gcodejerk.nc.interpreter.operations import NAN, VACANT
 
+REMEMBERED = 1 << 12
+"""Texts of which it is known what they say to compute."""
 _SPLIT = re.compile(rb"[0-9.][ \t]+[0-9.]")
 
 
@@ -56,15 +59,27 @@ def evaluate(text: bytes, variables: Mapping[str, float], rules: Arithmetic) -> 
     >>> evaluate(b"[#1 + 2 ** 3]", {"1": 4.0}, LINUXCNC.arithmetic)
     12.0
     """
-    if _SPLIT.search(text):
-        return NAN  # one number with a blank in it, or two: dialects differ
-    if rules.brackets == "()":
-        reader: Reader = NamedReader(text.strip(b" \t").upper(), variables, rules)
-    else:
-        reader = Reader(text.translate(None, b" \t").upper(), variables, rules)
-    try:
-        value = reader.expression(0)
-    except (NotComputableError, ArithmeticError, ValueError):
+    formula = _formula(text, rules)
+    if formula is None:
         return NAN
-    known = math.isfinite(value) or value == VACANT
-    return value if reader.at == len(reader.text) and known else NAN
+    try:
+        value = formula(variables)
+    except (ArithmeticError, ValueError):
+        return NAN
+    return value if math.isfinite(value) or value == VACANT else NAN
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _formula(text: bytes, rules: Arithmetic) -> Formula | None:
+    """What a text says to compute; None where it is no expression."""
+    if _SPLIT.search(text):
+        return None  # one number with a blank in it, or two: dialects differ
+    if rules.brackets == "()":
+        reader: Reader = NamedReader(text.strip(b" \t").upper(), rules)
+    else:
+        reader = Reader(text.translate(None, b" \t").upper(), rules)
+    try:
+        formula = reader.expression(0)
+    except (NotComputableError, ArithmeticError, ValueError):
+        return None
+    return formula if reader.at == len(reader.text) else None

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 
 from gcodejerk.nc.dialects.dialect import LINEAR, Arithmetic
-from gcodejerk.nc.interpreter.expressions import evaluate, variable_name
+from gcodejerk.nc.interpreter.expressions import REMEMBERED, evaluate, variable_name
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.text.block import Block, Name, Word
 from gcodejerk.nc.text.cursor import LARGEST
@@ -175,10 +176,14 @@ def reads_feed(block: Block, rules: Arithmetic) -> bool:
         return True
     if "$" in rules.feed:
         return any(b"$" in text for text in texts)
-    if not any(b"#" in text for text in texts):
-        return False
-    names = {n for text in texts for n in _READ.findall(text.translate(None, b" \t").upper())}
-    return any(name in (b"#", b"[") or _name_of(name) in rules.feed for name in names)
+    return any(b"#" in text and _reads_feed(text, rules.feed) for text in texts)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _reads_feed(text: bytes, feed: frozenset[str]) -> bool:
+    """Whether an expression reads one of these, or a variable that is computed and may be one."""
+    names = _READ.findall(text.translate(None, b" \t").upper())
+    return any(name in (b"#", b"[") or _name_of(name) in feed for name in names)
 
 
 def _name_of(text: bytes) -> str:
