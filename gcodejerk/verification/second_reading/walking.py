@@ -315,11 +315,17 @@ class Walker:
         if self.routes.named:
             bare = _LABEL.sub(rb"\1", bare, count=1)
         state.ended = False
-        before = state.copy()
+        # Where variables are numbers, a block ends by an M code or %: no other is looked back at.
+        may_end = self.stepper.dialect.text.variables != "#" or b"M" in upper or b"%" in upper
+        before = state.copy() if may_end else None
         seen = self.stepper.step(state, bare)
         self.lost = self.lost or state.strayed
         self.seen[at] = seen if at not in self.seen else _common(self.seen[at], seen)
-        return self._ended(upper, before, back) if state.ended else [(at + 1, state)]
+        if not state.ended:
+            return [(at + 1, state)]
+        if before is None:
+            raise LostError
+        return self._ended(upper, before, back)
 
     def _ended(
         self, upper: bytes, before: Tracker, back: list[Tracker]
