@@ -92,6 +92,13 @@ class Once(TyperCommand):
         return rest
 
 
+def refuse(*cases: tuple[object, str]) -> None:
+    """Refuse, as wrong usage, the first of some cases that is so."""
+    for so, why in cases:
+        if so:
+            raise typer.BadParameter(why)
+
+
 def said(ctx: typer.Context, name: str) -> bool:
     """Whether an option stands on the command line: the environment may have it by itself."""
     source = ctx.get_parameter_source(name)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gcodejerk.cli.common import MachineOption, console, load_machine, said, say, waiting
+from gcodejerk.cli.common import MachineOption, console, load_machine, refuse, said, say, waiting
 from gcodejerk.cli.moves import FIGURES
 
 if TYPE_CHECKING:
@@ -85,16 +85,9 @@ def identify(
     )
 
     name = _checked(axis, unit, rate, band, plot)
-    if program is None and (channel is not None or said(ctx, "machine")):
-        what = "--channel" if channel is not None else "--machine"
-        raise typer.BadParameter(
-            f"{what} is for participations, which need what ran too: --program FILE"
-        )
-    if rate is not None and time is not None:
-        raise typer.BadParameter("--rate is for records without a column of --time: choose one")
     outputs = [one for one in (as_json, plot, output) if one is not None]
-    if len(set(outputs)) < len(outputs):
-        raise typer.BadParameter("--json, --plot and -o are files of their own")
+    _refuse_idle(ctx, program, channel, rate, time)
+    refuse((len(set(outputs)) < len(outputs), "--json, --plot and -o are files of their own"))
     described, moves = _told(machine, program, name)
     _keep_apart(outputs, [*records, program], described)
     with waiting("reading"):
@@ -106,9 +99,8 @@ def identify(
     spectra = [one for one in read if isinstance(one, Spectrum)]
     responses = [one for one in read if isinstance(one, FrequencyResponse)]
     taken = [make_record(one, unit) for one in read if isinstance(one, Samples)]
-    if spectra or responses:
-        idle = {"--program": program, "--unit": unit, "--rate": rate, "--time": time}
-        _refuse_beside_spectra([option for option, value in idle.items() if value is not None])
+    if not taken:
+        _refuse_beside_spectra(program=program, unit=unit, rate=rate, time=time)
     kinds = [one for one in (spectra, responses, taken) if one]
     if len(kinds) > 1:
         raise RecordError(
@@ -125,12 +117,31 @@ def identify(
     _show(*result, as_json, plot, output)
 
 
-def _refuse_beside_spectra(idle: list[str]) -> None:
-    """Refuse what is of records over time alone."""
-    if idle:
-        raise typer.BadParameter(
-            f"{idle[0]} is of records over time, and these are spectra: leave {idle[0]} out"
-        )
+def _refuse_idle(
+    ctx: typer.Context,
+    program: str | None,
+    channel: str | None,
+    rate: float | None,
+    time: str | None,
+) -> None:
+    """Refuse options that do nothing without another, or beside it."""
+    told = said(ctx, "machine")
+    needs = "is for participations, which need what ran too: --program FILE"
+    both = rate is not None and time is not None
+    refuse(
+        (program is None and channel is not None, f"--channel {needs}"),
+        (program is None and told, f"--machine {needs}"),
+        (both, "--rate is for records without a column of --time: choose one"),
+    )
+
+
+def _refuse_beside_spectra(**idle: object) -> None:
+    """Refuse options that are of records over time alone."""
+    for name, value in idle.items():
+        if value is not None:
+            raise typer.BadParameter(
+                f"--{name} is of records over time, and these are spectra: leave --{name} out"
+            )
 
 
 def _checked(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gcodejerk.cli.common import ControllerOption
+from gcodejerk.cli.common import ControllerOption, refuse
 
 if TYPE_CHECKING:
     from gcodejerk.machine.sources import Draft
@@ -70,16 +70,10 @@ def machine_new(
 ) -> None:  # fmt: skip
     """Make a commented machine file from a control's own configuration, or from answers."""
     from gcodejerk.batch.files import new_file, refuse_clashes
-    from gcodejerk.errors import MachineError
     from gcodejerk.machine.sources import draft_of, stated_axis, stated_mode, text_of
 
-    if force and output == "-":
-        raise typer.BadParameter("--force replaces a file: name the file with -o")
+    _check_output(output, force)
     refuse_clashes([output], files)
-    if output != "-" and os.path.lexists(output) and not force:
-        raise MachineError(
-            f"{output} is there already", "give another name, or --force to replace it"
-        )
     folder = Path(output).parent if output != "-" else Path()
     asked = not files and not axis
     if asked and not sys.stdin.isatty():
@@ -108,6 +102,17 @@ def machine_new(
     if as_json:
         print(json.dumps(_record(draft, text, output), indent=1, ensure_ascii=False))
     _say(draft, text, output)
+
+
+def _check_output(output: str, force: bool) -> None:
+    """Refuse a file that is there, unless it may be replaced."""
+    from gcodejerk.errors import MachineError
+
+    refuse((force and output == "-", "--force replaces a file: name the file with -o"))
+    if output != "-" and os.path.lexists(output) and not force:
+        raise MachineError(
+            f"{output} is there already", "give another name, or --force to replace it"
+        )
 
 
 def _must_be_known(controller: str | None, dialect: str | None) -> None:

@@ -47,21 +47,14 @@ class Outputs:
         `trial`: the option by which nothing is written, empty where there is none. It may be added
         to any run: the other options say which run that is.
         """
-        if self.report == STANDARD and (trial == "--diff" or as_json):
-            raise typer.BadParameter("--report - has standard output to itself: no --diff, --json")
-        if as_json and trial == "--diff":
-            raise typer.BadParameter("standard output holds one: the difference or --json")
+        piped = self.output == STANDARD or (self.output is None and STANDARD in files)
+        self._check_standard(piped and not trial, trial == "--diff", as_json)
         if sum(map(bool, (self.output, self.output_dir, self.in_place))) > 1:
             raise typer.BadParameter("choose one of -o, --output-dir and --in-place")
         if "-" in files and len(files) > 1:
             raise typer.BadParameter("standard input (-) is one program: give it alone")
         if "-" in files and self.output_dir is not None:
             raise typer.BadParameter("standard input has no name to keep in a folder: say -o FILE")
-        piped = self.output == STANDARD or (self.output is None and STANDARD in files)
-        if as_json and not trial and piped:
-            raise typer.BadParameter(
-                "standard output holds one: the program or --json; name a file with -o"
-            )
         if self.if_changed and (self.in_place or piped):
             raise typer.BadParameter("--if-changed compares a program with its output: name one")
         if self.if_changed and self.report == STANDARD:
@@ -72,6 +65,17 @@ class Outputs:
             raise typer.BadParameter("--backup is of --in-place: elsewhere the original stays")
         if self.in_place and "-" in files:
             raise typer.BadParameter("--in-place needs a file, not standard input")
+
+    def _check_standard(self, program: bool, difference: bool, as_json: bool) -> None:
+        """Refuse two things on standard output, one of which is the program or the difference."""
+        if self.report == STANDARD and (difference or as_json):
+            raise typer.BadParameter("--report - has standard output to itself: no --diff, --json")
+        if as_json and difference:
+            raise typer.BadParameter("standard output holds one: the difference or --json")
+        if as_json and program:
+            raise typer.BadParameter(
+                "standard output holds one: the program or --json; name a file with -o"
+            )
 
     def check_single(self, many: bool) -> None:
         """Refuse names of single files where many programs are given, and reports of no name."""

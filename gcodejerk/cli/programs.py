@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from contextlib import closing
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -17,6 +17,7 @@ from gcodejerk.cli.common import (
     console,
     load_machine,
     progress,
+    refuse,
     said,
     say,
 )
@@ -132,9 +133,9 @@ def process(
         _refuse_beside_revert(ctx)
         _revert(files, quiet)
         return
-    outputs.check(files, trial="--diff" if diff else "--check" if check else "", as_json=as_json)
-    if as_json and verbose:
-        raise typer.BadParameter("--json has no lines of rapids: -v, or --report FILE.json")
+    mode = _mode(check=check, diff=diff)
+    outputs.check(files, trial=_TRIALS.get(mode, ""), as_json=as_json)
+    refuse((as_json and verbose, "--json has no lines of rapids: -v, or --report FILE.json"))
     found, problems = find_inputs(files, output_dir)
     many = len(found) + len(problems) > 1
     outputs.check_single(many or any(map(os.path.isdir, files)))
@@ -151,7 +152,6 @@ def process(
     )
     described = counting(load_machine(machine, files), rapid_feed, rapid_clearance)
     described = calling(described, subprograms)
-    mode = "diff" if diff else "check" if check else "write"
     batch = outputs.jobs(found, described, settings, mode=mode, strict=strict)
     held = (STANDARD in (job.output, job.report) for job in batch)
     aside = diff or (mode == "write" and any(held))
@@ -169,6 +169,15 @@ def process(
         raise typer.Exit(1)
     if check and tally.changed:
         raise typer.Exit(WOULD_CHANGE)
+
+
+_TRIALS = {"diff": "--diff", "check": "--check"}
+"""Modes in which nothing is written, by their options."""
+
+
+def _mode(*, check: bool, diff: bool) -> Literal["write", "check", "diff"]:
+    """What becomes of what is made of a program."""
+    return "diff" if diff else "check" if check else "write"
 
 
 BESIDE_REVERT = ("files", "revert", "quiet")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -12,11 +13,13 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 import typer
 
 from gcodejerk.cli.common import (
+    Bar,
     JsonOption,
     MachineOption,
     ProfileOption,
     load_machine,
     progress,
+    refuse,
 )
 from gcodejerk.cli.rapid_feed import ClearanceOption, RapidFeedOption, counting
 from gcodejerk.cli.subprograms import SubprogramsOption, calling
@@ -67,42 +70,41 @@ def verify(
     from gcodejerk.verification.rows.files import rows_format, stated_profile
     from gcodejerk.verification.table import is_table
 
-    if as_json and quiet:
-        raise typer.BadParameter("--json prints, and -q is the exit status alone: choose one")
-    if original == processed == "-":
-        raise typer.BadParameter("only one of the two can be standard input")
+    front = Front(unroll, expand_cycles)
+    named = processed.lower().endswith(".csv")
+    in_table = f"{front.options}: a table of streams has no {front.what} written out"
+    refuse(
+        (as_json and quiet, "--json prints, and -q is the exit status alone: choose one"),
+        (original == processed == "-", "only one of the two can be standard input"),
+        (report is not None and front, "--report: its lines are the original's, as it was"),
+        (named and front, in_table),
+    )
     described = counting(load_machine(machine, [original]), rapid_feed, rapid_clearance)
     described = calling(described, subprograms)
-    front = Front(unroll, expand_cycles)
-    if report is not None and front:
-        raise typer.BadParameter("--report: its lines are the original's, as it was")
-    in_table = f"{front.options}: a table of streams has no {front.what} written out"
-    if processed.lower().endswith(".csv") and front:
-        raise typer.BadParameter(in_table)
     reported = None if report is None else read_reported(report)
     told = ""
     with ExitStack() as files:
         one, other = (files.enter_context(open_input(name)) for name in (original, processed))
         names = (original, processed)
-        named = processed.lower().endswith(".csv")
         table = named or is_table(other) or rows_format(other) is not None
-        if table and front:
-            raise typer.BadParameter(in_table)
+        refuse((table and front, in_table))
         stated = profile or stated_profile(other)
         described, dialect, front = _said(
             other, processed, described, profile, dialect, controller, front
         )
-        if report is not None and (table or front or described.controller not in ALIGNED):
-            raise typer.BadParameter(
-                "--report holds streams for LinuxCNC in the original's own lines to their "
-                f"profiles, and {processed} has none: leave --report out"
+        none = table or front or described.controller not in ALIGNED
+        held_to = (
+            "--report holds streams for LinuxCNC in the original's own lines to their profiles"
+        )
+        refuse(
+            (
+                report is not None and none,
+                f"{held_to}, and {processed} has none: leave --report out",
             )
+        )
         samples = beside_of(processed) if described.controller == CONTROLLER else None
         beside = files.enter_context(open_input(samples)) if samples is not None else None
-        show = files.enter_context(progress(quiet))
-        if show is not None:
-            show.wait("reading")
-        tell = None if show is None else partial(show, "verifying")
+        tell = _telling(files.enter_context(progress(quiet)))
         if front:
             found, written = verify_written(
                 one, other, described, front, names=names, dialect=dialect, most=most,
@@ -121,6 +123,14 @@ def verify(
         _tell_assumed(found, processed, described, bool(stated) or not table)
     if not found.ok:
         raise typer.Exit(1)
+
+
+def _telling(show: Bar | None) -> Callable[[int, int], None] | None:
+    """What shows how far the proof is, where somebody looks; until it says so, that it reads."""
+    if show is None:
+        return None
+    show.wait("reading")
+    return partial(show, "verifying")
 
 
 def _said(

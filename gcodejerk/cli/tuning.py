@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcodejerk.cli.common import ControllerOption, MachineOption, console, load_machine, progress
+from gcodejerk.cli.common import (
+    ControllerOption,
+    MachineOption,
+    console,
+    load_machine,
+    progress,
+    refuse,
+)
 
 if TYPE_CHECKING:
     from gcodejerk.machine import Machine
@@ -83,21 +90,10 @@ def parameters(
     from gcodejerk.report.tuning_record import tuning_record
     from gcodejerk.report.tuning_table import tuning_notes, tuning_tables
 
-    if bool(files) == (lengths is not None):
-        raise typer.BadParameter("give programs, or --lengths FROM:TO such as 1:500, and not both")
-    if goal not in GOALS:
-        raise typer.BadParameter(f"--goal {goal}: choose {' or '.join(GOALS)}")
-    if lengths is not None and dialect is not None:
-        raise typer.BadParameter(
-            "--dialect is of programs, and --lengths has none: leave --dialect out"
-        )
     own = _numbers(tried or [])
     written = _written(output, as_json, plot, no_curve=no_curve)
-    if own and "-" in written:
-        raise typer.BadParameter(
-            "--try shows its numbers beside the others, where standard output is free: leave --try "
-            "out, or name a file in place of -"
-        )
+    refuse((goal not in GOALS, f"--goal {goal}: choose {' or '.join(GOALS)}"))
+    _refuse_idle(files, lengths, dialect, own, written)
     programs = files or []
     described = load_machine(machine, programs)
     refuse_clashes(written, [described.source, *programs])
@@ -189,6 +185,26 @@ def _moves(
             parts.append(program_moves(program.rapids, source, machine))
     name = Path(found[0].path).name if len(found) == 1 else f"{len(found)} programs"
     return joined_moves(parts, machine), name
+
+
+def _refuse_idle(
+    files: list[str] | None,
+    lengths: str | None,
+    dialect: str | None,
+    own: dict[str, float],
+    written: list[str],
+) -> None:
+    """Refuse options beside which others do nothing."""
+    alone = lengths is not None and dialect is not None
+    beside = "--try shows its numbers beside the others, where standard output is free"
+    refuse(
+        (
+            bool(files) == (lengths is not None),
+            "give programs, or --lengths FROM:TO such as 1:500, and not both",
+        ),
+        (alone, "--dialect is of programs, and --lengths has none: leave --dialect out"),
+        (own and "-" in written, f"{beside}: leave --try out, or name a file in place of -"),
+    )
 
 
 def _numbers(tried: list[str]) -> dict[str, float]:
