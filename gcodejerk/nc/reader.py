@@ -228,7 +228,7 @@ class Reader:
         last = len(spelled)
         if spelled.careful.any():
             last = int(np.argmax(spelled.careful))
-            self._forms[said[last][0]] = None
+            self._remember(said[last][0], None)
         stop = self.read_run(spelled, 0, last, (number, place[1])) if last else 0
         computed.take_back(stop)
         if stop < FEWEST_COMPUTED:
@@ -262,9 +262,13 @@ class Reader:
         if text in self._forms:
             return self._forms[text]
         form = form_of(self._parsed.get(text) or self._parse(text), self.dialect)
+        self._remember(text, form)
+        return form
+
+    def _remember(self, text: bytes, form: Form | None) -> None:
+        """The same lines are remembered as those that were taken apart."""
         if len(text) <= SHORT:
             self._forms[text] = form
-        return form
 
     def _run(self, line: Line, first: bool = False) -> None:
         """Execute a line of the main program."""
