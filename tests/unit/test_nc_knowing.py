@@ -96,6 +96,37 @@ def test_what_plain_grbl_refuses_and_others_run_is_reckoned_both_ways(line, afte
     assert notes
 
 
+@pytest.mark.parametrize(
+    ("block", "after"),
+    [
+        # by grbl 1.1's own gc_execute_line: run and not moving, or refused; others move
+        (b"G49 X3", "start unknown"),
+        (b"G1 G49 X3", "start unknown"),
+        (b"X3 A5", "start unknown"),
+        (b"T300 X3", "start unknown"),
+        (b"T-1 X3", "start unknown"),
+        (b"G10 G91", "distance mode unknown"),
+        (b"G91 I5", "distance mode unknown"),
+        (b"G80 G0 X3", "start unknown"),
+        (b"G43.1 G91", "distance mode unknown"),
+        (b"G80\nG92 X3\nG0", "start unknown"),
+        (b"G1 F0 G38.2 G91 X3", "distance mode unknown"),
+    ],
+)
+def test_words_that_plain_grbl_refuses_and_others_run_are_reckoned_both_ways(block, after):
+    found, notes = read(b"G0 X1 Y1 Z1 F100\n" + block + b"\nG0 X7\n", "grbl")
+    assert found[-1] == after
+    assert notes
+    plain, _ = read(b"G0 X1 Y1 Z1 F100\nG49\nG1 X3\nT25\nG0 X7\n", "grbl")
+    assert plain[-1] is None
+
+
+def test_an_axis_that_the_machine_has_is_refused_by_nobody():
+    limits = dict.fromkeys("XYZA", (100.0, 1000.0, 10000.0))
+    found, _ = read(b"G0 X1 Y1 Z1 A0\nX3 A5\nG0 X7\n", "grbl", limits=limits)
+    assert found[-1] is None
+
+
 def test_a_rapid_beside_a_code_that_may_be_refused_is_left_alone():
     found, notes = read(b"G0 X1\nG64 G0 X5\nX7\nG0 X9\n", "grbl")
     assert found == [None, "block not understood", "start unknown", None]

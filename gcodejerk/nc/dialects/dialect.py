@@ -19,6 +19,7 @@ from typing import Literal
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.limits import Limit, Mode
+from gcodejerk.nc.dialects.refusals import Refusals
 from gcodejerk.nc.dialects.spelling import Text, Writing
 from gcodejerk.start import Start
 
@@ -250,6 +251,8 @@ class Dialect:
     refused: frozenset[str] = frozenset()
     """Codes ("G64", "M6") that some of its controls refuse, and others run. Where one is refused,
     its whole block changes nothing, and the sender waits for somebody, who may move the axes."""
+    refuses: Refusals = field(default_factory=Refusals)
+    """What some refuse besides."""
     feed_of_mixed: bool = False
     """Where linear and rotary axes move together, F is certainly the speed of the linear ones."""
     feed_on_rapids: bool = False
@@ -366,15 +369,17 @@ class Dialect:
         Parameters
         ----------
         start : Start
-            Codes that are harmless, and M codes that run before the motion of their block, or
-            behind it. Of codes that do more than switch a spindle, coolant or auxiliaries, nothing
-            is believed.
+            Codes that are harmless, M codes that run before the motion of their block, or behind
+            it, and the axes that there are. Of M codes that do more than switch a spindle, coolant
+            or auxiliaries, nothing is believed.
 
         Returns
         -------
         Dialect
         """
         dialect = self.with_harmless(start.harmless)
+        if lacking := self.refuses.axes - start.limits.keys():
+            dialect = replace(dialect, letters="".join(a for a in self.letters if a not in lacking))
         before, after = (
             frozenset(m for m in codes if dialect.m_groups.get(m) in _SWITCHES)
             for codes in (start.m_before, start.m_after)

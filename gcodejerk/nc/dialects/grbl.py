@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from gcodejerk.nc.dialects import limits
 from gcodejerk.nc.dialects.dialect import COMPENSATION, Dialect, code_names, grouped
+from gcodejerk.nc.dialects.refusals import Refusals
 from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
@@ -101,6 +102,16 @@ GRBL = Dialect(
         *("G43", "G43.2", "G64", "G98", "G99", "G41", "G41.1", "G42", "G42.1", "G50", "G51"),
         *("G7", "G8", "M6", "M7", "M48", "M49", "M50", "M51", "M53", "M56"),
         *(f"M{n}" for n in range(62, 69)),
+    ),
+    refuses=Refusals(
+        axes=frozenset("ABC"),
+        tool=255,  # MAX_TOOL_NUMBER
+        lengths=frozenset({490}),
+        bare_table=True,
+        bare_centre=True,
+        end_beside=True,
+        still_words=True,
+        length_axis="Z",
     ),
     letters="FSTXYZABCDEHIJKLPQR",
     uses={

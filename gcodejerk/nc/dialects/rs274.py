@@ -91,6 +91,7 @@ RS274 = Dialect(
     # LinuxCNC has G7, which a block that is not understood may hold.
     diameter_codes=True,
     refused=GRBL.refused,
+    refuses=GRBL.refuses,
     feed_before_units=True,
     arcs_refused=True,
     limits=GRBL.limits,

@@ -37,7 +37,7 @@ _REACH = 2e-4
 _MODES = frozenset({"motion", "plane", "distance", "arc distance", "feed mode", "units"})
 """Groups beside which the way of an arc is known from where the block begins."""
 _CENTRES = {"X": "I", "Y": "J", "Z": "K"}
-_TAKES = AXIS_USERS | {"words", "store"}
+_TAKES = AXIS_USERS | {"words"}
 
 
 def in_doubt(codes: Codes, state: State, dialect: Dialect) -> bool | None:
@@ -77,7 +77,7 @@ def lacks_feed(codes: Codes, state: State, dialect: Dialect) -> bool:
     else:
         mode = dialect.feed_modes.get(codes.g.get("feed mode", -1), state.feed_mode)
         feed = state.feed if mode == state.feed_mode else NAN
-    if feed > 0.0 or codes.unknown or motion not in (G1, *dialect.arcs):
+    if feed > 0.0 or codes.unknown or motion not in (G1, *dialect.arcs, *dialect.redrawn):
         return False
     if dialect.effect(codes.g.get("non-modal")) in _TAKES or takes_axes(codes):
         return False

@@ -162,12 +162,15 @@ class _Sorter:
         if group is None:
             self.codes.reject(word.text)
         elif group not in g or g[group] == G80:
+            self.codes.fault |= group in g and self._dialect.refuses.end_beside
             g[group] = code
             late = group == "distance" and self._dialect.distance_first and self.codes.moved()
             self.codes.fault = self.codes.fault or bool(late)
         elif code != G80:
             self.codes.fault = True
             g[group] = code
+        else:
+            self.codes.fault |= self._dialect.refuses.end_beside
 
     def m_code(self, word: Word, value: float) -> None:
         """An M word."""

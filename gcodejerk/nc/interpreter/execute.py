@@ -21,6 +21,7 @@ from gcodejerk.nc.interpreter.limits import set_by_setting
 from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.phases import Phases
 from gcodejerk.nc.interpreter.rapids import USES_FEED
+from gcodejerk.nc.interpreter.refusals import refused_by_some
 from gcodejerk.nc.interpreter.rules import is_complete
 from gcodejerk.nc.interpreter.variables import assign, assigned_values, reads_feed
 from gcodejerk.nc.text.block import Block
@@ -101,7 +102,7 @@ class Executor(Phases):
         if block.assigns:
             assign(block, values, state, rules)
             self._switch_overrides(block, values)
-        code = _first_refused(codes, self.dialect)
+        code = refused_by_some(codes, state, self.dialect)
         doubt = self.dialect.arcs_refused and in_doubt(codes, state, self.dialect)
         slow = self.dialect.arcs_refused and lacks_feed(codes, state, self.dialect)
         if code or slow or doubt is not False:
@@ -198,14 +199,6 @@ def _may_do_anything(rest: bytes) -> bool:
     if rest[:1] == b"$":
         return _SHOWS_OR_SETS.fullmatch(rest) is None
     return any(byte in b"GMOgmo#[\r" for byte in rest)
-
-
-def _first_refused(codes: Codes, dialect: Dialect) -> str:
-    """Name a code of the block that some of the dialect's controls refuse; empty without one."""
-    if not dialect.refused:
-        return ""
-    names = [f"G{code / 10:g}" for code in codes.g.values()] + [f"M{m}" for m in codes.m]
-    return next((name for name in names if name in dialect.refused), "")
 
 
 def _call(codes: Codes, dialect: Dialect) -> Call | None:

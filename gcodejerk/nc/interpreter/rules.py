@@ -30,7 +30,7 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     if codes.unknown:
         return True
     values, g = codes.values, codes.g
-    if values.get("F", 0.0) < 0.0 or values.get("S", 0.0) < 0.0:
+    if any(values.get(letter, 0.0) < 0.0 for letter in "FST"):
         return False
     motion = (_strict_motion if dialect.strict else _lenient_motion)(codes, state, dialect)
     if motion == _REFUSED:
@@ -43,7 +43,7 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     mode = dialect.feed_modes.get(g["feed mode"]) if "feed mode" in g else state.feed_mode
     if mode == 93 and motion not in (None, 0, G80) and axes and "F" not in values:
         return False
-    return _cartesian(codes, motion, dialect) and _words_used(codes, motion, state, dialect)
+    return _cartesian(codes, motion, dialect) and _words_used(codes, motion, dialect)
 
 
 def _lenient_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
@@ -88,8 +88,8 @@ def _cartesian(codes: Codes, motion: int | None, dialect: Dialect) -> bool:
     return not any(letter in codes.values and letter != radius for letter in dialect.polar)
 
 
-def _words_used(codes: Codes, motion: int | None, state: State, dialect: Dialect) -> bool:
-    """Whether every letter has a code that uses it."""
+def _words_used(codes: Codes, motion: int | None, dialect: Dialect) -> bool:
+    """Whether every letter has a code that uses it, of those that are certainly in force."""
     in_force = None
     for letter in codes.values:
         if letter == "P" and codes.names and letter not in dialect.letters:
@@ -103,8 +103,6 @@ def _words_used(codes: Codes, motion: int | None, state: State, dialect: Dialect
             used = list(codes.g.values())
             if motion is not None:
                 used.append(motion)
-            elif state.motion is None:
-                return True
             in_force = {f"G{c / 10:g}" for c in used} | {f"M{m}" for m in codes.m}
         if not users & in_force:
             return False

@@ -1,4 +1,4 @@
-"""Arcs that the control may refuse while the program goes on, and runs of feed moves with them.
+"""Arcs and words that a control may refuse while the program goes on, and runs of feed moves.
 
 Rule: an arc that misses its end, or of which too little is known, is run and not run.
 """
@@ -9,13 +9,14 @@ import re
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LEFT_OVER, PLANES, Effect
-from gcodejerk.nc.dialects.gcodes import G1, G40, G90, G91
+from gcodejerk.nc.dialects.gcodes import G1, G40, G43_1, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.drilling import Drilling
 from gcodejerk.verification.second_reading.reading import NAN, Run, Text
 from gcodejerk.verification.second_reading.sorting import Sorted
 
-_TAKES: frozenset[Effect] = frozenset(("return", "table", "local", "set", "words", "store"))
+_NO_MOTION: frozenset[Effect] = frozenset(("return", "table", "local", "set"))
+_TAKES: frozenset[Effect] = _NO_MOTION | {"words"}
 _ALONE = {"motion", "plane", "distance", "arc distance", "feed mode", "units"}
 _CENTRES = dict(zip("XYZ", "IJK", strict=True))
 _COMMENT = re.compile(rb"\([^()]*\)")
@@ -165,12 +166,43 @@ class Circling(Drilling):
         dialect, g, values = self.dialect, block.g, block.values
         motion = g.get("motion", self.g.get("motion"))
         moves = block.axes or (motion != G1 and {"I", "J", "K"} & values.keys())
-        if not dialect.arcs_refused or not moves or motion not in (G1, *dialect.arcs):
+        feeds = motion in (G1, *dialect.arcs, *dialect.redrawn)
+        if not dialect.arcs_refused or not moves or not feeds:
             return False
         if any(dialect.effect(code) in _TAKES for code in g.values()):
             return False
         another = "feed mode" in g and self.mode_of(g["feed mode"]) != self.feed_mode
         return not values.get("F", NAN if another else self.feed) > 0.0
+
+    def may_be_refused(self, block: Sorted) -> bool:
+        """Whether some of the dialect's controls may refuse a block."""
+        codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}
+        if not codes.isdisjoint(self.dialect.refused) or self.doubts_words(block):
+            return True
+        return self.doubts_feed(block) or self.doubts_arc(block)
+
+    def doubts_words(self, block: Sorted) -> bool:
+        """Whether a block holds words, or some beside others, that not every control takes."""
+        dialect, g, rules = self.dialect, block.g, self.dialect.refuses
+        effects = {dialect.effect(code) for code in g.values()}
+        takes = not effects.isdisjoint(_NO_MOTION)
+        length, stated = g.get("tool length"), g.get("motion", G80) != G80
+        if length == G43_1 and rules.length_axis:
+            takes = True
+            if block.axes != 1 << AXES.index(rules.length_axis):
+                return True
+        return (
+            block.values.get("T", 0.0) > rules.tool
+            or (rules.bare_table and "table" in effects and not block.axes)
+            or (rules.bare_centre and not block.axes and not set("IJKR").isdisjoint(block.values))
+            or (length in rules.lengths and (bool(block.axes) or takes or stated))
+            or (
+                rules.still_words
+                and takes
+                and bool(block.axes)
+                and g.get("motion", self.g.get("motion")) == G80
+            )
+        )
 
     def doubts_arc(self, block: Sorted) -> bool:
         """Whether a block is an arc that the control may refuse."""

@@ -90,6 +90,8 @@ class Sorted:
         there = self.g.get(group)
         if there not in (None, G80) and code != G80:
             return False
+        if there is not None and dialect.refuses.end_beside:
+            return False
         if there in (None, G80):
             self.g[group] = code  # beside G80, another code of its group is the one that counts
         return there != code

@@ -140,8 +140,7 @@ class Tracker(Circling):
                 self.turning(effect)
             elif effect in _SMOOTH:
                 self.smooth(effect, line)
-        codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}
-        if codes & dialect.refused or self.doubts_feed(block) or self.doubts_arc(block):
+        if self.may_be_refused(block):
             return self._run_or_refused(block)
         seen = self._run_block(block)
         seen = self.end_elsewhere(line, block) or seen

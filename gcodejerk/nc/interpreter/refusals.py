@@ -1,0 +1,52 @@
+"""Blocks that some of a dialect's controls refuse, and others run.
+
+Rule: such a block is executed or changes nothing; whoever executes it reckons with both.
+"""
+
+from __future__ import annotations
+
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.gcodes import G43_1, G80
+from gcodejerk.nc.interpreter.codes import Codes
+from gcodejerk.nc.interpreter.modal import State
+from gcodejerk.nc.interpreter.rules import AXIS_USERS, takes_axes
+
+
+def refused_by_some(codes: Codes, state: State, dialect: Dialect) -> str:
+    """Name what some of the dialect's controls refuse in a block; empty without anything.
+
+    Parameters
+    ----------
+    codes : Codes
+        Of the block, which the others accept (`rules.is_complete`).
+    state : State
+        In front of it.
+    dialect : Dialect
+        Of the program.
+    """
+    names = [f"G{code / 10:g}" for code in codes.g.values()] + [f"M{m}" for m in codes.m]
+    if code := next((name for name in names if name in dialect.refused), ""):
+        return code
+    rules, axes = dialect.refuses, codes.moved()
+    if codes.values.get("T", 0.0) > rules.tool:
+        return f"T{codes.values['T']:g}"
+    effect = dialect.effect(codes.g.get("non-modal"))
+    if rules.bare_table and effect == "table" and not axes:
+        return "G10 without an axis"
+    if rules.bare_centre and not axes and not codes.values.keys().isdisjoint("IJKR"):
+        return "the centre or radius of an arc without an axis"
+    return _axes_taken(codes, state, dialect, effect in AXIS_USERS)
+
+
+def _axes_taken(codes: Codes, state: State, dialect: Dialect, takes: bool) -> str:
+    """The same of axis words that no motion takes; `takes`: a code like G28 stands in the block."""
+    rules, axes = dialect.refuses, codes.moved()
+    length, motion = codes.g.get("tool length"), codes.g.get("motion")
+    if length in rules.lengths and (axes or takes or motion not in (None, G80)):
+        return f"G{length / 10:g} beside axis words or what takes some"
+    if rules.length_axis and length == G43_1 and axes != {rules.length_axis}:
+        return f"G43.1 with other axes than {rules.length_axis}"
+    in_force = state.motion if motion is None else motion
+    if rules.still_words and axes and in_force == G80 and (takes or takes_axes(codes)):
+        return "axis words while G80 is in force"
+    return ""
