@@ -85,6 +85,8 @@ def sure_lines(
         by_radius = (arc_words == BIT["R"]) & (letters & in_plane != 0)
         silent = letters & (AXIS_BITS | _ARC_WORDS | BIT["G"]) == 0
         sure = np.where(is_arc, by_centre | by_radius | silent, sure)
+    if dialect.refuses.bare_centre:
+        sure = sure & ((arc_words == 0) | (letters & AXIS_BITS != 0))
     counting = sum(
         1 << k for k, wrap in enumerate(state.wraps) if AXES[k] not in LINEAR and wrap != "none"
     )
