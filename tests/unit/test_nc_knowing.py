@@ -114,9 +114,13 @@ def test_what_plain_grbl_refuses_and_others_run_is_reckoned_both_ways(line, afte
     ],
 )
 def test_words_that_plain_grbl_refuses_and_others_run_are_reckoned_both_ways(block, after):
-    found, notes = read(b"G0 X1 Y1 Z1 F100\n" + block + b"\nG0 X7\n", "grbl")
+    text = b"G0 X1 Y1 Z1 F100\n" + block + b"\nG0 X7\n"
+    found, notes = read(text, "grbl")
     assert found[-1] == after
     assert notes
+    start = start_of("grbl", spindle="mill")
+    ((_, seen),) = observations(io.BytesIO(text), find_dialect("grbl"), start, [text.count(b"\n")])
+    assert not seen.sure or seen.start[0] != seen.start[0] or seen.modes["incremental"] is None
     plain, _ = read(b"G0 X1 Y1 Z1 F100\nG49\nG1 X3\nT25\nG0 X7\n", "grbl")
     assert plain[-1] is None
 

@@ -183,26 +183,29 @@ class Circling(Drilling):
 
     def doubts_words(self, block: Sorted) -> bool:
         """Whether a block holds words, or some beside others, that not every control takes."""
-        dialect, g, rules = self.dialect, block.g, self.dialect.refuses
-        effects = {dialect.effect(code) for code in g.values()}
-        takes = not effects.isdisjoint(_NO_MOTION)
+        rules, values = self.dialect.refuses, block.values
+        effects = {self.dialect.effect(code) for code in block.g.values()}
+        bare = not block.axes and (
+            (rules.bare_table and "table" in effects)
+            or (rules.bare_centre and not set("IJKR").isdisjoint(values))
+        )
+        negative = any(values.get(letter, 0.0) < 0.0 for letter in "FST")
+        too_large = values.get("T", 0.0) > rules.tool
+        taken = not effects.isdisjoint(_NO_MOTION)
+        return bare or negative or too_large or self._doubts_taken(block, taken=taken)
+
+    def _doubts_taken(self, block: Sorted, *, taken: bool) -> bool:
+        """The same of axis words that no motion takes; `taken`: one like G28 has them."""
+        g, rules = block.g, self.dialect.refuses
         length, stated = g.get("tool length"), g.get("motion", G80) != G80
         if length == G43_1 and rules.length_axis:
-            takes = True
+            taken = True
             if block.axes != 1 << AXES.index(rules.length_axis):
                 return True
-        return (
-            block.values.get("T", 0.0) > rules.tool
-            or (rules.bare_table and "table" in effects and not block.axes)
-            or (rules.bare_centre and not block.axes and not set("IJKR").isdisjoint(block.values))
-            or (length in rules.lengths and (bool(block.axes) or takes or stated))
-            or (
-                rules.still_words
-                and takes
-                and bool(block.axes)
-                and g.get("motion", self.g.get("motion")) == G80
-            )
-        )
+        if length in rules.lengths and (block.axes or taken or stated):
+            return True
+        still = rules.still_words and g.get("motion", self.g.get("motion")) == G80
+        return still and taken and bool(block.axes)
 
     def doubts_arc(self, block: Sorted) -> bool:
         """Whether a block is an arc that the control may refuse."""
