@@ -4,6 +4,7 @@ import io
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from gcodejerk import ProgramError
@@ -12,6 +13,8 @@ from gcodejerk.nc import DIALECTS, Dialect, Start, find_dialect, parse_block, re
 from gcodejerk.nc import trace as follow
 from gcodejerk.nc.dialects import GROUP
 from gcodejerk.reasons import CERTAIN, REASONS
+from gcodejerk.verification.findings import Findings
+from gcodejerk.verification.second_reading.agreement import confirm
 
 KNOWN = Start(positions={"X": 0.0, "Y": 0.0, "Z": 0.0}, startup="G17 G21 G90 G94")
 SIEMENS = Start(positions=KNOWN.positions, startup="G17 G71 G90 G94 G64")
@@ -277,6 +280,32 @@ def test_rapids_of_marlin_and_klipper_run_at_f():
         assert rapids.speed.tolist()[1:] == [10.0, 20.0]
     rapids = read_program(io.BytesIO(b"G0 X5 F600\n"), dialect="linuxcnc", start=KNOWN).rapids
     assert math.isnan(rapids.speed[0])
+
+
+@pytest.mark.parametrize(
+    ("dialect", "line", "speed"),
+    [
+        # F belongs to the command of its line, and only a move has a use for it.
+        ("klipper", b"G91 F60", 50.0),
+        ("marlin", b"G90 F60", 50.0),
+        ("marlin", b"G92 X0 F60", 50.0),
+        ("klipper", b"G1 F60", 1.0),
+        # Behind a code that not every control knows, and behind F0, nobody knows which F holds.
+        ("klipper", b"G3 X5 I3 F60", NOWHERE),
+        ("marlin", b"G5 X5 I3 J1 P1 Q1 F60", NOWHERE),
+        ("marlin", b"G0 X5 F0", NOWHERE),
+        ("klipper", b"G1 F0", NOWHERE),
+    ],
+)
+def test_f_counts_beside_a_move_alone(dialect, line, speed):
+    program = b"G90\nG0 X5 F3000\n" + line + b"\nG90\nG0 X0 Y0 Z0\nG0 X8\n"
+    rapids = read_program(io.BytesIO(program), dialect=dialect, start=PRINTER).rapids
+    assert rapids.speed[-1] == pytest.approx(speed, nan_ok=True)
+    rows, found = np.arange(len(rapids) - 1, len(rapids)), Findings(100)
+    assert confirm(io.BytesIO(program), dialect, PRINTER, rapids, rows, found)
+    assert not found.violations
+    wrong = replace(rapids, speed=np.full(len(rapids), 2.0))
+    assert not confirm(io.BytesIO(program), dialect, PRINTER, wrong, rows, found)
 
 
 def test_a_rapid_that_feeds_plastic_is_left_alone():

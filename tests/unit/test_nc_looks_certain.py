@@ -139,6 +139,21 @@ NOT_CERTAIN = {
     "a padded code of Klipper": (
         "klipper", b"G00 X5\nG90\nG0 X9 F6000\n", Reason.START_UNKNOWN
     ),
+    "F0": ("klipper", b"G0 X5 F0\nG0 X9 F6000\n", Reason.START_UNKNOWN),
+    "F0 in a run of lines": (
+        "klipper", b"G1 X5\nG1 X6\nG1 X7\nG1 Y1\nG1 X5 F0\nG1 Z3\nG1 X8 F90\nG0 Y9\n",
+        Reason.START_UNKNOWN
+    ),
+    "G92 with an axis that it passes over": (
+        "klipper", b"G92 A5\nG0 X9\n", Reason.START_UNKNOWN
+    ),
+    "a bare G92 leaves A where it was": ("klipper", b"G92\nG0 A9\n", Reason.START_UNKNOWN),
+    "a code behind T": ("klipper", b"T0 G91\nG0 X0 Y0 Z0 F600\nG0 X9\n", NO_DISTANCE),
+    "a code behind an axis": ("marlin", b"X5 G91\nG0 X0 Y0 Z0 F600\nG0 X9\n", NO_DISTANCE),
+    "a move behind an axis": (
+        "marlin", b"G0 Y1\nG1 X1\nG1 X2\nG1 X3\nX5 G1\nG1 Y9\nG1 Y8\nG1 Y7\nG0 X9\n",
+        Reason.START_UNKNOWN
+    ),
     "an arc that Klipper may lack": ("klipper", b"G2 X5 I3\nG0 X9\n", Reason.START_UNKNOWN),
     "an object that is left out": (
         "klipper", b"EXCLUDE_OBJECT_END NAME=A\nG0 X9\n", Reason.START_UNKNOWN

@@ -231,7 +231,7 @@ class Dialect:
     modal_motion: bool = True
     """G0 to G3 stay in force; otherwise every block states its own."""
     one_command: bool = False
-    """The first G or M is the command, and all other words are its parameters."""
+    """The first word is the command, and all others are its parameters."""
     units: Mapping[int, bool] = field(default_factory=lambda: {200: True, 210: False})
     """G code -> whether lengths are inches."""
     feed_modes: Mapping[int, int] = field(default_factory=lambda: {930: 93, 940: 94, 950: 95})
@@ -257,6 +257,9 @@ class Dialect:
     """Where linear and rotary axes move together, F is certainly the speed of the linear ones."""
     feed_on_rapids: bool = False
     """G0 runs at F, like G1."""
+    feed_of_moves: bool = False
+    """F counts beside G0 to G3 alone; anywhere else it belongs to another command. One that is not
+    greater than 0 is refused or passed over."""
     tool_frame: frozenset[str] = frozenset()
     """Addresses that change a tool's offset, and with it the frame: T on a lathe, D."""
     length_axes: str = AXES
@@ -270,7 +273,11 @@ class Dialect:
     p_selects: frozenset[int] = frozenset()
     """Systems that a P may turn into another one: G54 P3 for G54.1 P3."""
     bare_set: Literal["nothing", "zero", "unknown"] = "unknown"
-    """G92 without axis words: changes nothing; makes every position zero; nobody knows."""
+    """G92 without axis words: changes nothing; makes the position of every axis that it may name
+    zero; nobody knows."""
+    set_letters: str = ""
+    """Letters that G92 takes; beside others, it may be one without axis words. Empty: all, where
+    `bare_set` is not "zero"."""
     shift_may_end: bool = False
     """By a setting of the control, selecting a work system ends what G92 has shifted."""
     incremental_set: bool = False

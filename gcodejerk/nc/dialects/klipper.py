@@ -33,10 +33,12 @@ KLIPPER = replace(
         checksum=True,
         line_limit=1024,
     ),
-    # G20 is refused, and a bare G92 sets every position to 0 (klippy/extras/gcode_move.py).
+    # G20 is refused, and a G92 without any of its letters sets each of their positions to 0
+    # (klippy/extras/gcode_move.py).
     groups={code: group for code, group in MARLIN.groups.items() if code != 200},
     defaults={**MARLIN.defaults, "units": 210},
     bare_set="zero",
+    set_letters="XYZE",
     refused=frozenset(),
     redrawn=frozenset({20, 30, 50}),
     other_m="unknown",  # a macro of the owner's, perhaps

@@ -85,6 +85,7 @@ MARLIN = Dialect(
     dark_rapids=True,
     incremental_set=True,
     feed_on_rapids=True,
+    feed_of_moves=True,
     refused=frozenset({"G20"}),
     m_scales=frozenset({220}),
     limits=limits.MARLIN,

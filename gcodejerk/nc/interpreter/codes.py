@@ -119,8 +119,7 @@ def sort_words(
         codes.reject(b"axis words beside a harmless code")
     codes.expression = codes.expression or bool(block.assigns)
     codes.names = [*block.names, *codes.calls]
-    several = codes.g and (codes.m or len(codes.g) > 1)
-    if dialect.one_command and several and not _in_turn(block, dialect):
+    if dialect.one_command and (codes.g or codes.m) and not _in_turn(block, dialect):
         codes.fault = True
     if sorter.whole and dialect.whole_numbers == "machine":
         _whole_numbers(codes, sorter.whole, dialect, inch, decimal_point)
@@ -208,7 +207,10 @@ class _Sorter:
 
 
 def _in_turn(block: Block, dialect: Dialect) -> bool:
-    """Whether the commands of a block do the same in turn as together: modes, then one more."""
+    """Whether the commands of a block do the same in turn as together: modes, then one more.
+
+    What stands in front of the first, an axis or a T, makes something else of the line.
+    """
     words = [word for word in block.words if word.letter != "N"]
     last = max(k for k, word in enumerate(words) if word.letter in "GM")
     return all(

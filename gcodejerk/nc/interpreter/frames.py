@@ -193,7 +193,7 @@ def set_names(state: State, codes: Codes, dialect: Dialect) -> None:
     values: Values = codes.values
     if not values and not codes.increments:
         if dialect.bare_set == "zero":
-            values = dict.fromkeys(AXES, 0.0)
+            values = dict.fromkeys(dialect.set_letters, 0.0)
         elif dialect.bare_set == "unknown":
             state.forget_positions()
             state.lose("g92")

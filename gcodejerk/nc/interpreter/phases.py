@@ -109,7 +109,12 @@ class Phases(Effects):
             if not self.dialect.one_command and codes.g.get("non-modal") != G4:
                 self.state.put("feed", NAN)  # a feed, or for what takes the other words
             return
-        feed = codes.values["F"]
+        motion, feed = codes.g.get("motion"), codes.values["F"]
+        if self.dialect.feed_of_moves:
+            if motion is None:
+                return
+            if motion in self.dialect.redrawn:
+                feed = NAN  # a control that does not know the code passes its F over, too
         self.state.put("feed", feed)
         self.state.put("feed_whole", codes.feed_whole)
         if feed == feed:

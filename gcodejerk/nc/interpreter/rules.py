@@ -30,7 +30,7 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     if codes.unknown:
         return True
     values, g = codes.values, codes.g
-    if any(values.get(letter, 0.0) < 0.0 for letter in "FST"):
+    if _too_small(codes, dialect):
         return False
     motion = (_strict_motion if dialect.strict else _lenient_motion)(codes, state, dialect)
     if motion == _REFUSED:
@@ -44,6 +44,12 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     if mode == 93 and motion not in (None, 0, G80) and axes and "F" not in values:
         return False
     return _cartesian(codes, motion, dialect) and _words_used(codes, motion, dialect)
+
+
+def _too_small(codes: Codes, dialect: Dialect) -> bool:
+    """Whether F, S or T is less than the control takes."""
+    still = dialect.feed_of_moves and "motion" in codes.g and codes.values.get("F") == 0.0
+    return still or any(codes.values.get(letter, 0.0) < 0.0 for letter in "FST")
 
 
 def _lenient_motion(codes: Codes, state: State, dialect: Dialect) -> int | None:
@@ -91,6 +97,9 @@ def _cartesian(codes: Codes, motion: int | None, dialect: Dialect) -> bool:
 def _words_used(codes: Codes, motion: int | None, dialect: Dialect) -> bool:
     """Whether every letter has a code that uses it, of those that are certainly in force."""
     in_force = None
+    taken = dialect.set_letters if dialect.effect(codes.g.get("non-modal")) == "set" else ""
+    if taken and not codes.values.keys() <= set(taken):
+        return False
     for letter in codes.values:
         if letter == "P" and codes.names and letter not in dialect.letters:
             continue  # NAME P3: called three times

@@ -146,7 +146,10 @@ def run_plain(
     motion = _spread(codes.line, codes.codes(), (state.motion or 0) // 10, last - first)
     sure = sure_lines(letters, motion, state, dialect)
     if dialect.arcs_refused:
-        _doubt_refused(sure, lines, letters, motion, state, first)
+        _doubt_arcs(sure, lines, letters, motion, state, first)
+    if dialect.arcs_refused or dialect.feed_of_moves:
+        given = lines.words("F", first, last)
+        sure[given.line[given.values() == 0.0]] = False
     if not sure.all():
         last = first + int(np.argmin(sure))
         letters, motion = letters[: last - first], motion[: last - first]
@@ -200,7 +203,7 @@ def run_plain(
     return last, int(row[certain[0]]) + place[0] if len(certain) else None
 
 
-def _doubt_refused(
+def _doubt_arcs(
     sure: NDArray[np.bool_],
     lines: Lines,
     letters: NDArray[np.uint32],
@@ -208,12 +211,10 @@ def _doubt_refused(
     state: State,
     first: int,
 ) -> None:
-    """Mark what the control may refuse: arcs that do not meet their end, and F0."""
+    """Mark arcs that the control may refuse, since they do not meet their end."""
     if state.unit is not None:
         arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
         sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
-    given = lines.words("F", first, first + len(letters))
-    sure[given.line[given.values() == 0.0]] = False
 
 
 def _motion_behind(

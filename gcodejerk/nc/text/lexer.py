@@ -139,6 +139,8 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
     if dialect.text.padded:
         zeros |= (behind - first == 2) & (text.take(first) == ord("0"))
     bad[codes] |= ~zeros | (text.take(behind - 1) > ord("3"))
+    if dialect.one_command:
+        bad[_behind_others(kind)] = True
     if dialect.text.hexadecimal:
         xs = np.flatnonzero(kind == ord("X"))
         bad[xs] |= text.take(place.take(xs) - 1) == ord("0")
@@ -155,6 +157,15 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
     if dialect.whole_numbers == "machine":
         bad |= _whole(joints)
     return bad
+
+
+def _behind_others(kind: NDArray[np.uint8]) -> Places:
+    """G words in front of which another word of their line stands, but for its number."""
+    word = np.flatnonzero((kind >= LETTERS) | (kind == END))
+    letter = kind.take(word)
+    in_front = (letter[:-1] != END) & (letter[:-1] != ord("N"))
+    found: Places = word[1:][in_front & (letter[1:] == ord("G"))]
+    return found
 
 
 def _many_digits(joints: Joints, width: Places, most: int) -> Flags:

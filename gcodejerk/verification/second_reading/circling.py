@@ -6,6 +6,7 @@ Rule: an arc that misses its end, or of which too little is known, is run and no
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LEFT_OVER, PLANES, Effect
@@ -65,8 +66,10 @@ class Circling(Drilling):
         if self.lacks_feed():
             return self._take_unfed(text, data, at)
         run = text.take_run(data, at, stated=not self.feeding)
-        taken = data[at : run[1]] if run is not None and self.dialect.arcs_refused else b""
-        if NO_FEED.search(taken) or self._strays(taken):
+        taken = data[at : run[1]] if run is not None else b""
+        rules, checked = self.dialect, self.dialect.arcs_refused
+        unfed = (checked or rules.feed_of_moves) and NO_FEED.search(taken) is not None
+        if unfed or (checked and self._strays(taken)):
             assert run is not None
             text.tried = at, run[1]  # line by line, then: who looks again and again never ends
             return None
@@ -161,6 +164,12 @@ class Circling(Drilling):
         """Whether a feed move may be refused, since it has no F."""
         return self.dialect.arcs_refused and not self.feed > 0.0
 
+    def counts_feed(self, g: Mapping[str, int]) -> bool | None:
+        """Whether F counts beside these codes; None: not on every control."""
+        if not self.dialect.feed_of_moves or "motion" not in g:
+            return not self.dialect.feed_of_moves
+        return None if g["motion"] in self.dialect.redrawn else True
+
     def doubts_feed(self, block: Sorted) -> bool:
         """Whether a block is a feed move without F that the control may refuse."""
         dialect, g, values = self.dialect, block.g, block.values
@@ -190,9 +199,10 @@ class Circling(Drilling):
             or (rules.bare_centre and not set("IJKR").isdisjoint(values))
         )
         negative = any(values.get(letter, 0.0) < 0.0 for letter in "FST")
+        still = self.dialect.feed_of_moves and "motion" in block.g and values.get("F") == 0.0
         too_large = values.get("T", 0.0) > rules.tool
         taken = not effects.isdisjoint(_NO_MOTION)
-        return bare or negative or too_large or self._doubts_taken(block, taken=taken)
+        return bare or negative or still or too_large or self._doubts_taken(block, taken=taken)
 
     def _doubts_taken(self, block: Sorted, *, taken: bool) -> bool:
         """The same of axis words that no motion takes; `taken`: one like G28 has them."""

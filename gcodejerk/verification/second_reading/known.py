@@ -391,7 +391,7 @@ class Known:
         if "set" in kinds:
             dialect, self.level = self.dialect, NAN
             if not values and not increments and dialect.bare_set == "zero":
-                values = dict.fromkeys(AXES, 0.0)
+                values = dict.fromkeys(dialect.set_letters, 0.0)
             elif not values and not increments and dialect.bare_set == "unknown":
                 self.lose()
                 self.g92 = [NAN] * len(AXES)

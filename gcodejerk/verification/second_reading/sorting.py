@@ -78,8 +78,8 @@ class Sorted:
             return False
         if dialect.distance_first and _distance_late(line, dialect):
             return False
-        alone = not dialect.one_command or len(self.g) + len(self.m) <= 1
-        return alone or _modes_first(line, dialect)
+        several = dialect.one_command and (self.g or self.m)
+        return not several or _modes_first(line, dialect)
 
     def _g_code(self, number: float, dialect: Dialect) -> bool:
         """Sort a code; whether it is known, and the only one of its group."""
@@ -101,8 +101,10 @@ class Sorted:
         axis = dialect.increments.get(letter)
         if letter in self.values or (axis or letter) in self.increments:
             return False
-        effects = {dialect.effect(code) for code in self.g.values()} if dialect.calls else set()
+        effects = {dialect.effect(code) for code in self.g.values()}
         if letter in dialect.calls and "label" not in effects:
+            return False
+        if dialect.set_letters and "set" in effects and letter not in dialect.set_letters:
             return False
         if letter not in dialect.letters and axis is None and not dialect.one_command:
             return False

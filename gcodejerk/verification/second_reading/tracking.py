@@ -223,8 +223,9 @@ class Tracker(Circling):
         taken = "words" in kinds or (self.dialect.one_command and not g)
         if "F" in values and taken and not self.dialect.one_command and G4 not in g.values():
             self.feed = NAN
-        if "F" in values and not taken:
-            self.feed, self.feed_whole = values["F"], self.matters(block.feed_whole)
+        if "F" in values and not taken and (counts := self.counts_feed(g)) is not False:
+            self.feed = values["F"] if counts else NAN
+            self.feed_whole = self.matters(block.feed_whole)
 
     def _set_tool(self, block: Sorted, seen: Observation) -> None:
         """Execute the words, other than codes, that move the tool or its frame."""
