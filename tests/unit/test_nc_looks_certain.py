@@ -9,7 +9,7 @@ import pytest
 from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
 from gcodejerk.machine import Machine, find_machine
-from gcodejerk.nc import CERTAIN, DIALECTS, Start, read_program
+from gcodejerk.nc import CERTAIN, DIALECTS, Start, read_program, trace
 from gcodejerk.nc.interpreter.modal import FIELDS, State, agree, join, same
 from gcodejerk.nc.reader import Reader
 from gcodejerk.reasons import REASONS, Reason
@@ -266,6 +266,8 @@ NOT_CERTAIN = {
         "heidenhain-iso", b"N3 G01 G43 Z5 F9*\nN4 G40*\nN5 G00 Z9*\n", Reason.START_UNKNOWN
     ),
     "beside a linear one": ("linuxcnc", b"G0 X3 A5\n", Reason.ROTARY_WAY),
+    "a dwell without P": ("grbl", b"G4 X3\nG0 X9\n", Reason.START_UNKNOWN),
+    "T with decimals": ("grbl", b"G0 X5 T1.5\nG0 X9\n", Reason.START_UNKNOWN),
     "an arc that misses its end": ("grbl", b"G2 X10 Y0 I5.6\nG0 X0\n", Reason.START_UNKNOWN),
     "an arc whose radius is too small": ("grbl", b"G2 X10 R3\nG0 X0\n", Reason.START_UNKNOWN),
     "an arc without its plane": ("grbl", b"G2 Z3 I5\nG0 Z50\n", Reason.START_UNKNOWN),
@@ -336,6 +338,20 @@ def test_what_only_looks_certain_is_left_alone(name):
     dialect, text, reason = NOT_CERTAIN[name]
     assert read(text, dialect)[-1] == reason
     assert reason is None or also_noticed(text, dialect)
+
+
+def test_a_feed_motion_without_f_may_leave_the_feed_mode_as_it_was():
+    """grbl refuses it in G93 whether an axis moves or not, and G93 with it."""
+    text = HEADS["grbl"] + b"G93 G1\nG0 X0 Y0 Z0\nG0 X9\n"
+    assert read_program(io.BytesIO(text), dialect="grbl").rapids.feed_mode[-1] == 0
+
+
+@pytest.mark.parametrize("front", [b"", b"G1 A5\nG1 A6\nG1 A7\nG1 A8\n"])
+def test_an_arc_that_may_be_refused_leaves_an_axis_that_turns_unknown_in_any_unit(front):
+    text = b"F100\nG0 A0\n" + front + b"G2 A5 I3 Y1\n"
+    start = start_of("grbl", wraps={"A": "none"}, limits={"A": (9.0, 9.0, 9.0)})
+    *_, last = trace(io.BytesIO(text), dialect="grbl", start=start)
+    assert math.isnan(last[1][AXES.index("A")])
 
 
 STILL_CERTAIN = {

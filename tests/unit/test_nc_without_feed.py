@@ -62,6 +62,17 @@ def test_with_an_f_it_is_certain(name, dialect):
     assert start == start
 
 
+@pytest.mark.parametrize("dialect", ["grbl", "rs274"])
+@pytest.mark.parametrize("front", [b"", b"G0 X1\nG0 X2\nG0 X3\nG0 X4\nG0 X5\n"])
+def test_a_g1_that_is_stated_without_f_is_refused_though_nothing_moves(dialect, front):
+    reason, _, wrong = last(HEAD + front + b"G91 G1\nG0 X9\n", dialect)
+    assert reason == Reason.DISTANCE_MODE_UNKNOWN
+    assert not wrong
+    text = HEAD + front + b"G1\nX7 Y0 Z5 F100\nG0 X9\n"
+    assert last(text, dialect)[0] == Reason.START_UNKNOWN  # refused, X7 may have been a rapid
+    assert last(text.replace(b"X7", b"G1 X7"), dialect)[0] is None
+
+
 @pytest.mark.parametrize("dialect", ["linuxcnc", "mach", "marlin", "klipper"])
 def test_other_controls_stop_or_go_on_with_a_feed_of_their_own(dialect):
     text = b"G21\nG90\nG0 X0 Y0 Z5\nG1 X5\nG0 X9\n"

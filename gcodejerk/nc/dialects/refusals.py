@@ -4,7 +4,7 @@ Whoever sends a program to a control that refuses a block may go on with the nex
 a block is executed or changes nothing, and both are reckoned with.
 
 Source: gnea/grbl, grbl/gcode.c, gc_execute_line; grblHAL/core, gcode.c; bdring/FluidNC, GCode.cpp.
-The rules were found by running drawn programs through the first of these.
+The rules were found by running drawn programs through the first two of these.
 """
 
 from __future__ import annotations
@@ -20,7 +20,11 @@ class Refusals:
     axes: frozenset[str] = frozenset()
     """Axes of which a word is refused where the machine does not have them."""
     tool: float = math.inf
-    """The largest T."""
+    """The largest T; one that is no whole number, too, where there is a largest."""
+    bare_dwell: bool = False
+    """G4 without P."""
+    bare_inverse: bool = False
+    """A feed motion in G93 that is stated without F, whether an axis moves or not."""
     lengths: frozenset[int] = frozenset()
     """Codes of the tool length that take axis words for themselves, though they have no use for
     them, and stand beside nothing else that takes some: grbl's ``G49 X5`` moves nothing."""

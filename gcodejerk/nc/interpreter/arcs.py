@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.nc.dialects.dialect import ARC_CENTRES, PLANES, Dialect
+from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LINEAR, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G1, G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import NAN, State
@@ -45,9 +45,11 @@ def in_doubt(codes: Codes, state: State, dialect: Dialect) -> bool | None:
     unit = state.unit
     if "units" in codes.g:
         unit = MM_PER_INCH if dialect.units[codes.g["units"]] else 1.0
-    if unit is None or not _is_arc(codes, state, dialect):
-        return False  # without a unit nothing is known of positions anyway
+    if not _is_arc(codes, state, dialect):
+        return False
     values, moved = codes.values, codes.moved()
+    if unit is None:
+        return False if moved <= LINEAR else None  # of the linear ones nothing is known anyway
     plane = codes.g.get("plane", state.plane)
     if plane not in ARC_CENTRES or not _MODES.issuperset(codes.g) or state.diameter is not False:
         return None
@@ -81,7 +83,9 @@ def lacks_feed(codes: Codes, state: State, dialect: Dialect) -> bool:
         return False
     if dialect.effect(codes.g.get("non-modal")) in _TAKES or takes_axes(codes):
         return False
-    return bool(codes.moved()) or (motion != G1 and not codes.values.keys().isdisjoint("IJK"))
+    if "motion" in codes.g or codes.moved():
+        return True  # one that is stated is refused though nothing moves
+    return motion != G1 and not codes.values.keys().isdisjoint("IJK")
 
 
 def _is_arc(codes: Codes, state: State, dialect: Dialect) -> bool:

@@ -5,8 +5,10 @@ Rule: such a block is executed or changes nothing; whoever executes it reckons w
 
 from __future__ import annotations
 
+import math
+
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.dialects.gcodes import G43_1, G80
+from gcodejerk.nc.dialects.gcodes import G4, G43_1, G80
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.rules import AXIS_USERS, takes_axes
@@ -28,14 +30,26 @@ def refused_by_some(codes: Codes, state: State, dialect: Dialect) -> str:
     if code := next((name for name in names if name in dialect.refused), ""):
         return code
     rules, axes = dialect.refuses, codes.moved()
-    if codes.values.get("T", 0.0) > rules.tool:
-        return f"T{codes.values['T']:g}"
+    tool = codes.values.get("T", 0.0)
+    if rules.tool < math.inf and (tool > rules.tool or tool % 1.0):
+        return f"T{tool:g}"
+    if rules.bare_dwell and G4 in codes.g.values() and "P" not in codes.values:
+        return "G4 without P"
+    if rules.bare_inverse and _lacks_time(codes, state, dialect):
+        return "a feed motion without F in G93"
     effect = dialect.effect(codes.g.get("non-modal"))
     if rules.bare_table and effect == "table" and not axes:
         return "G10 without an axis"
     if rules.bare_centre and not axes and not codes.values.keys().isdisjoint("IJKR"):
         return "the centre or radius of an arc without an axis"
     return _axes_taken(codes, state, dialect, effect in AXIS_USERS)
+
+
+def _lacks_time(codes: Codes, state: State, dialect: Dialect) -> bool:
+    """Whether a feed motion is stated without F in G93, or in a mode that may be that."""
+    mode = dialect.feed_modes.get(codes.g.get("feed mode", -1), state.feed_mode)
+    feeds = codes.g.get("motion", G80) not in (dialect.rapid, G80)
+    return mode in (93, 0, None) and feeds and "F" not in codes.values
 
 
 def _axes_taken(codes: Codes, state: State, dialect: Dialect, takes: bool) -> str:

@@ -29,6 +29,7 @@ from gcodejerk.start import RapidFeed
 from gcodejerk.units import SECONDS_PER_MINUTE
 
 AXIS_BITS = (1 << len(AXES)) - 1
+_ROTARY_BITS = sum(BIT[axis] for axis in AXES if axis not in LINEAR)
 CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
 _ARC_WORDS = CENTRES | BIT["R"]
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
@@ -93,7 +94,8 @@ def sure_lines(
     if counting and state.distance == G90:
         sure = sure & (letters & np.uint32(counting) == 0)  # where they end, the way they go says
     if state.feed_mode == 93:
-        sure = sure & ((motion == 0) | (letters & AXIS_BITS == 0) | (letters & BIT["F"] != 0))
+        feeding = AXIS_BITS | (BIT["G"] if dialect.refuses.bare_inverse else 0)
+        sure = sure & ((motion == 0) | (letters & feeding == 0) | (letters & BIT["F"] != 0))
     if not dialect.modal_motion:
         sure = sure & ((letters & BIT["G"] != 0) | (letters & ~np.uint32(BIT["N"]) == 0))
     for letter in _BESIDE:
@@ -212,8 +214,10 @@ def _doubt_arcs(
     first: int,
 ) -> None:
     """Mark arcs that the control may refuse, since they do not meet their end."""
-    if state.unit is not None:
-        arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
+    arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
+    if state.unit is None:
+        sure[arcs] = letters[arcs] & _ROTARY_BITS == 0
+    else:
         sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
 
 

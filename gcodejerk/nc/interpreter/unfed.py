@@ -86,7 +86,7 @@ def run_unfed(
     motion = held[np.searchsorted(at, np.arange(len(letters)), side="right")]
     does = np.where(stated >= 0, stated, motion)
     sure = sure_lines(letters, np.maximum(does, 0).astype(np.uint8), state, dialect)
-    sure &= letters & BIT["F"] == 0
+    sure &= (letters & BIT["F"] == 0) & (moves | (stated < 1))
     stop = len(sure) if sure.all() else int(np.argmin(sure))
     if stop == 0:
         return first, None

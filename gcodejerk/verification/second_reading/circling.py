@@ -5,12 +5,13 @@ Rule: an arc that misses its end, or of which too little is known, is run and no
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LEFT_OVER, PLANES, Effect
-from gcodejerk.nc.dialects.gcodes import G1, G40, G43_1, G80, G90, G91
+from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G43_1, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.verification.second_reading.drilling import Drilling
 from gcodejerk.verification.second_reading.reading import NAN, Run, Text
@@ -134,8 +135,10 @@ class Circling(Drilling):
     def _strays(self, run: bytes) -> bool:
         """Whether any arc of a run may be refused."""
         plane = PLANES.get(self.g.get("plane") or 0)
-        if self.unit is None or not any(mark in run for mark in (b"I", b"J", b"K", b"R")):
+        if not any(mark in run for mark in (b"I", b"J", b"K", b"R")):
             return False
+        if self.unit is None:
+            return any(axis in run for axis in (b"A", b"B", b"C"))
         if plane is None or self.diameter is not False:
             return True
         first, second = plane[:2]
@@ -174,7 +177,7 @@ class Circling(Drilling):
         """Whether a block is a feed move without F that the control may refuse."""
         dialect, g, values = self.dialect, block.g, block.values
         motion = g.get("motion", self.g.get("motion"))
-        moves = block.axes or (motion != G1 and {"I", "J", "K"} & values.keys())
+        moves = block.axes or "motion" in g or (motion != G1 and {"I", "J", "K"} & values.keys())
         feeds = motion in (G1, *dialect.arcs, *dialect.redrawn)
         if not dialect.arcs_refused or not moves or not feeds:
             return False
@@ -200,9 +203,20 @@ class Circling(Drilling):
         )
         negative = any(values.get(letter, 0.0) < 0.0 for letter in "FST")
         still = self.dialect.feed_of_moves and "motion" in block.g and values.get("F") == 0.0
-        too_large = values.get("T", 0.0) > rules.tool
+        tool = values.get("T", 0.0)
+        wrong = rules.tool < math.inf and not (tool <= rules.tool and tool.is_integer())
+        wrong = wrong or negative or still or bare or self._lacks_time(block)
         taken = not effects.isdisjoint(_NO_MOTION)
-        return bare or negative or still or too_large or self._doubts_taken(block, taken=taken)
+        return wrong or self._doubts_taken(block, taken=taken)
+
+    def _lacks_time(self, block: Sorted) -> bool:
+        """Whether a dwell has no time, or a feed motion in G93 no F."""
+        rules, g = self.dialect.refuses, block.g
+        if rules.bare_dwell and G4 in g.values() and "P" not in block.values:
+            return True
+        mode = self.mode_of(g["feed mode"]) if "feed mode" in g else self.feed_mode
+        feeds = g.get("motion", G80) not in (0, G80) and "F" not in block.values
+        return rules.bare_inverse and feeds and mode in (93, None)
 
     def _doubts_taken(self, block: Sorted, *, taken: bool) -> bool:
         """The same of axis words that no motion takes; `taken`: one like G28 has them."""
@@ -229,7 +243,8 @@ class Circling(Drilling):
         if "units" in g:
             self.unit = INCH if dialect.units[g["units"]] else 1.0
         plane = PLANES.get(g.get("plane", self.g.get("plane")) or 0)
-        failed = self.unit is not None
+        turning = block.axes >> AXES.index("A") & 7 != 0
+        failed = self.unit is not None or turning
         if plane is not None and self.unit is not None and set(g) <= _ALONE:
             ends = []
             for axis in plane[:2]:
