@@ -308,6 +308,13 @@ def test_f_counts_beside_a_move_alone(dialect, line, speed):
     assert not confirm(io.BytesIO(program), dialect, PRINTER, wrong, rows, found)
 
 
+@pytest.mark.parametrize("code", [b"G61.1", b"G15", b"G69", b"G64"])
+def test_where_one_of_three_controls_refuses_a_block_nobody_knows_where_it_leads(code):
+    start = replace(KNOWN, resume="same")
+    found = end(b"G0 X1 Y1 Z1\n" + code + b" X5 Z1\n", "rs274", start)
+    assert same(found, (NOWHERE, 1.0, 1.0))
+
+
 def test_a_rapid_that_feeds_plastic_is_left_alone():
     assert reasons(b"G90\nG0 X5 F600 E1\n", "marlin", PRINTER) == [
         "other words of the block cannot keep their order"

@@ -14,7 +14,7 @@ say differently of G0 holds here too (`apart`, of Centroid).
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Dialect, grouped
+from gcodejerk.nc.dialects.dialect import Dialect, code_names, grouped
 from gcodejerk.nc.dialects.grbl import GRBL, SYSTEMS
 from gcodejerk.nc.dialects.linuxcnc import LINUXCNC
 from gcodejerk.nc.dialects.mach import MACH
@@ -90,7 +90,8 @@ RS274 = Dialect(
     p_selects=frozenset(SYSTEMS),
     # LinuxCNC has G7, which a block that is not understood may hold.
     diameter_codes=True,
-    refused=GRBL.refused,
+    # grbl knows none of these, and behind G61.1 the others may have moved.
+    refused=GRBL.refused | code_names("G15", "G16", "G61.1", "G68", "G69"),
     refuses=GRBL.refuses,
     feed_before_units=True,
     arcs_refused=True,
