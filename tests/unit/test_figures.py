@@ -415,7 +415,7 @@ def test_a_position_is_the_acceleration_integrated_twice():
 
 
 def test_a_measured_spectrum_is_drawn(tmp_path):
-    rows = [f"{f},{1.0 / ((1 - (f / 40) ** 2) ** 2 + 0.01)}\n" for f in range(10, 121, 10)]
+    rows = [f"{f},{1.0 / ((1 - (f / 40) ** 2) ** 2 + 0.01)}\n" for f in range(10, 81, 10)]
     (tmp_path / "x.csv").write_text("".join(rows))
     (tmp_path / "m.yaml").write_text(SPECTRUM)
     shown = Shown(compare_move({"X": 2.0}, Machine.load(tmp_path / "m.yaml")))
