@@ -295,6 +295,9 @@ def test_rapids_of_marlin_and_klipper_run_at_f():
         ("marlin", b"G5 X5 I3 J1 P1 Q1 F60", NOWHERE),
         ("marlin", b"G0 X5 F0", NOWHERE),
         ("klipper", b"G1 F0", NOWHERE),
+        # Nor where the motion before may still be in force.
+        ("marlin", b"F60", NOWHERE),
+        ("marlin", b"M104 F60", 50.0),
     ],
 )
 def test_f_counts_beside_a_move_alone(dialect, line, speed):

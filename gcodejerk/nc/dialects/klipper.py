@@ -37,6 +37,7 @@ KLIPPER = replace(
     # (klippy/extras/gcode_move.py).
     groups={code: group for code, group in MARLIN.groups.items() if code != 200},
     defaults={**MARLIN.defaults, "units": 210},
+    note="",
     bare_set="zero",
     set_letters="XYZE",
     refused=frozenset(),

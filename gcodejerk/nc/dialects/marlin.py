@@ -10,7 +10,9 @@ which ``G0 x5`` names no axis; G20, without which lengths stay mm. A tab is no b
 begins with one is no command, and ``X<tab>5`` has no number. ``N 10 G0`` is a command N, ``G+0``
 none. Of a longer line the first MAX_CMD_SIZE - 1 = 95 characters are read (src/gcode/queue.cpp).
 M501 and M502 load settings, the home offsets among them; M23, M24 and M26 go on in another file, or
-elsewhere in this one; M220 scales F until it is set to 100.
+elsewhere in this one; M220 scales F until it is set to 100. With GCODE_MOTION_MODES a line may
+begin with an axis or F, for the motion before; with G0_FEEDRATE, G0 runs at a speed of its own, and
+its F may be for G0 alone (src/gcode/parser.cpp, src/gcode/motion/G0_G1.cpp).
 """
 
 from __future__ import annotations
@@ -97,4 +99,6 @@ MARLIN = Dialect(
     after_m=frozenset(),
     # Positions are single-precision floats, good for seven digits (not looked up).
     writing=Writing((b"; ", b""), b"M400", digits=7),
+    note="G0 is read as running at the F in force, as Marlin does unless it is built with "
+    "G0_FEEDRATE: with that, leave programs as they are",
 )

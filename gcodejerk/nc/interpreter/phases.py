@@ -35,7 +35,12 @@ from gcodejerk.nc.interpreter.moves import (
 )
 from gcodejerk.nc.interpreter.named_cycles import drill_behind
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, NO_FEED, USES_FEED
-from gcodejerk.nc.interpreter.rules import arc_words, moves_without_axes, takes_axes
+from gcodejerk.nc.interpreter.rules import (
+    arc_words,
+    counts_as_feed,
+    moves_without_axes,
+    takes_axes,
+)
 from gcodejerk.nc.interpreter.variables import forget_shared
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
@@ -105,16 +110,10 @@ class Phases(Effects):
         """F, where it is a feed: in a dwell it may be a time."""
         if "F" not in codes.values:
             return
-        if self._dwells(codes):
-            if not self.dialect.one_command and codes.g.get("non-modal") != G4:
-                self.state.put("feed", NAN)  # a feed, or for what takes the other words
+        counts = counts_as_feed(codes, self.dialect, taken=self._dwells(codes))
+        if counts is False:
             return
-        motion, feed = codes.g.get("motion"), codes.values["F"]
-        if self.dialect.feed_of_moves:
-            if motion is None:
-                return
-            if motion in self.dialect.redrawn:
-                feed = NAN  # a control that does not know the code passes its F over, too
+        feed = codes.values["F"] if counts else NAN
         self.state.put("feed", feed)
         self.state.put("feed_whole", codes.feed_whole)
         if feed == feed:

@@ -7,7 +7,7 @@ accepted moves the tool somewhere else than we believe.
 from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, PLANES, Dialect
-from gcodejerk.nc.dialects.gcodes import G40, G80, G91
+from gcodejerk.nc.dialects.gcodes import G4, G40, G80, G91
 from gcodejerk.nc.interpreter.codes import Codes
 from gcodejerk.nc.interpreter.modal import State
 
@@ -44,6 +44,31 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     if mode == 93 and motion not in (None, 0, G80) and axes and "F" not in values:
         return False
     return _cartesian(codes, motion, dialect) and _words_used(codes, motion, dialect)
+
+
+def counts_as_feed(codes: Codes, dialect: Dialect, *, taken: bool) -> bool | None:
+    """Whether the F of a block is the feed from there on; None: on some controls.
+
+    Parameters
+    ----------
+    codes : Codes
+        Of a block with an F.
+    dialect : Dialect
+        Of the program.
+    taken : bool
+        Something else than a motion takes the words of the block for itself: a dwell, a command.
+    """
+    motion = codes.g.get("motion")
+    if dialect.one_command and not codes.g and not codes.m:
+        # It may be a line of the motion before, as on Marlin with GCODE_MOTION_MODES.
+        return None if dialect.feed_of_moves else False
+    if taken:
+        # Beside a dwell it is a time; else a feed, or for what takes the other words.
+        return False if dialect.one_command or codes.g.get("non-modal") == G4 else None
+    if not dialect.feed_of_moves or motion is None:
+        return not dialect.feed_of_moves
+    # A control that does not know the code passes its F over, too.
+    return None if motion in dialect.redrawn else True
 
 
 def _too_small(codes: Codes, dialect: Dialect) -> bool:

@@ -167,6 +167,12 @@ class Circling(Drilling):
         """Whether a feed move may be refused, since it has no F."""
         return self.dialect.arcs_refused and not self.feed > 0.0
 
+    def may_be_feed(self, block: Sorted) -> bool:
+        """Whether F may be a feed though something else takes the words of its block."""
+        if self.dialect.one_command:  # the motion before may be in force
+            return self.dialect.feed_of_moves and not block.g and not block.m
+        return G4 not in block.g.values()
+
     def counts_feed(self, g: Mapping[str, int]) -> bool | None:
         """Whether F counts beside these codes; None: not on every control."""
         if not self.dialect.feed_of_moves or "motion" not in g:

@@ -13,7 +13,7 @@ from typing import Any
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LEFT_OVER, LINEAR, Effect
-from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G43, G49, G80, G90, G91
+from gcodejerk.nc.dialects.gcodes import G1, G40, G43, G49, G80, G90, G91
 from gcodejerk.units import MM_PER_INCH as INCH
 from gcodejerk.units import SECONDS_PER_MINUTE
 from gcodejerk.verification.second_reading.circling import Circling
@@ -221,7 +221,7 @@ class Tracker(Circling):
                 self.feed = NAN
             self.feed_mode = mode
         taken = "words" in kinds or (self.dialect.one_command and not g)
-        if "F" in values and taken and not self.dialect.one_command and G4 not in g.values():
+        if "F" in values and taken and self.may_be_feed(block):
             self.feed = NAN
         if "F" in values and not taken and (counts := self.counts_feed(g)) is not False:
             self.feed = values["F"] if counts else NAN
