@@ -340,6 +340,16 @@ def test_what_only_looks_certain_is_left_alone(name):
     assert reason is None or also_noticed(text, dialect)
 
 
+def test_axis_words_without_a_motion_are_refused_where_g80_may_be_in_force():
+    """By grbl, with all that stands beside them."""
+    text = b"G21 G90 G94 F100\nX1 G91 F50\nG0 X0 Y0 Z0\nG90 G0 X0 Y0 Z0\nG0 X9\n"
+    rapids = read_program(io.BytesIO(text), dialect="grbl", start=start_of("grbl")).rapids
+    assert REASONS[rapids.reason[0]] == NO_DISTANCE
+    assert rapids.reason[-1] == CERTAIN
+    assert math.isnan(rapids.feed[-1])
+    assert read(text, "grbl", b"")[-1] is None
+
+
 def test_a_feed_motion_without_f_may_leave_the_feed_mode_as_it_was():
     """grbl refuses it in G93 whether an axis moves or not, and G93 with it."""
     text = HEADS["grbl"] + b"G93 G1\nG0 X0 Y0 Z0\nG0 X9\n"

@@ -86,13 +86,14 @@ def run_unfed(
     motion = held[np.searchsorted(at, np.arange(len(letters)), side="right")]
     does = np.where(stated >= 0, stated, motion)
     sure = sure_lines(letters, np.maximum(does, 0).astype(np.uint8), state, dialect)
-    sure &= (letters & BIT["F"] == 0) & (moves | (stated < 1))
+    # Nor where G1 is stated and nothing moves, or G80 may be in force.
+    sure &= (letters & BIT["F"] == 0) & np.where(moves, does >= 0, stated < 1)
     stop = len(sure) if sure.all() else int(np.argmin(sure))
     if stop == 0:
         return first, None
     letters, does, moves, centred = letters[:stop], does[:stop], moves[:stop], centred[:stop]
     doubted = (does >= 1) & (moves | ((does >= 2) & centred))
-    lost = moves & (does < 0) if stays else (moves & (does < 0)) | doubted
+    lost = np.zeros_like(doubted) if stays else doubted
     rapid = np.flatnonzero(moves & (does == 0))
     start, target = _positions(state, lines, first, rapid, doubted, lost)
     named = (letters & AXIS_BITS).astype(np.uint16)[rapid]

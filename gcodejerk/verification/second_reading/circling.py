@@ -234,8 +234,9 @@ class Circling(Drilling):
                 return True
         if length in rules.lengths and (block.axes or taken or stated):
             return True
-        still = rules.still_words and g.get("motion", self.g.get("motion")) == G80
-        return still and taken and bool(block.axes)
+        motion = g.get("motion", self.g.get("motion"))
+        still = motion == G80 if taken else motion is None
+        return rules.still_words and still and bool(block.axes)
 
     def doubts_arc(self, block: Sorted) -> bool:
         """Whether a block is an arc that the control may refuse."""
