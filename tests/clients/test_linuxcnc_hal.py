@@ -349,7 +349,7 @@ def test_a_hold_in_front_of_a_stream_and_no_rapid_override_keep_it_waiting():
     """The drives stay where they are as long as LinuxCNC's own G0 may not begin."""
     events = [
         {"do": "rapid", "to": 0.0, "after": 0.0},
-        {"do": "wait", "after": 1.5},
+        {"do": "wait", "after": 2.5},  # of which the way to the stream takes a part
         {"do": "pause", "after": 0.0},
         {"do": "rapid", "to": 1.0, "after": 0.1},
         {"do": "wait", "after": 0.4},
@@ -360,8 +360,7 @@ def test_a_hold_in_front_of_a_stream_and_no_rapid_override_keep_it_waiting():
     assert_within_limits(run)
     q = positions(run)[:, 0]
     stood = np.flatnonzero(np.abs(q - 1.0) < 1e-6)
-    # Of two seconds: on a slow machine what is asked for acts some tenths later.
-    assert stood[-1] - stood[0] > 1000
+    assert stood[-1] - stood[0] > 1500
     assert run.position == pytest.approx((10.0, 0.0, 0.0))
 
 

@@ -122,8 +122,8 @@ def _cartesian(codes: Codes, motion: int | None, dialect: Dialect) -> bool:
 def _words_used(codes: Codes, motion: int | None, dialect: Dialect) -> bool:
     """Whether every letter has a code that uses it, of those that are certainly in force."""
     in_force = None
-    taken = dialect.set_letters if dialect.effect(codes.g.get("non-modal")) == "set" else ""
-    if taken and not codes.values.keys() <= set(taken):
+    sets = dialect.set_letters and dialect.effect(codes.g.get("non-modal")) == "set"
+    if sets and not codes.values.keys() <= set(dialect.set_letters):
         return False
     for letter in codes.values:
         if letter == "P" and codes.names and letter not in dialect.letters:

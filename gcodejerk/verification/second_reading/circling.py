@@ -67,14 +67,17 @@ class Circling(Drilling):
         if self.lacks_feed():
             return self._take_unfed(text, data, at)
         run = text.take_run(data, at, stated=not self.feeding)
-        taken = data[at : run[1]] if run is not None else b""
-        rules, checked = self.dialect, self.dialect.arcs_refused
-        unfed = (checked or rules.feed_of_moves) and NO_FEED.search(taken) is not None
-        if unfed or (checked and self._strays(taken)):
-            assert run is not None
+        if run is not None and self._doubts_run(data, at, run[1]):
             text.tried = at, run[1]  # line by line, then: who looks again and again never ends
             return None
         return run
+
+    def _doubts_run(self, data: bytes, begin: int, end: int) -> bool:
+        """Whether any line of a run of feed moves may be refused."""
+        rules = self.dialect
+        if (rules.arcs_refused or rules.feed_of_moves) and NO_FEED.search(data, begin, end):
+            return True
+        return rules.arcs_refused and self._strays(data[begin:end])
 
     def _take_unfed(self, text: Text, data: bytes, at: int) -> tuple[Run, int] | None:
         """Take feed moves in front of any F, each of which is refused or not."""
@@ -220,9 +223,10 @@ class Circling(Drilling):
         rules, g = self.dialect.refuses, block.g
         if rules.bare_dwell and G4 in g.values() and "P" not in block.values:
             return True
+        if not rules.bare_inverse or "F" in block.values or g.get("motion", G80) in (0, G80):
+            return False
         mode = self.mode_of(g["feed mode"]) if "feed mode" in g else self.feed_mode
-        feeds = g.get("motion", G80) not in (0, G80) and "F" not in block.values
-        return rules.bare_inverse and feeds and mode in (93, None)
+        return mode in (93, None)
 
     def _doubts_taken(self, block: Sorted, *, taken: bool) -> bool:
         """The same of axis words that no motion takes; `taken`: one like G28 has them."""
@@ -250,8 +254,7 @@ class Circling(Drilling):
         if "units" in g:
             self.unit = INCH if dialect.units[g["units"]] else 1.0
         plane = PLANES.get(g.get("plane", self.g.get("plane")) or 0)
-        turning = block.axes >> AXES.index("A") & 7 != 0
-        failed = self.unit is not None or turning
+        failed = self.unit is not None or bool({"A", "B", "C"} & values.keys())
         if plane is not None and self.unit is not None and set(g) <= _ALONE:
             ends = []
             for axis in plane[:2]:

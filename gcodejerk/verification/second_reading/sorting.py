@@ -78,8 +78,8 @@ class Sorted:
             return False
         if dialect.distance_first and _distance_late(line, dialect):
             return False
-        several = dialect.one_command and (self.g or self.m)
-        return not several or _modes_first(line, dialect)
+        commands = dialect.one_command and (self.g or self.m)
+        return not commands or _modes_first(line, dialect)
 
     def _g_code(self, number: float, dialect: Dialect) -> bool:
         """Sort a code; whether it is known, and the only one of its group."""
@@ -101,14 +101,18 @@ class Sorted:
         axis = dialect.increments.get(letter)
         if letter in self.values or (axis or letter) in self.increments:
             return False
-        effects = {dialect.effect(code) for code in self.g.values()}
-        if letter in dialect.calls and "label" not in effects:
+        if letter in dialect.calls and "label" not in self._effects(dialect):
             return False
-        if dialect.set_letters and "set" in effects and letter not in dialect.set_letters:
+        taken = dialect.set_letters
+        if taken and letter not in taken and "set" in self._effects(dialect):
             return False
         if letter not in dialect.letters and axis is None and not dialect.one_command:
             return False
         return axis not in self.values
+
+    def _effects(self, dialect: Dialect) -> set[str]:
+        """What the codes do besides."""
+        return {dialect.effect(code) for code in self.g.values()}
 
     def _cartesian(self, dialect: Dialect, motion: int | None) -> bool:
         """Whether no radius and no angle says where the block leads; an arc has a radius."""
