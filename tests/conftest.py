@@ -22,6 +22,9 @@ USUAL = 60
 LONG = 250
 """How many times more examples `--long` draws."""
 
+SHARE = 3
+"""One in how many repeats `--repeats-of` takes."""
+
 
 def pytest_configure(config):
     # How long an example takes says what else the machine does, not what the package does.
@@ -61,6 +64,11 @@ def pytest_addoption(parser):
         help=f"draw {LONG} times as many examples in property tests, and take all of what other "
         "tests take in strides: hours, on demand",
     )
+    parser.addoption(
+        "--repeats-of",
+        metavar="NAME",
+        help=f"of the tests with the mark `repeats`, one in {SHARE}: which ones, NAME decides",
+    )
 
 
 QUICK = (
@@ -89,11 +97,11 @@ NOT_QUICK = (
 """Beginnings of names of their tests that take seconds."""
 
 REPEATS = {
-    "golden/test_sheets.py": {
-        "test_sheet_is_the_golden_one": 6,
-    },
     "clients/test_cycles_playback.py": {
         "test_holes_are_as_deep_and_ways_as_high_as_in_the_controllers_own_cycles": 2,
+    },
+    "clients/test_freecad.py": {
+        "test_a_job_is_posted_with_a_stock_post_and_its_rapids_rewritten": 2,
     },
     "clients/test_interpreter_processing.py": {
         "test_interpreter_finds_the_same_end_points_before_and_after": 4,
@@ -116,8 +124,14 @@ REPEATS = {
     "clients/test_linuxcnc_playback.py": {
         "test_what_is_played_is_what_was_reported": 2,
     },
+    "clients/test_page_browser.py": {
+        "test_a_click_on_the_path_chooses_and_both_themes_are_drawn": 2,
+    },
     "corpus/test_corpus.py": {
         "test_every_real_program_is_processed_and_verified": 4,
+    },
+    "golden/test_sheets.py": {
+        "test_sheet_is_the_golden_one": 6,
     },
     "property/test_control_settings.py": {
         "test_without_the_inserted_lines_a_program_is_what_it_was": 4,
@@ -198,9 +212,6 @@ REPEATS = {
     "unit/test_designs.py": {
         "test_measured_spectra_go_through_every_design": 8,
     },
-    "unit/test_documentation.py": {
-        "test_commands_print_what_the_page_shows": 8,
-    },
     "unit/test_faults.py": {
         "test_a_disk_that_fills_up_leaves_the_old_output": 3,
         "test_a_disk_that_is_full_for_a_process_leaves_nothing": 3,
@@ -210,6 +221,7 @@ REPEATS = {
     },
     "unit/test_figures.py": {
         "test_a_comparison_shows_every_axis_with_no_word_over_another_or_over_a_line": 5,
+        "test_a_simulation_is_readable_whatever_frequencies_it_spans": 3,
         "test_no_word_of_a_map_stands_over_another": 3,
         "test_no_word_of_three_maps_stands_over_another": 6,
     },
@@ -241,6 +253,12 @@ REPEATS = {
         "test_designs_are_legal_and_never_worse_than_the_stretched_conventional_profile": 3,
         "test_designs_are_near_the_best_that_brute_force_finds": 4,
     },
+    "unit/test_motion_refining.py": {
+        "test_a_long_move_is_left_with_no_more_than_jerks_in_every_interval_leave": 2,
+    },
+    "unit/test_motion_together.py": {
+        "test_no_profile_leaves_less_at_the_last_arrival_than_is_stated": 2,
+    },
     "unit/test_nc_branches.py": {
         "test_deep_nesting_takes_linear_time": 3,
     },
@@ -252,10 +270,14 @@ REPEATS = {
     },
     "unit/test_nc_reading_two_ways.py": {
         "test_both_ways_agree_on_an_odd_line_anywhere_in_a_run": 3,
+        "test_both_ways_agree_on_every_odd_line_in_a_run": 3,
         "test_both_ways_agree_on_every_real_file": 14,
     },
     "unit/test_parameters.py": {
         "test_the_search_finds_what_brute_force_finds": 12,
+    },
+    "unit/test_path_limits.py": {
+        "test_verify_accepts_what_is_planned_by_every_law": 3,
     },
     "unit/test_planning_pvt.py": {
         "test_an_optimum_of_many_segments_is_rows_too": 0,
@@ -265,6 +287,9 @@ REPEATS = {
     },
     "unit/test_same_streams.py": {
         "test_what_is_written_once_or_each_time_is_the_same": 3,
+    },
+    "unit/test_second_ahead.py": {
+        "test_lines_by_variables_taken_at_once_do_what_they_do_one_by_one": 2,
     },
     "unit/test_simulation.py": {
         "test_pictures_are_drawn": 2,
@@ -287,7 +312,7 @@ REPEATS = {
     },
 }
 """Tests of many cases of a kind: which one in how many comes before a change lands; 0 is none of
-them, where a cheaper test holds the kind. CI runs all."""
+them, where a cheaper test holds the kind. CI runs a share of these, another one of each change."""
 
 
 def pytest_itemcollected(item):
@@ -316,6 +341,14 @@ def pytest_runtest_setup(item):
 
 
 def pytest_collection_modifyitems(config, items):
+    name = config.getoption("--repeats-of")
+    if name is not None:
+        parts = ([], [])
+        for item in items:
+            other = zlib.crc32(f"{name} {item.nodeid}".encode()) % SHARE
+            parts[bool(other and item.get_closest_marker("repeats"))].append(item)
+        items[:], left = parts
+        config.hook.pytest_deselected(items=left)
     if not config.getoption("--long"):
         return
     for item in items:

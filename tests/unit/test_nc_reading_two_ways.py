@@ -198,10 +198,10 @@ def test_both_ways_agree_on_every_odd_line_in_a_run(dialect, request):
     stride = 1 if request.config.getoption("--long") else 4
     for word in ODD_LINES[list(DIALECTS).index(dialect) % stride :: stride]:
         lines = [*head, *plain, word, *head, *plain, "G1 Z50. F100.", *plain, word]
-        for end in ("\n", "\r\n"):
-            data = end.join(lines).encode("latin-1")
-            assert differences(data, begins, dialect) == [], word
-            assert differences(data + end.encode(), replace(begins, rapid_feed=None), dialect) == []
+        data = "\n".join(lines).encode("latin-1")
+        assert differences(data, begins, dialect) == [], word
+        data = "\r\n".join([*lines, ""]).encode("latin-1")
+        assert differences(data, replace(begins, rapid_feed=None), dialect) == [], word
 
 
 @pytest.mark.parametrize("dialect", [d for d in DIALECTS if find_dialect(d).quick])
