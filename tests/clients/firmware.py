@@ -2,10 +2,11 @@
 
 - ``KLIPPER``: folder of a checkout of Klipper3d/klipper. Its ``gcode.py`` and ``gcode_move.py`` run
   here, with a printer of stubs.
+- ``GRBL``: folder of a checkout of gnea/grbl; gcc builds the interpreter with `grbl.c`.
 - ``GRBLHAL``: folder of a checkout of grblHAL/Simulator with its submodule (grblHAL/core); gcc
   builds the interpreter with `grblhal.c`.
 
-Both are under the GPL, so that nothing of them is in this project, and no package of Debian has
+All are under the GPL, so that nothing of them is in this project, and no package of Debian has
 them. Behind a line that is refused, the next one runs: some senders go on so.
 """
 
@@ -171,18 +172,58 @@ def run_klipper(lines, arcs, before=()):
 
 
 @cache
+def _grbl():
+    """The interpreter, in a folder that goes with this process."""
+    source = checkout("GRBL", "grbl/gcode.c") / "grbl"
+    folder = tempfile.TemporaryDirectory(prefix="grbl-")
+    # What its headers ask of an AVR's compiler and library.
+    for header in ("io", "pgmspace", "interrupt", "wdt"):
+        _empty(folder, "avr", header)
+    _empty(folder, "util", "delay")
+    flags = ["-D__flash=", "-D_delay_ms(n)=", "-D_delay_us(n)=", f"-I{folder.name}", f"-I{source}"]
+    files = [source / f"{name}.c" for name in ("gcode", "protocol", "nuts_bolts", "settings")]
+    return folder, _built(folder, [*flags, HERE / "grbl.c", *files])
+
+
+def _empty(folder, *names):
+    header = Path(folder.name, *names).with_suffix(".h")
+    header.parent.mkdir(exist_ok=True)
+    header.touch()
+
+
+@cache
 def _grblhal(axes):
     """The interpreter, built for so many axes, in a folder that goes with this process."""
     source = checkout("GRBLHAL", "src/grbl/gcode.c") / "src"
     folder = tempfile.TemporaryDirectory(prefix="grblhal-")
-    program = Path(folder.name, "grblhal")
     files = [*(source / "grbl").glob("*.c"), *(source / "grbl" / "kinematics").glob("*.c")]
     files += [source / f"{name}.c" for name in ("eeprom", "grbl_eeprom_extensions")]
     files += [source / "validator_driver.c", source / "platform_linux.c", HERE / "grblhal.c"]
-    command = ["gcc", "-O1", "-w", "-fno-strict-aliasing", f"-DN_AXIS={axes}", "-DPLATFORM_LINUX"]
-    command += ["-DF_CPU=16000000", f"-I{source}", "-Wl,--wrap=mc_line", "-o", program]
-    subprocess.run([*command, *files, "-lm", "-lrt", "-lpthread"], check=True, timeout=300)
-    return folder, program
+    flags = [f"-DN_AXIS={axes}", "-DPLATFORM_LINUX", "-DF_CPU=16000000", f"-I{source}"]
+    return folder, _built(
+        folder, [*flags, "-Wl,--wrap=mc_line,--wrap=mc_arc", *files, "-lrt", "-lpthread"]
+    )
+
+
+def _built(folder, arguments):
+    """A program of C."""
+    program = Path(folder.name, "interpreter")
+    command = ["gcc", "-O1", "-w", "-fno-strict-aliasing", "-o", program, *arguments, "-lm"]
+    subprocess.run(command, check=True, timeout=300)
+    return program
+
+
+def run_grbl(lines, before=()):
+    """What plain grbl makes of a program.
+
+    Parameters
+    ----------
+    lines : list of str
+        The program's.
+    before : sequence of str
+        Lines that ran before, of which nothing is told.
+    """
+    return _told(*_grbl(), "XYZ", [*before, *lines])[len(before) :]
 
 
 def run_grblhal(lines, axes="XYZ", before=()):
@@ -199,7 +240,12 @@ def run_grblhal(lines, axes="XYZ", before=()):
     """
     folder, program = _grblhal(len(axes))
     Path(folder.name, "EEPROM.DAT").unlink(missing_ok=True)
-    text = "".join(f"{line}\n" for line in (*before, *lines)).encode("latin-1")
+    return _told(folder, program, axes, [*before, *lines])[len(before) :]
+
+
+def _told(folder, program, axes, lines):
+    """What an interpreter in C tells of each line."""
+    text = "".join(f"{line}\n" for line in lines).encode("latin-1")
     done = subprocess.run(
         [program], input=text, cwd=folder.name, capture_output=True, timeout=20, check=True
     )
@@ -222,4 +268,4 @@ def run_grblhal(lines, axes="XYZ", before=()):
             )
         )
         stands = machine
-    return told[len(before) :]
+    return told

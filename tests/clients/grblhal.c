@@ -23,12 +23,18 @@
 
 static int motions, rapids;
 
-/* In the place of mc_line (by the linker's --wrap): counts. */
+/* In the place of mc_line and mc_arc (by the linker's --wrap): they count. */
 status_code_t __wrap_mc_line (float *target, plan_line_data_t *data)
 {
     motions++;
     rapids += data->condition.rapid_motion;
     return Status_Handled;
+}
+
+void __wrap_mc_arc (float *target, plan_line_data_t *data, float *position, float *offset, float radius,
+                    plane_t plane, int32_t turns)
+{
+    motions++;
 }
 
 static int32_t read_nothing (void)

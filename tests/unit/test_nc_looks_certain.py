@@ -350,6 +350,18 @@ def test_axis_words_without_a_motion_are_refused_where_g80_may_be_in_force():
     assert read(text, "grbl", b"")[-1] is None
 
 
+@pytest.mark.parametrize("line", ["G92 X0", "G28 X0"])
+def test_axis_words_of_a_code_are_refused_too_where_g80_may_be_in_force(line):
+    """By grbl: where the axis stands behind it is not known."""
+    text = f"G21 G90 G94 G54\n{line}\nG0 X7\n".encode()
+    home = dict.fromkeys("XYZ", 0.0)
+    start = replace(start_of("grbl"), positions=dict.fromkeys("XYZ", 5.0), home=home)
+    start = replace(start, offsets={"G54": home})
+    for head, known in ((b"", False), (b"G80\n", False), (b"G0\n", True)):
+        rapids = read_program(io.BytesIO(head + text), dialect="grbl", start=start).rapids
+        assert math.isnan(rapids.start[-1, 0]) != known, head
+
+
 def test_a_feed_motion_without_f_may_leave_the_feed_mode_as_it_was():
     """grbl refuses it in G93 whether an axis moves or not, and G93 with it."""
     text = HEADS["grbl"] + b"G93 G1\nG0 X0 Y0 Z0\nG0 X9\n"

@@ -46,7 +46,8 @@ def read(text, dialect, **more):
 
 @pytest.mark.parametrize("dialect", ["fanuc", "haas", "linuxcnc", "grbl", "mach"])
 def test_behind_g28_the_axes_are_at_home(dialect):
-    why, rapids = read(b"G28 X0. Y0.\nG0 X1. Y2.\n", dialect, offsets=OFFSETS, home=HOME)
+    text, startup = b"G28 X0. Y0.\nG0 X1. Y2.\n", f"{STARTUP} G0"
+    why, rapids = read(text, dialect, offsets=OFFSETS, home=HOME, startup=startup)
     assert why == [FRAME, None]
     np.testing.assert_allclose(rapids.start[1, :2], (100.0, 50.0))
 

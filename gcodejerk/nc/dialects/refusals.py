@@ -35,7 +35,6 @@ class Refusals:
     end_beside: bool = False
     """G80 beside another code of its group."""
     still_words: bool = False
-    """Axis words of G28, G92 and their kin, too, while G80 is in force; those of no code also where
-    nobody knows what is."""
+    """Axis words, those of G28, G92 and their kin, too, while G80 is in force or may be."""
     length_axis: str = ""
     """The axis of G43.1, which has to stand there alone; empty where any may."""

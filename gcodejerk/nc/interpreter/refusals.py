@@ -61,8 +61,8 @@ def _axes_taken(codes: Codes, state: State, dialect: Dialect, takes: bool) -> st
     if rules.length_axis and length == G43_1 and axes != {rules.length_axis}:
         return f"G43.1 with other axes than {rules.length_axis}"
     in_force = state.motion if motion is None else motion
+    if rules.still_words and axes and in_force is None:
+        return "axis words while G80 may be in force"
     if rules.still_words and axes and in_force == G80 and (takes or takes_axes(codes)):
         return "axis words while G80 is in force"
-    if rules.still_words and axes and in_force is None and not (takes or takes_axes(codes)):
-        return "axis words while G80 may be in force"
     return ""

@@ -239,7 +239,7 @@ class Circling(Drilling):
         if length in rules.lengths and (block.axes or taken or stated):
             return True
         motion = g.get("motion", self.g.get("motion"))
-        still = motion == G80 if taken else motion is None
+        still = motion is None or (motion == G80 and taken)
         return rules.still_words and still and bool(block.axes)
 
     def doubts_arc(self, block: Sorted) -> bool:
