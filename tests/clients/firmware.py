@@ -5,6 +5,8 @@
 - ``GRBL``: folder of a checkout of gnea/grbl; gcc builds the interpreter with `grbl.c`.
 - ``GRBLHAL``: folder of a checkout of grblHAL/Simulator with its submodule (grblHAL/core); gcc
   builds the interpreter with `grblhal.c`.
+- ``FLUIDNC``: folder of a checkout of bdring/FluidNC; g++ builds the interpreter with
+  `fluidnc.cpp`.
 
 All are under the GPL, so that nothing of them is in this project, and no package of Debian has
 them. Behind a line that is refused, the next one runs: some senders go on so.
@@ -17,6 +19,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import textwrap
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -191,6 +194,51 @@ def _empty(folder, *names):
     header.touch()
 
 
+ARDUINO = {
+    "Arduino.h": """\
+        #pragma once
+        #include <charconv>
+        #include <cmath>
+        #include <cstdint>
+        #include <cstring>
+        #include <string>
+        #include "IPAddress.h"
+        #include "Print.h"
+        #include "Stream.h"
+        #include "WString.h"
+        """,
+    "IPAddress.h": """\
+        #pragma once
+        #include <cstdint>
+        struct IPAddress {
+            IPAddress(uint32_t address = 0) {}
+            operator uint32_t() const { return 0; }
+            bool fromString(const char*) { return false; }
+        };
+        """,
+}
+"""What FluidNC's headers ask of an Arduino."""
+
+
+@cache
+def _fluidnc():
+    """The interpreter, in a folder that goes with this process."""
+    source = checkout("FLUIDNC", "FluidNC/src/GCode.cpp") / "FluidNC"
+    folder = tempfile.TemporaryDirectory(prefix="fluidnc-")
+    for name, text in ARDUINO.items():
+        Path(folder.name, name).write_text(textwrap.dedent(text))
+    names = "GCode Parameters Expression Flowcontrol NutsBolts string_util Error"
+    names += " Pins/VoidPinDetail Pins/PinDetail Pins/PinCapabilities Pins/PinAttributes"
+    files = [source / "src" / f"{name}.cpp" for name in names.split()]
+    files += [source / "capture" / "arduino" / f"{name}.cpp" for name in ("Print", "WString")]
+    folders = [folder.name, *(source / name for name in ("capture", "capture/arduino"))]
+    folders += [source / "include", source / "src", source]
+    flags = ["-std=c++20", "-fpermissive", "-include", "charconv", "-DHOST", "-DARDUINO=1"]
+    flags += ['-DMCU="linux"', '-DVARIANT="capture"', "-DSKIP_HARDWARE_SETUP=1"]
+    flags += [f"-I{name}" for name in folders]
+    return folder, _built(folder, [*flags, HERE / "fluidnc.cpp", *files], compiler="g++")
+
+
 @cache
 def _grblhal(axes):
     """The interpreter, built for so many axes, in a folder that goes with this process."""
@@ -205,10 +253,10 @@ def _grblhal(axes):
     )
 
 
-def _built(folder, arguments):
-    """A program of C."""
+def _built(folder, arguments, compiler="gcc"):
+    """A program of C or C++."""
     program = Path(folder.name, "interpreter")
-    command = ["gcc", "-O1", "-w", "-fno-strict-aliasing", "-o", program, *arguments, "-lm"]
+    command = [compiler, "-O1", "-w", "-fno-strict-aliasing", "-o", program, *arguments, "-lm"]
     subprocess.run(command, check=True, timeout=300)
     return program
 
@@ -224,6 +272,11 @@ def run_grbl(lines, before=()):
         Lines that ran before, of which nothing is told.
     """
     return _told(*_grbl(), "XYZ", [*before, *lines])[len(before) :]
+
+
+def run_fluidnc(lines, before=()):
+    """What FluidNC makes of a program; as of `run_grbl`."""
+    return _told(*_fluidnc(), "XYZ", [*before, *lines])[len(before) :]
 
 
 def run_grblhal(lines, axes="XYZ", before=()):

@@ -9,7 +9,7 @@ import math
 import re
 
 import pytest
-from firmware import run_grbl, run_grblhal, run_klipper
+from firmware import run_fluidnc, run_grbl, run_grblhal, run_klipper
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -156,20 +156,26 @@ GRBL = programs(
         L1 | A5 | U1 | (X5 | % | O100 | /X5 | #1=5 | X#1 | X[1] | $ | $X | G90 G91 | G0 G1 X1 |
         G0G80 | G2 X5 Y0 I2.5 | G2 X5 Y5 R9 F80 | G2 I5 | G1 X5 | G1 | G0 | G92 G0 X1 | G4 P0 G0 |
         G38.2 X3 F9 | G0 X1 M2 | G91 M30 | M3 M5 | G54 G55 | G81 X1 Z-1 R3 | X4 Y4 | G91 G1 |
-        G1 F0"""
-    ),
+        G1 F0 | G92 G0 X1 | G0 G92 X1 | G43.1 G0 Z3 | G28 G1 X3 | N99999999 G0 X2 | N-5 G0 X3 |
+        G0 X5 / Y3 | N5 /G0 X3 | /N5 G91 | G0 (a;b) X5 | G1 X2 F100 (a ; b) G91 | (a;b) G20 |
+        G0 X3 (a (b) c) | G0 X3 ) Y2 | (a (b) G0 X9 | G0 X1 (open | (c) (d) G0 X4 | G0 X0x10 |
+        #<a>=2 | o1 if [1] | [ESP1] | G0 X[1+2] | M61 Q1 | M67 E1 Q3 | G38.6 X3 F9 | G5.1"""
+    )
+    + [f"G0 X7 ({'c' * n}) Y2" for n in (60, 90, 120, 300)]
+    + [f"({'c' * n})" for n in (130, 300)],
 )
 
 
-@pytest.mark.parametrize("run", [run_grbl, run_grblhal])
+@pytest.mark.parametrize("dialect", ["grbl", "rs274"])
+@pytest.mark.parametrize("run", [run_grbl, run_grblhal, run_fluidnc])
 @MANY
 @given(GRBL, st.booleans(), st.booleans())
-def test_grbl_does_what_is_certain(run, lines, known, offsets):
+def test_grbl_does_what_is_certain(run, dialect, lines, known, offsets):
     before = ["G20", "G92 X3", "G10 L2 P1 X7 Y1", "G1 F77 X3 Y2", "G43.1 Z4", "G80"]
     facts = {"offsets": {"G54": dict.fromkeys("XYZ", 0.0)}} if known and offsets else {}
     start = start_of(known, startup="G21" if known else "", **facts)
     ran = run(lines, before=() if known else before)
-    assert not contradicted(lines, "grbl", start, ran)
+    assert not contradicted(lines, dialect, start, ran)
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,7 @@ def test_a_line_is_read_as_the_dialect_writes_it(dialect, line, problem):
         ("fanuc", b"N120/G0X1.", True),
         ("fanuc", b"/2 G0X1.", True),
         ("siemens", b"/1 N70 G0 X1", True),
-        ("grbl", b"/G0X1", False),
+        ("grbl", b"/G0X1", True),
         ("fanuc", b"G0X1.", False),
     ],
 )

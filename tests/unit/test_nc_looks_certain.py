@@ -4,6 +4,7 @@ import io
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from gcodejerk.axes import AXES
@@ -1010,3 +1011,43 @@ def test_an_a_that_slides_is_known_in_no_program_for_a_machine_in_inches():
     text += "    rapid: {{velocity: 10, acceleration: 50, jerk: 5000}}\n"
     for units, known in (("mm", True), ("inch", False)):
         assert Machine.loads(text.format(units)).program_start().linear == {"A": known}
+
+
+@pytest.mark.parametrize("dialect", ["grbl", "rs274"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"/G1 X5",  # skipped, run or refused
+        b"G1 X5 / Y3",
+        b"G1 X5 (a;b) Y3",  # FluidNC ends the line at the semicolon
+        b"G1 X5 (" + b"c" * 130 + b") Y3",  # and refuses a line of more than 127 bytes
+        b"N99999999 G1 X5",
+        b"G92 G1 X5",  # FluidNC moves all axes
+        b"G28 G1 X5",
+        b"G43.1 G1 Z5",
+    ],
+)
+def test_what_fluidnc_takes_otherwise_is_not_known(line, dialect):
+    head = b"G21 G90 G94 G17 G54 G40 G49\nG0 X1 Y1 Z1\nG1 F100\n"
+    rapids = read_program(
+        io.BytesIO(head + line + b"\nG0 X9 Y9\n"), dialect=dialect, start=start_of(dialect)
+    ).rapids
+    assert np.isnan(rapids.start[-1, :2]).any()
+    assert read(head + line + b"\nG0 X9 Y9\n", dialect, b"")[-1] is not None
+
+
+@pytest.mark.parametrize("dialect", ["grbl", "rs274"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"(" + b"c" * 300 + b")",
+        b"(" + b"c" * 80 + b") ;" + b"d" * 80,
+        b"(a; b)",
+        b"G1 X5 (a; b)",
+        b"G1 X5 (a) ; b",
+        b"N9999999 G1 X5",
+    ],
+)
+def test_comments_and_numbers_that_no_control_minds_cost_nothing(line, dialect):
+    head = b"G21 G90 G94 G17 G54 G40 G49\nG0 X1 Y1 Z1\nG1 F100\n"
+    assert read(head + line + b"\nG0 X9 Y9\n", dialect, b"")[-1] is None

@@ -1,8 +1,10 @@
 """grbl 1.1, and what follows its language (grblHAL, FluidNC).
 
 Source: gnea/grbl, grbl/gcode.c and grbl/protocol.c. Blanks and control characters are thrown away,
-so is ``/`` (the block runs), a parenthesis that does not close ends with its line, and ``%``, O and
-M6 are errors. M2 leaves G1, power-on G0: which of the two is in force at the start is not known.
+a parenthesis that does not close ends with its line, and ``%``, O and M6 are errors. A ``/`` in
+front is thrown away (the block runs), skips the block where that is on (grblHAL), or is an error
+(FluidNC). FluidNC (collapseGCode) lets a ``;`` within parentheses end the line, too. M2 leaves G1,
+power-on G0: which of the two is in force at the start is not known.
 
 What plain grbl refuses and grblHAL (gcode.c) or FluidNC (GCode.cpp) run stands in `refused`: a
 block that holds such a code is executed or changes nothing at all (gc_execute_line returns before
@@ -26,15 +28,19 @@ GRBL = Dialect(
     text=Text(
         parentheses="open comment",
         semicolon="comment",
-        delete="ignored",
+        inner_semicolon=True,
+        delete="first",
         o_word="error",
         percent="error",
         variables="none",
         blanks="anywhere",
-        # Plain grbl refuses longer lines than LINE_BUFFER_SIZE - 1 (protocol.c).
-        line_limit=256,
+        # FluidNC refuses longer lines, comments and all (gc_execute_line); plain grbl those that
+        # have more than LINE_BUFFER_SIZE - 1 characters without them (protocol.c).
+        line_limit=127,
+        long_comments=True,
         characters=79,
         digits=8,  # MAX_INT_DIGITS: 00000012.5 is 12, and 0000000012 is 0 (nuts_bolts.c)
+        number_digits=7,  # MAX_LINE_NUMBER 10000000
     ),
     groups=grouped(
         {

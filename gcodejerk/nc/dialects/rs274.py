@@ -35,8 +35,11 @@ RS274 = Dialect(
         variables="none",
         blanks="anywhere",
         line_limit=min(member.text.line_limit for member in MEMBERS),
+        inner_semicolon=True,
+        long_comments=True,
         characters=GRBL.text.characters,
         digits=GRBL.text.digits,
+        number_digits=GRBL.text.number_digits,
     ),
     groups=grouped(
         {

@@ -41,9 +41,11 @@ class Text:
     """Behind M117 and M118 the rest of the line is text."""
     live_comments: bool = False
     """One that begins with a word and a comma may do something: ``(expr, ...)``, but for texts."""
-    delete: Literal["first", "numbered", "ignored", "none"] = "first"
+    inner_semicolon: bool = False
+    """A ``;`` within parentheses may end the line."""
+    delete: Literal["first", "numbered", "none"] = "first"
     """A ``/`` skips the block where the operator says so: in front of everything; there or behind
-    N, also with a level ``/1`` to ``/9``; the ``/`` is thrown away and the block runs; an error."""
+    N, also with a level ``/1`` to ``/9``; an error."""
     o_word: Literal["flow", "program", "error"] = "error"
     """``o100 while [..]``; ``O1234`` names a program (and so does ``:1234``); neither."""
     percent: Literal["lone", "leader", "named", "error"] = "lone"
@@ -74,10 +76,14 @@ class Text:
     """What ends every block."""
     line_limit: int = 512
     """Longest line that the controller reads, in bytes."""
+    long_comments: bool = False
+    """A line of comments alone does nothing, however long it is."""
     characters: int = 0
     """Most of a line without its comments and blanks; 0: what `line_limit` says."""
     digits: int = 0
     """Digits of a number that count, leading zeros among them, and the rest is lost; 0: all."""
+    number_digits: int = 0
+    """Digits of N up to which no number is too large; 0: none is."""
 
     @property
     def shortest(self) -> int:

@@ -22,7 +22,7 @@ from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.phases import Phases
 from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.refusals import refused_by_some
-from gcodejerk.nc.interpreter.rules import is_complete
+from gcodejerk.nc.interpreter.rules import is_complete, takes_twice
 from gcodejerk.nc.interpreter.variables import assign, assigned_values, reads_feed
 from gcodejerk.nc.text.block import Block
 from gcodejerk.reasons import Reason
@@ -151,7 +151,7 @@ class Executor(Phases):
         touched, state.touched = state.touched, before
         state.ended = ended
         state.forget_touched(touched, Reason.NOT_UNDERSTOOD)
-        if block.problem is not None or not self.dialect.strict:
+        if block.problem is not None or not self.dialect.strict or takes_twice(codes, self.dialect):
             # A control that is not strict may run what we refuse, and move what it does not name.
             state.forget_positions()
         unread = self.dialect.feed_on_rapids or b"F" in block.rest.upper()

@@ -46,6 +46,15 @@ def is_complete(codes: Codes, state: State, dialect: Dialect) -> bool:
     return _cartesian(codes, motion, dialect) and _words_used(codes, motion, dialect)
 
 
+def takes_twice(codes: Codes, dialect: Dialect) -> bool:
+    """Whether a motion is stated beside what takes its axis words.
+
+    FluidNC runs ``G92 G0 X1``, and moves all axes to where nobody says (gc_execute_line).
+    """
+    taken = dialect.effect(codes.g.get("non-modal")) in AXIS_USERS or takes_axes(codes)
+    return taken and codes.g.get("motion") not in (None, G80)
+
+
 def counts_as_feed(codes: Codes, dialect: Dialect, *, taken: bool) -> bool | None:
     """Whether the F of a block is the feed from there on; None: on some controls.
 

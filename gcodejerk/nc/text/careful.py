@@ -311,9 +311,6 @@ class CarefulLine(Cursor):
     def delete_mark(self) -> bool:
         """Pass over a ``/`` and its level, if it stands where the dialect has it."""
         where = self.rules.delete
-        if where == "ignored":
-            self.at += 1
-            return True
         behind = any(word.letter != "N" for word in self.words) or self.names or self.comments
         if where == "none" or behind or self.delete or (where == "first" and self.words):
             return False

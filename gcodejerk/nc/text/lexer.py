@@ -153,7 +153,7 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
         long |= part & _next(dot) & (both > LONGEST + 1)
         bad |= long
     if dialect.text.digits:
-        bad |= _many_digits(joints, width, dialect.text.digits)
+        bad |= _many_digits(joints, width, dialect.text.number_digits or dialect.text.digits)
     if dialect.whole_numbers == "machine":
         bad |= _whole(joints)
     return bad

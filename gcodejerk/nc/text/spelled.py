@@ -36,11 +36,18 @@ def check_line(rules: Text, text: bytes) -> None:
     if b"\r" in text and not rules.returns:
         raise SyntaxProblem("a carriage return may end the line", text.index(b"\r"))
     if rules.characters and len(text) > rules.characters:
-        said = _COMMENTS.sub(b"", text).translate(None, b" \t/")
+        said = _COMMENTS.sub(b"", text).translate(None, b" \t")
         if len(said) > rules.characters:
             raise SyntaxProblem(f"more than {rules.characters} characters", rules.characters)
     if rules.tight and (found := _TIGHT.match(_COMMENTS.sub(_blanks, text))):
         raise SyntaxProblem("a blank, tab or sign that makes another word of it", found.end() - 1)
+
+
+def is_too_long(rules: Text, text: bytes) -> bool:
+    """Whether the control may not read a line to its end, or refuse it."""
+    if len(text) <= rules.line_limit or text.strip(b" \t") == b"%":
+        return False
+    return not rules.long_comments or bool(_COMMENTS.sub(b"", text).strip())
 
 
 def _blanks(comment: re.Match[bytes]) -> bytes:
@@ -59,7 +66,10 @@ def check_word(rules: Text, text: bytes, begin: int) -> None:
     begin : int
         Where it stands in its line.
     """
-    if rules.digits and text[:1] not in b"Nn":
+    if rules.number_digits and text[:1] in b"Nn":
+        if len(text[1:].translate(None, b" \t")) > rules.number_digits:
+            raise SyntaxProblem("a number of a line with more digits than the control takes", begin)
+    elif rules.digits:
         front, _, behind = text[1:].translate(None, b" \t+-").partition(b".")
         if len(front) > _FEW and len(front) + len(behind) > rules.digits:
             raise SyntaxProblem("a number has more digits than the control reads", begin + 1)
@@ -81,11 +91,13 @@ def check_comments(rules: Text, text: bytes, comments: Iterable[tuple[int, int]]
     comments : iterable of tuple of int
         Where its comments stand.
     """
-    if rules.parentheses != "lone comment":
-        return
-    for begin, _ in comments:
-        if text[begin : begin + 1] == b"(":
+    for begin, end in comments:
+        if text[begin : begin + 1] != b"(":
+            continue
+        if rules.parentheses == "lone comment":
             raise SyntaxProblem("a comment beside words may be read as words", begin)
+        if rules.inner_semicolon and b";" in text[begin:end] and text[end:].strip(b" \t"):
+            raise SyntaxProblem("a ';' within parentheses may end the line", begin)
 
 
 @lru_cache(maxsize=16)

@@ -13,7 +13,7 @@ from gcodejerk.nc.text.block import Block, Word
 from gcodejerk.nc.text.careful import CarefulLine
 from gcodejerk.nc.text.cursor import SyntaxProblem
 from gcodejerk.nc.text.klartext import parse_klartext
-from gcodejerk.nc.text.spelled import check_comments, check_line
+from gcodejerk.nc.text.spelled import check_comments, check_line, is_too_long
 
 _PLAIN = re.compile(
     rb"(?:N[0-9]{1,8} ?)?(?:G[0-9]{1,3} ?)?(?:[XYZ]-?[0-9]{1,6}(?:\.[0-9]{0,8})? ?){1,3}"
@@ -55,18 +55,18 @@ def _parse_carefully(text: bytes, dialect: Dialect) -> Block:
     """The same word by word, whatever the line holds."""
     line = CarefulLine(text, dialect)
     problem, column, rest, mark = None, None, b"", 0
-    limit = dialect.text.line_limit
+    rules = dialect.text
     try:
-        if len(text) > limit and text.strip(b" \t") != b"%":
+        if is_too_long(rules, text):
             line.skip()
-            raise SyntaxProblem(f"line is longer than {limit} bytes", limit)
-        check_line(dialect.text, text)
+            raise SyntaxProblem(f"line is longer than {rules.line_limit} bytes", rules.line_limit)
+        check_line(rules, text)
         while line.skip():
             mark = line.at
             line.rest()
         mark = len(text)  # nothing is left that was not read as a word
         if line.words or line.names:
-            check_comments(dialect.text, text, line.comments)
+            check_comments(rules, text, line.comments)
     except SyntaxProblem as found:
         problem, column, rest = found.problem, found.at + 1, line.unread(line.words, mark)
     return Block(

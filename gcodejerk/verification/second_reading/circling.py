@@ -195,6 +195,13 @@ class Circling(Drilling):
         another = "feed mode" in g and self.mode_of(g["feed mode"]) != self.feed_mode
         return not values.get("F", NAN if another else self.feed) > 0.0
 
+    def takes_twice(self, block: Sorted) -> bool:
+        """Whether a strict control gets a motion beside what has the axis words for itself."""
+        if not self.dialect.strict or block.g.get("motion", G80) == G80:
+            return False
+        taken = any(self.dialect.effect(code) in _NO_MOTION for code in block.g.values())
+        return taken or block.g.get("tool length") == G43_1
+
     def may_be_refused(self, block: Sorted) -> bool:
         """Whether some of the dialect's controls may refuse a block."""
         codes = {f"G{code / 10:g}" for code in block.g.values()} | {f"M{m}" for m in block.m}

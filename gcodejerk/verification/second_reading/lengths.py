@@ -13,13 +13,25 @@ _LOOSE = re.compile(
     rb"[A-Z] *\t|^\t[ \t\0]*[A-Z]|N(?: | *[0-9]+(?:\.| *\t))|[GMT] *[-+]|[-+] ", re.IGNORECASE
 )
 """What Marlin takes for another word, or for none."""
+_COMMENT = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
+_NUMBER = re.compile(rb"N([0-9]+)")
 _LONG = re.compile(rb"(?<![0-9.N])[0-9]{5,}\.?[0-9]*")
 
 
 def is_cut(text: bytes, dialect: Dialect) -> bool:
     """Whether the control may not read a line to its end."""
     rules = dialect.text
-    return len(text) > rules.line_limit or (b"\r" in text and not rules.returns)
+    long = len(text) > rules.line_limit
+    if long and not (rules.long_comments and not _COMMENT.sub(b"", text).strip()):
+        return True
+    ended = rules.inner_semicolon and b";" in text and b"(" in text and _may_end_within(text)
+    return ended or (b"\r" in text and not rules.returns)
+
+
+def _may_end_within(text: bytes) -> bool:
+    """Whether a ``;`` stands within parentheses, and something behind them."""
+    inner = [c.end() for c in _COMMENT.finditer(text) if c[0].startswith(b"(") and b";" in c[0]]
+    return bool(inner) and bool(text[inner[0] :].strip(b" \t"))
 
 
 def is_loose(text: bytes, dialect: Dialect) -> bool:
@@ -32,8 +44,10 @@ def is_too_much(text: bytes, dialect: Dialect) -> bool:
     rules = dialect.text
     if not (rules.characters or rules.digits):
         return False
-    text = text.translate(None, b" \t\0/")
+    text = text.translate(None, b" \t\0")
     if rules.characters and len(text) > rules.characters:
+        return True
+    if rules.number_digits and any(len(n) > rules.number_digits for n in _NUMBER.findall(text)):
         return True
     numbers = _LONG.findall(text) if rules.digits else []
     return any(len(n) - n.count(b".") > rules.digits for n in numbers)

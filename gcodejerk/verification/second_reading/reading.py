@@ -300,8 +300,6 @@ class Text:
     def _mark(self, text: bytes, line: Line) -> bytes:
         """Take out the mark of block delete."""
         rules = self.dialect.text
-        if rules.delete == "ignored":
-            return text.replace(b"/", b"")
         if b"/" in text and rules.delete != "none" and (mark := self.delete.match(text)):
             line.deleted = True
             return text[mark.end() :]

@@ -199,7 +199,7 @@ def _blocks(number: bytes) -> bytes:
     """A line that states G0, and feed moves behind it."""
     block = rb"(?=[XYZ])" + _words(number, rb"(?:%s" + _BLANK + rb")?")
     block += rb"(?:F" + _NUMBER + _BLANK + rb")?\r?\n"
-    begin = _BLANK + rb"(?:N[0-9]{1,9}" + _BLANK + rb")?"
+    begin = _BLANK + rb"(?:N[0-9]{1,7}" + _BLANK + rb")?"
     rapid = begin + rb"G0?0(?![0-9.])" + _BLANK + block
     other = begin + rb"(?:G0?1(?![0-9.])" + _BLANK + rb")?" + block
     return rb"(?:%s(?:%s){0,%d})" % (rapid, other, _FEED_LINES)

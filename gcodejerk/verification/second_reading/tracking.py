@@ -131,7 +131,7 @@ class Tracker(Circling):
             return Observation()
         block = Sorted()
         told = self.unit == INCH, self.facts.decimal_point, self.g.get("motion")
-        if not block.sort(line, dialect, *told):
+        if not block.sort(line, dialect, *told) or self.takes_twice(block):
             return self._lost(line)
         if not dialect.modal_motion:
             self.g["motion"] = None
