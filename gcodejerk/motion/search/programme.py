@@ -235,19 +235,17 @@ class Unknowns:
     def responses(self, unit: float = 1.0) -> Array:
         """The rows of the problem for each unknown acceleration of that size, (n, len(a))."""
         # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
-        per_time = unit / self.h
-        if self.odd and not self.problem.cruise:
+        per_time, rows = unit / self.h, self.problem.rows
+        folds = self.odd and self.problem.cruise
+        if self.odd and not folds:
             # Blocks and their images say the same: the folded sum is twice that of the first half.
-            per_time, rows = 2.0 * per_time[: len(self.a) + 1], self.problem.rows
-            half: Array = rows[:, : len(self.a)] * per_time[:-1]
-            half -= rows[:, 1 : len(self.a) + 1] * per_time[1:]
-            return half
-        response: Array = self.problem.rows[:, :-1] * per_time[:-1]
+            per_time, rows = 2.0 * per_time[: len(self.a) + 1], rows[:, : len(self.a) + 1]
+        response: Array = rows[:, :-1] * per_time[:-1]
         # Some rows at a time: all of them are new memory once more, which costs more than the sum.
         for first in range(0, len(response), AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            response[some] -= self.problem.rows[some, 1:] * per_time[1:]
-        if self.odd:
+            response[some] -= rows[some, 1:] * per_time[1:]
+        if folds:
             folded: Array = (response - response[:, ::-1])[:, : len(self.a)]
             return folded
         return response
