@@ -152,7 +152,7 @@ class Cutting:
         self._usable = 1.0 - MARGIN
         self._fastest = problem.velocity * self._usable if problem.fast else FREE
         self._strongest = min(problem.acceleration * self._usable / self._unit, FREE)
-        self._response = unknowns.responses(self._unit)
+        self._responses = unknowns.responses(self._unit)
         self._starts = np.flatnonzero(np.diff(problem.group, prepend=-1))
         self._sizes = np.diff(np.append(self._starts, len(problem.group)))
         # Limits that are held: row k from above, row k + len(_limits) from below.
@@ -251,7 +251,7 @@ class Cutting:
         self._keep(np.array(info["lam"]))
         self.told = most = allowed + self._above
         self.expected = self.expected if smooth else max(most - gain, 0.0)
-        self._responded = self.problem.seen(self._response @ self._x)
+        self._responded = self.problem.seen(self._responses.of(self._x))
         self.left = np.sqrt(np.add.reduceat(self._responded**2, self._starts))
         self._caps = np.where(np.isnan(self.problem.cap), most, self.problem.cap)
         self.settled = (
@@ -392,12 +392,11 @@ class Cutting:
         row = np.minimum(row, len(self.problem.group) - 1)
         near, share = self.problem.near, self.problem.share
         if near is None or share is None:
-            planes: Array = np.einsum("ck,ckn->cn", direction, self._response[row])
-            return planes
+            return self._responses.to(np.einsum("ck,ckn->cn", direction, self._responses.rows[row]))
         shares = (direction[..., np.newaxis] * share[row]).reshape(len(cone), -1)
         nodes = near[row].reshape(len(cone), -1)
-        planes = np.matmul(shares[:, np.newaxis], self._response[nodes])[:, 0]
-        return planes
+        planes = np.matmul(shares[:, np.newaxis], self._responses.rows[nodes])[:, 0]
+        return self._responses.to(planes)
 
     def _prune(self, slack: Array) -> None:
         """Leave out the planes that are far away, each by its slack, and idle rows of jerks."""

@@ -155,6 +155,51 @@ class Rows:
         return matrix, np.concatenate(self.bounds)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Responses:
+    """What unknown accelerations do to the rows of a problem.
+
+    The acceleration of a knot is a jerk in the block before it, and its contrary behind. As one
+    matrix this would be as large as the rows once more; what is asked of it is next to nothing.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (n, k + 1)
+        What a unit jerk does in each of the blocks that count.
+    per_time : ndarray, shape (k + 1,)
+        The jerk in each for a unit of the acceleration at its end.
+    count : int
+        Unknowns.
+    folds : bool
+        The knots behind the middle have them, too, with the other sign.
+    """
+
+    rows: Array
+    per_time: Array
+    count: int
+    folds: bool
+
+    def of(self, a: Array) -> Array:
+        """What these accelerations do, shape (n,)."""
+        if self.folds:
+            between = np.zeros(len(self.per_time) - 1 - 2 * self.count)
+            a = np.concatenate([a, between, -a[::-1]])
+        seen: Array = self.rows @ (self.per_time * np.diff(a, prepend=0.0, append=0.0))
+        return seen
+
+    def to(self, rows: Array | None = None) -> Array:
+        """Rows of the blocks, all of them unless given, as rows of the unknowns, (r, count)."""
+        rows = self.rows if rows is None else rows
+        seen: Array = rows[:, :-1] * self.per_time[:-1]
+        # Some rows at a time: all of them are new memory once more, which costs more than the sum.
+        for first in range(0, len(seen), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            seen[some] -= rows[some, 1:] * self.per_time[1:]
+        if self.folds:
+            seen = (seen - seen[:, ::-1])[:, : self.count]
+        return seen
+
+
 class Unknowns:
     """Acceleration and velocity at every knot, and the peak jerk as a share of its limit.
 
@@ -232,23 +277,14 @@ class Unknowns:
         small = MARGIN * np.abs(v).max(initial=0.0)
         return bool(control.min() >= -small and control.max() <= self.problem.velocity + small)
 
-    def responses(self, unit: float = 1.0) -> Array:
-        """The rows of the problem for each unknown acceleration of that size, (n, len(a))."""
-        # The acceleration of a knot is a jerk in the block before it, and its contrary behind.
+    def responses(self, unit: float = 1.0) -> Responses:
+        """What accelerations in this unit do to the rows of the problem."""
         per_time, rows = unit / self.h, self.problem.rows
         folds = self.odd and self.problem.cruise
         if self.odd and not folds:
             # Blocks and their images say the same: the folded sum is twice that of the first half.
             per_time, rows = 2.0 * per_time[: len(self.a) + 1], rows[:, : len(self.a) + 1]
-        response: Array = rows[:, :-1] * per_time[:-1]
-        # Some rows at a time: all of them are new memory once more, which costs more than the sum.
-        for first in range(0, len(response), AT_ONCE):
-            some = slice(first, first + AT_ONCE)
-            response[some] -= rows[some, 1:] * per_time[1:]
-        if folds:
-            folded: Array = (response - response[:, ::-1])[:, : len(self.a)]
-            return folded
-        return response
+        return Responses(rows, per_time, len(self.a), folds)
 
     def accelerations(self, x: Array) -> Array:
         """The acceleration at every knot."""

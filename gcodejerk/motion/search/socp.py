@@ -162,7 +162,7 @@ def _solve_once(
         moves.append(Unknowns(problem, moves[-1].end if moves else 0))
     above, group, caps = moves[-1].end, problems[0].group, problems[0].cap
     columns = np.concatenate([move.a for move in moves])
-    response = np.hstack([move.problem.seen(move.responses()) for move in moves])
+    response = np.hstack([move.problem.seen(move.responses().to()) for move in moves])
     rows = Rows()
     for move in moves:
         move.motion(rows)
