@@ -29,6 +29,9 @@ WORTHWHILE = 0.7
 """Share of the candidates that are left, up to which the others are taken out."""
 AT_ONCE = 3
 """Poles after which candidates are compared with their bounds."""
+SMALL = 1 << 12
+"""More poles, where they and the candidates are no more numbers than this: calls would cost more
+than what is given up."""
 
 
 def symmetric_worst(
@@ -52,7 +55,7 @@ def symmetric_worst(
     bound : ndarray, shape (n, k), optional
         What leaves more may be said to leave anything: it is given up as soon as some of the modes
         show that, and is infinite. What leaves less is as without a bound, to the last bit; below
-        zero nothing is evaluated. [mm]
+        zero everything is infinite. [mm]
 
     Returns
     -------
@@ -210,7 +213,7 @@ class _Worst:
         while begin < len(self.poles):
             size = max(1, BLOCK // max(self.worst.size, 1))
             if self.bound is not None:
-                size = min(size, AT_ONCE)
+                size = min(size, max(AT_ONCE, SMALL // max(self.worst.size, 1)))
             block = slice(begin, begin + size)
             begin += size
             poles = self.poles[block, np.newaxis]
@@ -241,6 +244,8 @@ class _Worst:
     def displacement(self) -> Single:
         """The worst of each candidate, infinite where it was given up [mm]."""
         left = np.sqrt(self.worst)
+        if self.bound is not None:
+            left[self.bound < 0.0] = np.inf
         if self.index is None:
             return left.reshape(self.shape)
         out = np.full(self.shape[0] * self.shape[1], np.inf, dtype=np.float32)
