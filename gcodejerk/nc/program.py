@@ -21,10 +21,10 @@ from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.again import begins_again
 from gcodejerk.nc.flow.elsewhere import Elsewhere, find_elsewhere
-from gcodejerk.nc.flow.left_on import left_on
 from gcodejerk.nc.flow.outline import find_outline, may_go_back, read_body, refers, seekable
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.following_reader import MOST_BYTES, FollowingReader, worth_following
+from gcodejerk.nc.interpreter.left_on import left_on
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.neighbours import with_neighbours
 from gcodejerk.nc.interpreter.rapids import Rapids

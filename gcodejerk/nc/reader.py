@@ -15,12 +15,12 @@ import numpy as np
 from gcodejerk.nc.dialects.dialect import Dialect, code_name
 from gcodejerk.nc.flow.branches import Flow
 from gcodejerk.nc.flow.jumps import is_target
-from gcodejerk.nc.flow.left_on import LeftOn
 from gcodejerk.nc.flow.o_words import Passes
 from gcodejerk.nc.flow.structures import Collector, Node
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.interpreter.beams import darkness
 from gcodejerk.nc.interpreter.computed import Computed, Form, form_of
+from gcodejerk.nc.interpreter.left_on import LeftOn
 from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, MODES, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.interpreter.runner import Finding, Runner
@@ -123,8 +123,7 @@ class Reader:
             for name, value in kept.items():
                 if name not in stated:
                     state.put(name, value)
-        state.put("transforms", {**state.transforms, **dict.fromkeys(left.transforms)})
-        state.put("bars", {**state.bars, **dict.fromkeys(left.bars)})
+        left.enter(state)
 
     def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:
         """Take one line the careful way; text without its LF."""
@@ -199,7 +198,7 @@ class Reader:
     @property
     def _unfed(self) -> bool:
         """Whether the control refuses feed moves, since there is no F."""
-        return self.dialect.arcs_refused and not self.state.feed > 0.0
+        return self.dialect.feed_needed and not self.state.feed > 0.0
 
     def read_run(self, lines: Lines, first: int, last: int, place: tuple[int, int]) -> int:
         """Take plain lines of a chunk as arrays; the first that was not taken."""

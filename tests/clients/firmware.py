@@ -7,6 +7,8 @@
   builds the interpreter with `grblhal.c`.
 - ``FLUIDNC``: folder of a checkout of bdring/FluidNC; g++ builds the interpreter with
   `fluidnc.cpp`.
+- ``MARLIN``: folder of a checkout of MarlinFirmware/Marlin; g++ builds it for its own Linux with
+  `marlin.cpp`, a minute each for what it can do without options and with them.
 
 All are under the GPL, so that nothing of them is in this project, and no package of Debian has
 them. Behind a line that is refused, the next one runs: some senders go on so.
@@ -16,11 +18,14 @@ import contextlib
 import importlib
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import textwrap
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -253,6 +258,70 @@ def _grblhal(axes):
     )
 
 
+MARLIN_OPTIONS = {
+    "MOTHERBOARD": "BOARD_SIMULATED",
+    "SERIAL_PORT": "0",
+    **dict.fromkeys(("X_DRIVER_TYPE", "Y_DRIVER_TYPE", "Z_DRIVER_TYPE", "E0_DRIVER_TYPE"), "A4988"),
+    "ARC_SUPPORT": "",
+    # What asks for a machine, or for more of its code.
+    **dict.fromkeys(
+        (
+            *("DWIN_CREALITY_LCD", "DWIN_LCD_PROUI", "RET6_12864_LCD", "PROUI_EX"),
+            *("CV_LASER_MODULE", "LCD_BACKLIGHT_TIMEOUT_MINS", "SDSUPPORT", "EEPROM_SETTINGS"),
+            *("PRINTCOUNTER", "NOZZLE_PARK_FEATURE", "ADVANCED_PAUSE_FEATURE", "LIN_ADVANCE"),
+            *("HOTEND_IDLE_TIMEOUT", "POWER_LOSS_RECOVERY", "BABYSTEPPING", "HAS_GCODE_PREVIEW"),
+            *("PROBE_MANUALLY", "MESH_BED_LEVELING", "AUTO_BED_LEVELING_UBL", "LCD_BED_LEVELING"),
+            *("ENDSTOP_INTERRUPTS_FEATURE", "FILAMENT_RUNOUT_SENSOR", "CUSTOM_VERSION_FILE"),
+            *("PREVENT_COLD_EXTRUSION", "PREVENT_LENGTHY_EXTRUDE", "NO_WORKSPACE_OFFSETS"),
+            *("MIN_SOFTWARE_ENDSTOPS", "MAX_SOFTWARE_ENDSTOPS", "HOME_AFTER_DEACTIVATE"),
+            *("NO_MOTION_BEFORE_HOMING", "HOST_ACTION_COMMANDS"),
+        )
+    ),
+}
+"""Of Marlin's configuration; None switches one off."""
+MARLIN_EXTRAS = (
+    *("INCH_MODE_SUPPORT", "PAREN_COMMENTS", "GCODE_CASE_INSENSITIVE", "GCODE_MOTION_MODES"),
+    *("CNC_COORDINATE_SYSTEMS", "CNC_WORKSPACE_PLANES"),
+)
+MARLIN_WRAPS = (
+    *("_ZN7Planner11buffer_lineERK7XYZEvalIfEfhRK12PlannerHints", "_ZN7Planner11synchronizeEv"),
+    *("_ZN8Endstops20validate_homing_moveEv", "_Z8homeaxis8AxisEnum", "_Z4idleb"),
+    *("_Z10safe_delayj", "_ZN11GCodeParser23unknown_command_warningEv"),
+)
+
+
+@cache
+def _marlin(extras):
+    """The interpreter, with what the language may have besides or not; as of the others."""
+    checked_out = checkout("MARLIN", "Marlin/src/gcode/queue.cpp") / "Marlin"
+    folder = tempfile.TemporaryDirectory(prefix="marlin-")
+    source = Path(folder.name, "Marlin")
+    shutil.copytree(checked_out, source, ignore=shutil.ignore_patterns("tft*", "fontdata"))
+    options = {**MARLIN_OPTIONS, **dict.fromkeys(MARLIN_EXTRAS, "" if extras else None)}
+    for file in (source / "Configuration.h", source / "Configuration_adv.h"):
+        text = file.read_text()
+        for name, value in options.items():
+            new = f"//#define {name}" if value is None else f"#define {name} {value}"
+            text = re.sub(rf"(?m)^(\s*)(?://\s*)?#define\s+{name}\b.*$", rf"\1{new}", text)
+        file.write_text(text)
+    flags = ["-std=gnu++17", "-D__PLAT_LINUX__", "-D__MARLIN_FIRMWARE__", f"-I{source}"]
+    flags.append(f"-I{source / 'src/HAL/LINUX/include'}")
+    others = re.compile(r"src/HAL/(?!LINUX|shared)|src/lcd/.*/|/LINUX/main.cpp|gcode/queue.cpp")
+    files = [file for file in source.rglob("*.cpp") if not others.search(file.as_posix())]
+
+    def compiled(file):
+        out = file.with_suffix(".o")
+        command = ["g++", "-w", *flags, "-c", file, "-o", out]
+        subprocess.run(command, check=True, timeout=300)
+        return out
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        objects = list(threads.map(compiled, files))
+    wraps = f"-Wl,{','.join(f'--wrap={name}' for name in MARLIN_WRAPS)}"
+    linked = [*flags, HERE / "marlin.cpp", *objects, wraps, "-lrt", "-lpthread"]
+    return folder, _built(folder, linked, compiler="g++")
+
+
 def _built(folder, arguments, compiler="gcc"):
     """A program of C or C++."""
     program = Path(folder.name, "interpreter")
@@ -296,11 +365,34 @@ def run_grblhal(lines, axes="XYZ", before=()):
     return _told(folder, program, axes, [*before, *lines])[len(before) :]
 
 
-def _told(folder, program, axes, lines):
+def run_marlin(lines, extras, way, before=()):
+    """What Marlin makes of a program.
+
+    Parameters
+    ----------
+    lines : list of str
+        The program's.
+    extras : bool
+        It has what its language may have besides (`MARLIN_EXTRAS`).
+    way : str
+        How lines come: of a "file", "bare" through the serial port, or "sent" by a sender.
+    before : sequence of str
+        Lines that ran before, of which nothing is told.
+    """
+    told = _told(*_marlin(extras), "XYZ", [*before, *lines], way)[len(before) :]
+    return [replace(each, rapids=None) for each in told]
+
+
+def _told(folder, program, axes, lines, *arguments):
     """What an interpreter in C tells of each line."""
     text = "".join(f"{line}\n" for line in lines).encode("latin-1")
     done = subprocess.run(
-        [program], input=text, cwd=folder.name, capture_output=True, timeout=20, check=True
+        [program, *arguments],
+        input=text,
+        cwd=folder.name,
+        capture_output=True,
+        timeout=20,
+        check=True,
     )
     told, stands = [], dict.fromkeys(axes, 0.0)
     for answer in done.stdout.splitlines():

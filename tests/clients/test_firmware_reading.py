@@ -9,7 +9,7 @@ import math
 import re
 
 import pytest
-from firmware import run_fluidnc, run_grbl, run_grblhal, run_klipper
+from firmware import run_fluidnc, run_grbl, run_grblhal, run_klipper, run_marlin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -131,6 +131,53 @@ def test_klipper_does_what_is_certain(lines, known, arcs):
     before = [] if known else ["G91", "G92 X3", "G1 X8 Y5 Z-2 F5400", "G92 Y1 Z4", "M83"]
     ran = run_klipper(lines, arcs, before)
     assert not contradicted(lines, "klipper", start_of(known), ran)
+
+
+MARLIN = programs(
+    [["G90", "G21", "G0 F3000 X0 Y0 Z5"], ["G90"], ["G90", "G28"], []],
+    parts(
+        """G0 | G0 | G0 | G0 | G0 | G0 | G0 | G0 | G1 | G1 | G00 | g0 | G2 | G3 | G0.1 | G90 G0 |
+        G5 |
+        N5 G0 | M400 G0 | T0 | G+0 | G 0 | G0. | G28 | G92 | M204 | M82 G0 | G53 G0 | G53 | G54 |
+        G92.1 | G28.1 | G60 | G61"""
+    ),
+    "EABCUVWIJKRSPQHLDT",
+    [
+        *parts(
+            r"""G90 | G91 | G92 X0 | G92 | G92 E0 | G92 A3 | G92 F5 | G92 X1 A2 | G28 | G28 X |
+            G28 A |
+            G28 O | G28 R5 | G20 | G21 | G4 P1 | M82 | M83 | M220 S50 | M220 S100 | M220 | M220 B |
+            M220 R | M400 | M204 S9 | M117 G0 X5 | M118 G0 X5 | G10 | G11 | G17 | G18 | G54 | G55 |
+            G53
+            | G59.1 | T0 | T1 | T0 G91 | X5 G91 | F300 G0 X3 | G91 F100 | F60 | G90 X5 | X5 | G091 |
+            N7G90 | G91*34 | (c) | ; c | G0 | G0 F900 | G0 E5 | G0 X | G0;X5 | G0X5Y3 | N 5 G91 |
+            N5 G91 | N-5 G91 | g1 f300 x2 | G0 X5 Y3 Q | M106 M400 | G1 F0 | G92 X1 F9 | M206 X3 |
+            M428
+            | M211 S1 | M211 S0 | M999 | M500 | M501 | M502 | G60 S0 | G61 S0 | G61 X | M114 | M17 |
+            M18 | M84 X | M73 P5 | M75 | M201 X500 | M203 X500 | M205 X9 | M92 X80 | M92 X40 |
+            M218 T1 X5 | M302 | G0X0x10 | G0Y0X10 | G0 X1E1 | G0 X1e1 | G0 X5 X6 | G0 X5,Y3 |
+            G0 X5 (c) Y2 | (c) G0 X5 | G0 (X9) X5 | G1 X5 ;(c | G0 ( X3 | G0 X5 "c" Y3 | G0 F |
+            G0 FX5
+            | G0 X5 F | G0 X-.5 Y+.5 | G0 X--5 | G0 X5- | G0 X. | G0 Z | G0 XYZ5 | GO X5 | G0x5 |
+            G0 X 5 | G0 X$5 | G0 /X5 | /G0 X5 | % | O1 | M2 | M30 | M3 S9 | M5 | M3 I | G1 X5 S9 |
+            @pause | !G0 X3 | G0 X5! | G80 | G38.2 X5 | G27 | M24 | M26 | M808 | M810 G0X5 | M810 |
+            M486 S1 | M486 P1 | M486 S-1 | D5 | U5 G91 | H | Y2 | E5 | S5 | P2 | I5 J2 | F-5 | F0 |
+            G2 X5 Y0 I2.5 | G3 X1 I5 Z-2 | G2 I5 | G2 I5 X10 | G3 X5 Y5 R9 F80"""
+        ),
+        "G0 X5\tY3",
+        "\tG0 X5",
+        f"G0 Y1 {'Q1 ' * 40}X7",
+    ],
+)
+
+
+@pytest.mark.parametrize("extras", [False, True])
+@MANY
+@given(MARLIN, st.booleans(), st.sampled_from(["file", "bare", "sent"]))
+def test_marlin_does_what_is_certain(extras, lines, known, way):
+    before = [] if known else ["G91", "G92 X3", "G1 X8 Y5 Z-2 F5400", "G92 Y1 Z4", "M83"]
+    ran = run_marlin(lines, extras, way, before)
+    assert not contradicted(lines, "marlin", start_of(known), ran)
 
 
 GRBL = programs(

@@ -88,7 +88,7 @@ NEVER = {
 SECOND_READER = (
     *("reading", "sorting", "known", "coding", "drilling", "circling", "tracking"),
     *("operating", "computing", "routes", "walking", "klartext", "straight", "limiting"),
-    *("lengths", "parameters", "labelled", "stepping", "joining", "ahead"),
+    *("lengths", "parameters", "labelled", "stepping", "joining", "ahead", "unread"),
 )
 """Modules of `verification` that read programs without the help of `nc`, but for its tables."""
 FOREIGN = {

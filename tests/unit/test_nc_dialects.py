@@ -90,7 +90,9 @@ def test_every_dialect_moves_where_absolute_words_say(name):
         ("grbl", b"G0X 1 2", None),
         ("fanuc", b"G0 X1 2", "'2' has no meaning here"),
         ("siemens", b"G0 X1 2", "'2' has no meaning here"),
-        ("marlin", b"N10 G1 X5*71", None),
+        ("marlin", b"G1 X5*71", None),
+        ("marlin", b"N10 G1 X5*71", "a block with a number of its own may be no command"),
+        ("klipper", b"n10 G1 X5", "a block with a number of its own may be no command"),
         ("linuxcnc", b"N10 G1 X5*71", "'*' has no meaning here"),
         ("heidenhain-iso", b"N10 G00 X+5 Y-3*", None),
         ("grbl", b"%", "'%' has no meaning here"),
@@ -326,7 +328,7 @@ def test_a_rapid_that_feeds_plastic_is_left_alone():
 
 
 def test_a_checksum_forbids_inserting_lines():
-    assert reasons(b"N1 G90*20\nN2 G0 X5 F600*30\n", "marlin", PRINTER) == [
+    assert reasons(b"G90*20\nG0 X5 F600*30\n", "marlin", PRINTER) == [
         "other words of the block cannot keep their order"
     ]
 

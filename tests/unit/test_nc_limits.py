@@ -123,6 +123,29 @@ def test_a_block_that_is_not_understood_ends_no_limit(dialect, lines):
     assert reasons(dialect, lines) in (SET, Reason.NOT_UNDERSTOOD)
 
 
+@pytest.mark.parametrize(
+    ("dialect", "line", "reason"),
+    [
+        ("marlin", b"N3 M204 S100", SET),
+        ("marlin", b"m201 x100", SET),
+        ("marlin", b"M204 S100 (slowly)", SET),
+        ("klipper", b"N3 M204 S100", SET),
+        ("klipper", b"N3 SET_VELOCITY_LIMIT ACCEL=100", SET),
+        ("marlin", b"N3 M220 S50", Reason.FEED_SCALED),
+        ("marlin", b"m220 s50", Reason.FEED_SCALED),
+        ("grbl", b"G51 X2 P3 ~", Reason.ROTATION),
+    ],
+)
+def test_a_block_that_is_not_understood_may_begin_what_lasts(dialect, line, reason):
+    """Small letters, comments and numbers are passed over by some of these controls."""
+    assert reasons(dialect, line) == reason
+
+
+@pytest.mark.parametrize("line", [b"N3 M220 S50", b"m220 s50"])
+def test_what_it_may_have_begun_is_ended_by_a_word_that_is_read(line):
+    assert reasons("marlin", line + b"\nM220 S100") is None
+
+
 def test_grbl_may_refuse_to_set_it_back():
     assert reasons("grbl", b"$120=500\n$120=2500") == SET
 

@@ -270,6 +270,9 @@ NOT_CERTAIN = {
     "a dwell without P": ("grbl", b"G4 X3\nG0 X9\n", Reason.START_UNKNOWN),
     "T with decimals": ("grbl", b"G0 X5 T1.5\nG0 X9\n", Reason.START_UNKNOWN),
     "an arc that misses its end": ("grbl", b"G2 X10 Y0 I5.6\nG0 X0\n", Reason.START_UNKNOWN),
+    "an arc of Marlin whose ends are in line": (
+        "marlin", b"G3 X1 I5 Z-2 F600\nG0 X9\n", Reason.START_UNKNOWN
+    ),
     "an arc whose radius is too small": ("grbl", b"G2 X10 R3\nG0 X0\n", Reason.START_UNKNOWN),
     "an arc without its plane": ("grbl", b"G2 Z3 I5\nG0 Z50\n", Reason.START_UNKNOWN),
     "an arc from an unknown place": (
@@ -460,8 +463,9 @@ STILL_CERTAIN = {
     "behind an arc that misses its end": (
         "grbl", b"G2 X10 Y0 I5.6\nG0 X0 Y0 Z9 F90\nG1 X3\nG0 X5\n"
     ),
+    "an arc of Marlin that meets its end": ("marlin", b"G2 X10 Y0 I5 F600\nG0 X0 Y5\n"),
     "an arc of LinuxCNC, which stops": ("linuxcnc", b"G2 X10 Y0 I5.6\nG0 X0\n"),
-    "a text of Marlin": ("marlin", b"M117 Hello G91 #1\nN5 M118 G91 World*3\nG0 X5 F900\n"),
+    "a text of Marlin": ("marlin", b"M117 Hello G91 #1\nM118 G91 World*3\nG0 X5 F900\n"),
     "rounded corners no more": (
         "siemens", b"RNDM=5\nG1 X5 Y5\nRNDM=0\nG1 X5 Y5\nG0 X10 Y0\nG0 Y10\n"
     ),

@@ -124,9 +124,9 @@ MARLIN = {
     "a tab in front": b"\tG91",
     "a tab in a code": b"G\t91",
     "a tab in front of a number": b"G0 X\t5",
+    "N of its own, which a sender's stands in front of": b"N10 G91",
     "a tab behind N": b"N10\tG91",
-    "a blank behind N": b"N 10 G91",
-    "a point in N": b"N10.5 G91",
+    "a blank in front of it": b" N 10 G91",
     "a sign in front of a code": b"G+91",
     "a blank behind a sign": b"G0 X- 5",
     "a line of 96 characters": b"G0 X1" + b" " * 86 + b"Y1000",
@@ -139,12 +139,16 @@ def test_marlin_may_read_another_word_or_none(case):
     assert known("marlin", MARLIN[case]) == [False, False]
 
 
+def test_klipper_may_take_a_number_for_the_command():
+    """Of two N, the second is it (klippy/gcode.py, _process_commands)."""
+    assert known("klipper", b"N10 G91") == [False, False]
+
+
 @pytest.mark.parametrize(
     "line",
     [
         b"\t; text",
         b"G 91\t",
-        b"N10 G91",
         b"G0 X5\tY6",
         b"G0 X1" + b" " * 86 + b"Y100",
         b"(Adaptive - depth: G -2,\tN 10)",

@@ -212,8 +212,7 @@ class Dialect:
     """Letter -> codes ("G43", "M66") one of which has to stand in the block or be in force; where
     the table is empty, every letter may stand everywhere."""
     shifts_travel: bool = False
-    """By a setting of the control, the first increment behind a change of the frame travels that
-    change, too."""
+    """By a setting, the first increment behind a change of the frame travels that change, too."""
     base_frames: bool = False
     """Between machine and work systems lie frames that the program does not name, and that G53 may
     leave in force."""
@@ -321,7 +320,7 @@ class Dialect:
     """An M code that is not listed: not understood, or a program of the builder's that may move,
     and that may end in G90 and with the tool length cancelled, as those for tool changes do."""
     contours: frozenset[int] = frozenset()
-    """Codes whose P and Q name the first and last block of a contour: those blocks do not run."""
+    """Codes whose P and Q name a contour's first and last block: those blocks do not run."""
     redrawn: frozenset[int] = frozenset()
     """Motions whose end is not what their words say."""
     drilling: Drilling = field(default_factory=Drilling)
@@ -329,8 +328,9 @@ class Dialect:
     rapid: int = 0
     arcs: frozenset[int] = frozenset({20, 30})
     arcs_refused: bool = False
-    """An arc that does not meet its end is refused, and a feed move before any F; and whoever sends
-    the program may go on."""
+    """An arc that misses its end may be refused, and whoever sends the program go on."""
+    feed_needed: bool = False
+    """So may a feed move before any F."""
     harmless: frozenset[int] = frozenset({0})
     """G codes whose effect does not depend on when, within its block, a rapid runs."""
     before_m: frozenset[int] = frozenset()

@@ -137,6 +137,7 @@ GRBL = Dialect(
     strict=True,
     paths={610: 64},
     arcs_refused=True,
+    feed_needed=True,
     limits=limits.GRBL,
     dark_rapids=True,
     beam_codes=frozenset({4}),

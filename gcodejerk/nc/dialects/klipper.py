@@ -3,8 +3,9 @@
 Sources: Klipper's docs, G-Codes.md; Klipper3d/klipper issue 3911 (``( )`` is no comment). Macros
 have names and may do anything; what they leave behind is unknown. F is one for all moves. A code is
 compared as it is written: ``G00`` is unknown (klippy/gcode.py, _process_commands), and what is not
-known is passed over. So are G2 and G3 without the section [gcode_arcs]. What stands between
-EXCLUDE_OBJECT_START and EXCLUDE_OBJECT_END is left out where the operator says so.
+known is passed over. Of two N in front of a block, a sender's and the program's, one is its code.
+So are G2 and G3 without the section [gcode_arcs]. What stands between EXCLUDE_OBJECT_START and
+EXCLUDE_OBJECT_END is left out where the operator says so.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ KLIPPER = replace(
     text=Text(
         parentheses="code",
         padded=False,
+        numbered=False,
         semicolon="comment",
         delete="none",
         o_word="error",
@@ -42,6 +44,7 @@ KLIPPER = replace(
     set_letters="XYZE",
     refused=frozenset(),
     redrawn=frozenset({20, 30, 50}),
+    arcs_refused=False,
     other_m="unknown",  # a macro of the owner's, perhaps
     dark_rapids=False,  # M3 is a macro there, if anything; a laser is declared
     limits=limits.KLIPPER,

@@ -7,12 +7,16 @@ for all moves: G0 runs at it like G1.
 What a build has to switch on, and many do not (src/gcode/parser.cpp, src/gcode/gcode.h; config/
 extras.h): comments in parentheses, without which ``G0 X5 (Z9)`` goes to Z9; small letters, without
 which ``G0 x5`` names no axis; G20, without which lengths stay mm. A tab is no blank: a line that
-begins with one is no command, and ``X<tab>5`` has no number. ``N 10 G0`` is a command N, ``G+0``
-none. Of a longer line the first MAX_CMD_SIZE - 1 = 95 characters are read (src/gcode/queue.cpp).
-M501 and M502 load settings, the home offsets among them; M23, M24 and M26 go on in another file, or
-elsewhere in this one; M220 scales F until it is set to 100. With GCODE_MOTION_MODES a line may
-begin with an axis or F, for the motion before; with G0_FEEDRATE, G0 runs at a speed of its own, and
-its F may be for G0 alone (src/gcode/parser.cpp, src/gcode/motion/G0_G1.cpp).
+begins with one is no command, and ``X<tab>5`` has no number. ``G+0`` is no command. One N in front
+of a command is passed over, and has to be followed by a checksum where it does not come from a file
+of the control's own (src/gcode/queue.cpp); a sender adds both, and then the program's own N is the
+command, which nobody has. An arc whose ends lie on one ray from its centre is passed over with all
+beside it (src/gcode/motion/G2_G3.cpp). Of a longer line the first MAX_CMD_SIZE - 1 = 95 characters
+are read (src/gcode/queue.cpp). M501 and M502 load settings, the home offsets among them; M23, M24
+and M26 go on in another file, or elsewhere in this one; M220 scales F until it is set to 100. With
+GCODE_MOTION_MODES a line may begin with an axis or F, for the motion before; with G0_FEEDRATE, G0
+runs at a speed of its own, and its F may be for G0 alone (src/gcode/parser.cpp,
+src/gcode/motion/G0_G1.cpp).
 """
 
 from __future__ import annotations
@@ -52,6 +56,7 @@ MARLIN = Dialect(
         parentheses="lone comment",
         capitals=True,
         tight=True,
+        numbered=False,
         semicolon="comment",
         delete="none",
         o_word="error",
@@ -87,6 +92,7 @@ MARLIN = Dialect(
     dark_rapids=True,
     incremental_set=True,
     feed_on_rapids=True,
+    arcs_refused=True,
     feed_of_moves=True,
     refused=frozenset({"G20"}),
     m_scales=frozenset({220}),

@@ -98,6 +98,7 @@ RS274 = Dialect(
     refuses=GRBL.refuses,
     feed_before_units=True,
     arcs_refused=True,
+    feed_needed=True,
     limits=GRBL.limits,
     dark_rapids=True,
     # Centroid's control has programs like these, and moves Z apart; nothing may tell it from them.

@@ -24,8 +24,11 @@ class Text:
     capitals: bool = False
     """Small letters outside of comments may be read as nothing."""
     tight: bool = False
-    """A tab, a blank behind N or a sign, a sign in front of a code or a point in N makes another
-    word of it, or none."""
+    """A tab, a blank behind a sign or a sign in front of a code makes another word of it, or none.
+    """
+    numbered: bool = True
+    """N in front of a block is passed over; otherwise it may make no command of it: who sends the
+    program puts another N in front."""
     returns: bool = False
     """A carriage return within a line counts nowhere; otherwise it may end the line."""
     padded: bool = True

@@ -15,7 +15,7 @@ from typing import BinaryIO
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.jumps import EVERYWHERE, jumps_of
-from gcodejerk.nc.flow.left_on import NOTHING, LeftOn, left_on
+from gcodejerk.nc.interpreter.left_on import NOTHING, LeftOn, left_on
 from gcodejerk.nc.text.block import Line, Name
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.nc.text.tokenizer import parse_line

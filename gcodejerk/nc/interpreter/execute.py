@@ -17,7 +17,8 @@ from gcodejerk.nc.interpreter.arcs import in_doubt, lacks_feed
 from gcodejerk.nc.interpreter.beams import inline_power
 from gcodejerk.nc.interpreter.codes import Codes, sort_words
 from gcodejerk.nc.interpreter.eligibility import Call, Step, looks_rapid, why_left_alone
-from gcodejerk.nc.interpreter.limits import set_by_setting
+from gcodejerk.nc.interpreter.left_on import left_by
+from gcodejerk.nc.interpreter.limits import LIMIT, set_by_setting
 from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.phases import Phases
 from gcodejerk.nc.interpreter.rapids import USES_FEED
@@ -104,7 +105,7 @@ class Executor(Phases):
             self._switch_overrides(block, values)
         code = refused_by_some(codes, state, self.dialect)
         doubt = self.dialect.arcs_refused and in_doubt(codes, state, self.dialect)
-        slow = self.dialect.arcs_refused and lacks_feed(codes, state, self.dialect)
+        slow = self.dialect.feed_needed and lacks_feed(codes, state, self.dialect)
         if code or slow or doubt is not False:
             what = "a feed move without F" if slow else "the arc"
             self._run_or_refuse(codes, step, code or what)
@@ -161,6 +162,9 @@ class Executor(Phases):
             state.forget(Reason.NOT_UNDERSTOOD)
         if block.problem is not None:
             step.limits |= set_by_setting(state, block.rest, self.dialect, self.limits)
+            left = left_by(block.rest, self.dialect)
+            left.enter(state)
+            step.limits |= LIMIT + "anything" in left.bars
         step.feed_event = USES_FEED
 
     def _assign(self, target: str) -> None:

@@ -149,7 +149,7 @@ def run_plain(
     sure = sure_lines(letters, motion, state, dialect)
     if dialect.arcs_refused:
         _doubt_arcs(sure, lines, letters, motion, state, first)
-    if dialect.arcs_refused or dialect.feed_of_moves:
+    if dialect.feed_needed or dialect.feed_of_moves:
         given = lines.words("F", first, last)
         sure[given.line[given.values() == 0.0]] = False
     if not sure.all():

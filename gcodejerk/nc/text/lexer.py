@@ -132,7 +132,7 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
     is_n, is_g = kind == ord("N"), kind == ord("G")
     bad: Flags = (sign | dot) & _before(is_n | is_g)
     bad |= sign & _before((kind == ord("F")) | (kind == ord("S")))
-    bad |= is_n & ~_before(kind == END)
+    bad |= is_n & ~_before(kind == END) if dialect.text.numbered else is_n
     codes = np.flatnonzero(is_g)
     first, behind = place.take(codes) + 1, place.take(codes + 1)
     zeros = behind - first == 1

@@ -75,7 +75,7 @@ class Circling(Drilling):
     def _doubts_run(self, data: bytes, begin: int, end: int) -> bool:
         """Whether any line of a run of feed moves may be refused."""
         rules = self.dialect
-        if (rules.arcs_refused or rules.feed_of_moves) and NO_FEED.search(data, begin, end):
+        if (rules.feed_needed or rules.feed_of_moves) and NO_FEED.search(data, begin, end):
             return True
         return rules.arcs_refused and self._strays(data[begin:end])
 
@@ -168,7 +168,7 @@ class Circling(Drilling):
 
     def lacks_feed(self) -> bool:
         """Whether a feed move may be refused, since it has no F."""
-        return self.dialect.arcs_refused and not self.feed > 0.0
+        return self.dialect.feed_needed and not self.feed > 0.0
 
     def may_be_feed(self, block: Sorted) -> bool:
         """Whether F may be a feed though something else takes the words of its block."""
@@ -188,7 +188,7 @@ class Circling(Drilling):
         motion = g.get("motion", self.g.get("motion"))
         moves = block.axes or "motion" in g or (motion != G1 and {"I", "J", "K"} & values.keys())
         feeds = motion in (G1, *dialect.arcs, *dialect.redrawn)
-        if not dialect.arcs_refused or not moves or not feeds:
+        if not dialect.feed_needed or not moves or not feeds:
             return False
         if any(dialect.effect(code) in _TAKES for code in g.values()):
             return False

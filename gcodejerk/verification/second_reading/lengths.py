@@ -9,11 +9,10 @@ import re
 
 from gcodejerk.nc.dialects.dialect import Dialect
 
-_LOOSE = re.compile(
-    rb"[A-Z] *\t|^\t[ \t\0]*[A-Z]|N(?: | *[0-9]+(?:\.| *\t))|[GMT] *[-+]|[-+] ", re.IGNORECASE
-)
+_LOOSE = re.compile(rb"[A-Z] *\t|^\t[ \t\0]*[A-Z]|[GMT] *[-+]|[-+] ", re.IGNORECASE)
 """What Marlin takes for another word, or for none."""
 _COMMENT = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
+_SAYING = re.compile(rb"^([ \t]*(?:N[0-9]+[ \t]*)?M11[78])(?:[^0-9.].*)?$")
 _NUMBER = re.compile(rb"N([0-9]+)")
 _LONG = re.compile(rb"(?<![0-9.N])[0-9]{5,}\.?[0-9]*")
 
@@ -32,6 +31,11 @@ def _may_end_within(text: bytes) -> bool:
     """Whether a ``;`` stands within parentheses, and something behind them."""
     inner = [c.end() for c in _COMMENT.finditer(text) if c[0].startswith(b"(") and b";" in c[0]]
     return bool(inner) and bool(text[inner[0] :].strip(b" \t"))
+
+
+def unsaid(text: bytes, dialect: Dialect) -> bytes:
+    """A line without what M117 shows and M118 sends."""
+    return _SAYING.sub(rb"\1", text) if dialect.text.messages else text
 
 
 def is_loose(text: bytes, dialect: Dialect) -> bool:

@@ -25,6 +25,7 @@ from gcodejerk.verification.second_reading.lengths import (
     is_cut,
     is_loose,
     is_too_much,
+    unsaid,
     written_frame,
 )
 from gcodejerk.verification.second_reading.limiting import Said, take_limits
@@ -61,10 +62,10 @@ _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*$")
 _NAME = re.compile(rb"([A-Z_][A-Z_][A-Z0-9_]*)([ \t]*\((?:[^()\"]|\"[^\"]*\")*\))?")
 _PARAMETER = re.compile(rb"R[0-9]+[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;]*")
 _PADDED = re.compile(rb"(?<![A-Z_])[GM](?:[ \t]|0[0-9])", re.IGNORECASE)
+_NUMBERED = re.compile(rb"[ \t]*N[-+ 0-9]", re.IGNORECASE)
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
 _SPINDLE = re.compile(rb"\$(-?[0-9]+)\.?(?![-+0-9.#\[])")
-_SAYING = re.compile(rb"^([ \t]*(?:N[0-9]+[ \t]*)?M11[78])(?:[^0-9.].*)?$")
 _STRING = re.compile(rb"([A-Z])[ \t]*=[ \t]*\"[^\"]*\"")
 RUN_LINES = 512
 """Lines of a run in one match."""
@@ -79,6 +80,8 @@ class Line:
     deleted: bool = False
     """The operator may skip it."""
     understood: bool = True
+    unread: bytes = b""
+    """All of it, in capitals, where it is not understood."""
     effects: list[Effect] = field(default_factory=list)
     """Of named words, the ones without any left out."""
     percent: bool = False
@@ -174,7 +177,7 @@ class Text:
         extra = "E" if dialect.one_command else "IJK" if dialect.polar else "IJKR"
         word = rb"(?:[" + (letters + extra).encode() + rb"][ \t]*" + number + rb"[ \t]*)"
         feed = rb"(?:F[ \t]*" + _NUMBER + rb"[ \t]*)?"
-        line_number = rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?"
+        line_number = rb"[ \t]*" + (rb"(?:N[ \t]*[0-9]+[ \t]*)?" if rules.numbered else b"")
         told = sorted({20, 30} & dialect.arcs - dialect.redrawn)
         arcs = b"".join(b"%d" % (code // 10) for code in told)
         code = rb"G" + (rb"0?" if rules.padded else rb"") + rb"[1" + arcs + rb"](?![0-9.])[ \t]*"
@@ -186,9 +189,7 @@ class Text:
         stated = line_number + code + rest
         most = rb"%d}" % RUN_LINES
         if rules.tight:
-            lines, stated = (
-                part.replace(rb"[ \t]*", b" *").replace(rb"N *", b"N") for part in (lines, stated)
-            )
+            lines, stated = (part.replace(rb"[ \t]*", b" *") for part in (lines, stated))
         return (
             re.compile(lines + rb"{4," + most),
             re.compile(stated + lines + rb"{3," + most),
@@ -218,13 +219,11 @@ class Text:
         most = self.dialect.text.characters
         if most and max(map(len, text.split(b"\n"))) > most:
             return None
-        if b"(" in text:
-            text = re.sub(rb"\([^()]*\)", b"", text)
+        text = re.sub(rb"\([^()]*\)", b"", text) if b"(" in text else text
         last: dict[str, float] = {}
         whole = False
         for letter in AXES + "F":
-            place = text.rfind(letter.encode())
-            if place >= 0:
+            if (place := text.rfind(letter.encode())) >= 0:
                 number = _WORD.match(text, place)
                 assert number is not None
                 last[letter] = float(number[2])
@@ -243,31 +242,38 @@ class Text:
         first : bool
             No block stands in front of it.
         """
-        rules, line = self.dialect.text, Line(blank=not text.strip())
+        line = Line(blank=not text.strip())
+        self._take(text, first, line)
+        line.unread = b"" if line.understood else text.upper()
+        return line
+
+    def _take(self, text: bytes, first: bool, line: Line) -> None:
+        """Take what stands in one line."""
+        rules = self.dialect.text
         if rules.klartext:
             said = read_statement(text, self.dialect)
             line.words, line.relative, line.deleted = said.words, said.relative, said.deleted
             line.effects, line.understood = said.effects, said.understood
-            return line
-        if is_cut(text, self.dialect) or self._acts(text):
-            line.understood = False
-            return line
-        text = self._unsaid(text)
+            return
+        line.understood = not (is_cut(text, self.dialect) or self._acts(text))
+        if not line.understood:
+            return
+        text = unsaid(text, self.dialect)
         beside = b"(" in text.partition(b";")[0]
         if self.comments is not None:
             text = self.comments.sub(b"\0", text)
         text = text.strip(b" \0" if rules.tight else b" \t\0")
         if text and self._misspelled(text, beside):
             line.understood = False
-            return line
+            return
         text = text.upper()
         if first and rules.leader and _FILE_NAME.fullmatch(text):
-            return line
+            return
         text = self._mark(text, line)
         if rules.checksum:
             text = _CHECKSUM.sub(b"", text)
         if self._no_words(text, line):
-            return line
+            return
         text = self._blanked(text, line)
         if line.flow is None:
             if rules.blanks == "anywhere":
@@ -276,16 +282,11 @@ class Text:
                 line.words += [("$", float(n), False) for n in _SPINDLE.findall(text)]
                 text = _SPINDLE.sub(b"\0", text)
             self._words(text.replace(b"\0", b" "), line)
-        return line
 
     def _acts(self, text: bytes) -> bool:
         """Whether a comment of a line is, or may be, a command."""
         runs_python = self.python is not None and self.python.search(text) is not None
         return runs_python or (self.dialect.text.live_comments and _runs(text))
-
-    def _unsaid(self, text: bytes) -> bytes:
-        """A line without what M117 shows and M118 sends."""
-        return _SAYING.sub(rb"\1", text) if self.dialect.text.messages else text
 
     def _misspelled(self, text: bytes, beside: bool) -> bool:
         """Whether the control may see other words than stand here; `beside` parentheses."""
@@ -293,6 +294,7 @@ class Text:
         return (
             (beside and rules.parentheses == "lone comment")
             or is_loose(text, self.dialect)
+            or (not rules.numbered and _NUMBERED.match(text) is not None)
             or (rules.capitals and text != text.upper())
             or (not rules.padded and _PADDED.search(text) is not None)
         )

@@ -148,7 +148,7 @@ class PlainLines:
         ends = np.flatnonzero(characters == 10)
         if len(ends) < FEWEST or int(np.diff(ends, prepend=-1).max()) > rules.shortest:
             return None
-        if self.dialect.arcs_refused and NO_FEED.search(text):
+        if self.dialect.feed_needed and NO_FEED.search(text):
             return None
         if rules.klartext:
             text = _FRONT.sub(b"", text).replace(b"R0", b"").replace(b"FMAX", b"G0")

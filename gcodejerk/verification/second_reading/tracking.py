@@ -22,6 +22,7 @@ from gcodejerk.verification.second_reading.known import NEAR, Observation
 from gcodejerk.verification.second_reading.limiting import too_fast
 from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
+from gcodejerk.verification.second_reading.unread import may_begin
 
 _FRAMES: frozenset[Effect] = frozenset(
     {
@@ -176,13 +177,10 @@ class Tracker(Circling):
         # M3 I: a letter without a number is no word
         fires = any(letter == "M" and number in (3, 4) for letter, number, _ in line.words)
         self.habits = self.habits or (fires and not line.understood)
-        if "watch" in line.effects:
-            self.bars["synchronized action"] = True
-        if any(effect in ("transform", "swivel", "modal cycle") for effect in line.effects):
-            self.frames["a named frame"] = None
         self.forget()
-        if not {"corner", "corners"}.isdisjoint(line.effects):
-            self.bars["corners that are cut"] = None
+        frames, bars = may_begin(line.unread, line.effects, self.dialect)
+        self.frames |= dict.fromkeys(frames)
+        self.bars |= bars
         self.bar_for_good(any(self.is_unknown(letter, n) for letter, n, _ in line.words))
         self.strayed = True
         return Observation()
