@@ -263,6 +263,7 @@ def follow(
             first = chunk.data.find(b"\n")
             if first > 0 and chunk.data[first - 1 : first] == b"\r":
                 newline = b"\r\n"
+        reader.runner.look_for_instant(chunk)
         read_chunk(reader, chunk, plain)
         size += len(chunk.data)
         lines += chunk.feeds + (not chunk.data.endswith(b"\n"))

@@ -30,6 +30,9 @@ class ProcessedError(ProgramError):
     """The program carries our stamp: it was processed before."""
 
 
+_ODD = re.compile(r"[^A-Za-z0-9 #&+,./:=_-]")
+"""What some control takes for more than text, in comments too: ``!`` of grbl holds the feed, and
+``%`` ends a program."""
 _SIGNED = re.compile(rb"gcodejerk stamp [ -~]{1,40}?" + SUM_MARK + rb"([0-9a-f]{16})")
 
 
@@ -75,8 +78,6 @@ def stamp_text(machine: Machine, chosen: Sequence[str]) -> bytes:
     """
     text = " ".join((machine.settings_hash, *chosen)).encode()
     digest = hashlib.blake2b(text, digest_size=4).hexdigest()
-    plain = "".join(
-        c if c.isascii() and c.isprintable() and c not in "()" else "?" for c in machine.name
-    )
+    plain = _ODD.sub("-", machine.name)
     head = f"gcodejerk stamp {__version__} {digest}".encode() + SUM_UNKNOWN
     return (head + b" " + plain.encode())[:STAMP_LENGTH].rstrip()

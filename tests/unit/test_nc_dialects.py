@@ -464,3 +464,21 @@ def test_a_tool_length_of_a_mill_shifts_z_alone():
     assert math.isnan(end(b"G0 X5. Y6. Z7.\nG43 H1 Z50. Y1.\n", "fanuc")[0])
     assert math.isnan(end(b"G18 G0 X5. Y6. Z7.\nG43 H1\n", "fanuc")[1])
     assert math.isnan(end(b"G0 X5. Y6. Z7.\nG43 H1\n", "linuxcnc")[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "byte"),
+    [
+        ("G21\n(STOP!)\nG0 X5 (~)\n", 2, "'!'"),
+        ("G21\nG0 X5 ; Öl\n", 2, "byte 0x96 (of a letter?)"),
+        ("G21 (ö, why?)\nG0 X5\n", None, ""),
+    ],
+)
+def test_bytes_that_grbl_takes_out_of_any_line_are_named(text, line, byte):
+    """Its serial port does, whatever line they stand in (grbl/serial.c)."""
+    found = read_program(io.BytesIO(text.encode()), dialect="grbl", start=KNOWN).findings
+    told = [one for one in found if "when it arrives" in one.message]
+    assert [one.line for one in told] == ([line] if line else [])
+    assert all(one.message.startswith(byte) for one in told)
+    others = read_program(io.BytesIO(text.encode()), dialect="linuxcnc", start=KNOWN).findings
+    assert not any("when it arrives" in one.message for one in others)

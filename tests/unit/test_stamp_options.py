@@ -1,6 +1,7 @@
 """Options that `process` was given and that `verify` is not: the stamp tells them."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,12 @@ def test_a_damaged_file_is_refused_under_the_stamps_options_too(run, tmp_path):
 def test_the_profile_is_taken_from_the_stamp_in_python_as_well():
     made = process(PLATE, VMC, profile="shortest")
     assert verify(PLATE, made.output, VMC).ok
+
+
+def test_the_name_in_a_stamp_is_nothing_but_text_to_any_control():
+    """grbl holds the feed at ``!``, Fanuc ends a program at ``%``, in comments too."""
+    named = replace(VMC, name="Öl! #2 %~?;(A)")
+    made = process(PLATE, named).output
+    (stamp,) = [line for line in made.decode("ascii").splitlines() if "stamp" in line]
+    assert stamp.endswith(" -l- #2 -----A-)")
+    assert verify(PLATE, made, named).ok

@@ -40,6 +40,7 @@ RS274 = Dialect(
         characters=GRBL.text.characters,
         digits=GRBL.text.digits,
         number_digits=GRBL.text.number_digits,
+        instant=GRBL.text.instant,
     ),
     groups=grouped(
         {

@@ -46,6 +46,8 @@ class Text:
     """One that begins with a word and a comma may do something: ``(expr, ...)``, but for texts."""
     inner_semicolon: bool = False
     """A ``;`` within parentheses may end the line."""
+    instant: bytes = b""
+    """Bytes that are commands of the control when they arrive, wherever they stand."""
     delete: Literal["first", "numbered", "none"] = "first"
     """A ``/`` skips the block where the operator says so: in front of everything; there or behind
     N, also with a level ``/1`` to ``/9``; an error."""

@@ -18,6 +18,7 @@ from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import EXACT, Row
 from gcodejerk.nc.text.block import Line
+from gcodejerk.nc.text.chunks import Chunk
 from gcodejerk.reasons import Reason
 from gcodejerk.start import Start
 from gcodejerk.units import SECONDS_PER_MINUTE
@@ -52,6 +53,7 @@ class Runner:
         self.limited: Line | None = None
         """The first line that sets a limit too low."""
         self._lost: dict[int, tuple[Line, int]] = {}
+        self._instant = False
         """Line behind which what is in force is unknown -> it, and rapids left alone for that."""
         self.asked_distance: int | None = None
         self.asked_feed_mode: int | None = None
@@ -232,6 +234,24 @@ class Runner:
                 "alone",
             )
         ]
+
+    def look_for_instant(self, chunk: Chunk) -> None:
+        """Name the first byte that the control does not leave to the line in which it stands."""
+        instant = self.dialect.text.instant
+        if self._instant or len(chunk.data.translate(None, instant)) == len(chunk.data):
+            return
+        self._instant = True
+        at = min(place for byte in instant if (place := chunk.data.find(byte)) >= 0)
+        byte = chunk.data[at]
+        told = f"'{byte:c}'" if byte in b"!~" else f"byte 0x{byte:02X}"
+        told += " (of a letter?)" if byte >= 0x80 else ""
+        self.syntax_problems.append(
+            Finding(
+                chunk.line + chunk.data.count(b"\n", 0, at),
+                f"{told} is a command when it arrives (hold, override), in a comment too: "
+                "write it otherwise, or let the sender leave comments out",
+            )
+        )
 
     def add_problem(self, line: Line, problem: str, column: int | None = None) -> None:
         """Note a line that is not understood."""
