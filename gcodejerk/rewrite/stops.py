@@ -11,7 +11,7 @@ is guessed.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 from gcodejerk.emit.sheets import Sheets
@@ -99,7 +99,9 @@ class _Scan:
 
     def __init__(self, program: Program, emitter: Sheets, machine: Machine) -> None:
         self.program, self.emitter = program, emitter
-        self.dialect: Dialect = program.language
+        # A line with a number is run or refused: settings may stand around it either way.
+        text = replace(program.language.text, numbered=True)
+        self.dialect: Dialect = replace(program.language, text=text)
         self.firmware = self.dialect.one_command
         self.own = re.compile(emitter.program_sets.encode(), re.IGNORECASE)
         self.harmless = {one.number.upper() for one in machine.controller_parameters}
