@@ -66,8 +66,6 @@ def check_word(rules: Text, text: bytes, begin: int) -> None:
     begin : int
         Where it stands in its line.
     """
-    if not rules.numbered and text[:1] in b"Nn":
-        raise SyntaxProblem("a block with a number of its own may be no command", begin)
     if rules.number_digits and text[:1] in b"Nn":
         if len(text[1:].translate(None, b" \t")) > rules.number_digits:
             raise SyntaxProblem("a number of a line with more digits than the control takes", begin)

@@ -67,6 +67,11 @@ def _parse_carefully(text: bytes, dialect: Dialect) -> Block:
         mark = len(text)  # nothing is left that was not read as a word
         if line.words or line.names:
             check_comments(rules, text, line.comments)
+        if line.words and line.words[0].letter == "N" and not rules.numbered:
+            raise SyntaxProblem(
+                "with a number of its own it may be no command: post the program without",
+                line.words[0].begin,
+            )
     except SyntaxProblem as found:
         problem, column, rest = found.problem, found.at + 1, line.unread(line.words, mark)
     return Block(
