@@ -41,8 +41,14 @@ GRBL = Dialect(
         characters=79,
         digits=8,  # MAX_INT_DIGITS: 00000012.5 is 12, and 0000000012 is 0 (nuts_bolts.c)
         number_digits=7,  # MAX_LINE_NUMBER 10000000
-        # Feed hold, resume, door, cancel, overrides, coolant (config.h, serial.c).
-        instant=bytes((*b"!~", 0x84, 0x85, *range(0x90, 0x98), *range(0x99, 0x9F), 0xA0, 0xA1)),
+        # Feed hold, resume, door, cancel, overrides, coolant (grbl's config.h, serial.c); grblHAL's
+        # own (grbl.h), macros among them.
+        instant=bytes(
+            (
+                *(*b"!~", *range(0x80, 0x8D), *range(0x90, 0x98), *range(0x99, 0x9F)),
+                *(*range(0xA0, 0xA5), *range(0xB0, 0xB8)),
+            )
+        ),
     ),
     groups=grouped(
         {

@@ -248,7 +248,7 @@ class Runner:
         self.syntax_problems.append(
             Finding(
                 chunk.line + chunk.data.count(b"\n", 0, at),
-                f"{told} is a command when it arrives (hold, override), in a comment too: "
+                f"{told} is a command when it arrives (hold, override, macro), in a comment too: "
                 "write it otherwise, or let the sender leave comments out",
             )
         )
