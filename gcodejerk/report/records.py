@@ -400,9 +400,10 @@ def _positions(rapids: Rapids, position: Any, row: int) -> Record:
 
 def _sum(plans: Plans) -> float:
     """How long all planned moves last together [s]."""
+    planned = plans.planned  # some are left alone behind their design
     if plans.lasting is not None:
-        return float(plans.times.sum())
-    return float(plans.counts.sum()) * plans.machine.interval
+        return float(plans.times[planned].sum())
+    return float(plans.counts[planned].sum()) * plans.machine.interval
 
 
 def _known(value: float) -> float | None:
