@@ -3,7 +3,7 @@
 Sources: Klipper's docs, G-Codes.md; Klipper3d/klipper issue 3911 (``( )`` is no comment). Macros
 have names and may do anything; what they leave behind is unknown. F is one for all moves. A code is
 compared as it is written: ``G00`` is unknown (klippy/gcode.py, _process_commands), and what is not
-known is passed over. Of two N in front of a block, a sender's and the program's, one is its code.
+known is passed over. Behind a sender's N, the program's own is taken for the command.
 So are G2 and G3 without the section [gcode_arcs]. What stands between EXCLUDE_OBJECT_START and
 EXCLUDE_OBJECT_END is left out where the operator says so.
 """

@@ -238,7 +238,9 @@ class Runner:
     def look_for_instant(self, chunk: Chunk) -> None:
         """Name the first byte that the control does not leave to the line in which it stands."""
         instant = self.dialect.text.instant
-        if self._instant or len(chunk.data.translate(None, instant)) == len(chunk.data):
+        if not instant or self._instant:
+            return
+        if len(chunk.data.translate(None, instant)) == len(chunk.data):
             return
         self._instant = True
         at = min(place for byte in instant if (place := chunk.data.find(byte)) >= 0)
