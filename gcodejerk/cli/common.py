@@ -6,7 +6,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -38,9 +38,57 @@ def _profiles() -> list[str]:
     return list(PROFILES)
 
 
+def known_controller(name: str | None) -> str | None:
+    """The name of a controller; a name that none has is wrong usage."""
+    from gcodejerk.emit import controllers, load_controller
+
+    return _known(name, load_controller, controllers())
+
+
+def known_dialect(name: str | None) -> str | None:
+    """The name of a dialect; a name that none has is wrong usage."""
+    from gcodejerk.nc import AUTO, DIALECTS, find_dialect
+
+    return _known(name, find_dialect, (AUTO, *DIALECTS))
+
+
+def known_profile(name: str | None) -> str | None:
+    """The name of a profile; a name that none has is wrong usage."""
+    if name is not None and name not in (choices := _profiles()):
+        raise typer.BadParameter(
+            f"there is no profile {name!r}: choose one of {', '.join(choices)}"
+        )
+    return name
+
+
+def _known(name: str | None, find: Callable[[str], object], known: Collection[str]) -> str | None:
+    """A name, which may be that of an installed package's; what cannot be found is wrong usage."""
+    from gcodejerk.errors import GcodejerkError
+
+    if name is not None and name not in known:
+        try:
+            find(name)
+        except GcodejerkError as error:
+            raise typer.BadParameter(str(error)) from None
+    return name
+
+
+def positive(value: float | None) -> float | None:
+    """A time; one that is not above zero is wrong usage."""
+    if value is not None and not 0.0 < value < float("inf"):
+        raise typer.BadParameter(f"it is {value:g} s, expected more than zero")
+    return value
+
+
 ControllerOption = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="see `gcodejerk controllers`", autocompletion=_controllers),
+    typer.Option(
+        metavar="NAME", help="see `gcodejerk controllers`", autocompletion=_controllers,
+        callback=known_controller,
+    ),
+]  # fmt: skip
+DialectOption = Annotated[
+    str | None, typer.Option(help="how the program is read", callback=known_dialect)
 ]
 MachineOption = Annotated[
     str | None,
@@ -60,6 +108,7 @@ ProfileOption = Annotated[
     typer.Option(
         metavar="NAME",
         autocompletion=_profiles,
+        callback=known_profile,
         help="condition3 (default), symmetric, cascade, optimal, shortest, conventional, "
         "condition1 or 2",
     ),

@@ -88,7 +88,7 @@ def install(
     as_json: JsonOption = False,
 ) -> None:
     """Install what a program needs to call gcodejerk, or take it out again; or say how."""
-    from gcodejerk.hosts.catalogue import HOSTS, Request, host_lines
+    from gcodejerk.hosts.catalogue import ALIASES, HOSTS, Request, host_lines
 
     told = (machine, form, base, remove or None, linuxcnc_version)
     if host is None and any(one is not None for one in told):
@@ -96,6 +96,7 @@ def install(
     if host is None:
         _print(host_lines(), as_json)
         return
+    host = ALIASES.get(host, host)
     if host not in HOSTS:
         raise typer.BadParameter(f"{host}: choose one of {', '.join(HOSTS)}")
     request = Request(host, where, machine, form, base, remove, linuxcnc_version)

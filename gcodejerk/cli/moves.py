@@ -16,6 +16,7 @@ from gcodejerk.cli.common import (
     ProfileOption,
     console,
     load_machine,
+    positive,
     progress,
     waiting,
 )
@@ -38,10 +39,14 @@ def plan(
     ],
     machine: MachineOption = None,
     time: Annotated[
-        float | None, typer.Option(metavar="S", help="T_SUM; the conventional time by default")
+        float | None,
+        typer.Option(
+            metavar="S", help="T_SUM; the conventional time by default", callback=positive
+        ),
     ] = None,
     t1: Annotated[
-        float | None, typer.Option("--T1", metavar="S", help="T1 of a four-segment profile")
+        float | None,
+        typer.Option("--T1", metavar="S", help="T1 of a four-segment profile", callback=positive),
     ] = None,
     profile: ProfileOption = None,
     as_json: Annotated[
@@ -151,6 +156,8 @@ def map_amplitudes(
     from gcodejerk.batch.files import STANDARD, new_file, refuse_clashes
 
     suffix = _suffix_of_map(output, condition, conditions=conditions)
+    if length == 0.0:
+        raise typer.BadParameter("--length 0 is no move: give another, for example --length 1")
     if as_json and output == STANDARD:
         raise typer.BadParameter("--json and -o - are both on standard output: choose one")
     if output is None and (points is not None or longest is not None):
@@ -219,7 +226,9 @@ def compare(
     time: Annotated[
         float | None,
         typer.Option(
-            metavar="S", help="T_SUM of the profiles that keep it; the conventional time by default"
+            metavar="S",
+            callback=positive,
+            help="T_SUM of the profiles that keep it; the conventional time by default",
         ),
     ] = None,
     shaper_damping: Annotated[

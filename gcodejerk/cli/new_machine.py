@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gcodejerk.cli.common import ControllerOption, refuse
+from gcodejerk.cli.common import ControllerOption, DialectOption, refuse
 
 if TYPE_CHECKING:
     from gcodejerk.machine.sources import Draft
@@ -35,7 +35,7 @@ def machine_new(
     ] = "-",
     name: Annotated[str | None, typer.Option(help="what reports call the machine")] = None,
     controller: ControllerOption = None,
-    dialect: Annotated[str | None, typer.Option(help="how programs are read")] = None,
+    dialect: DialectOption = None,
     positioning: Annotated[
         str | None, typer.Option(help="linear: G0 is straight; independent: each axis on its own")
     ] = None,
@@ -81,7 +81,6 @@ def machine_new(
             "name a control's configuration, or state axes: --axis 'X velocity=36m/min "
             "acceleration=0.4g'; questions are asked at a terminal only"
         )
-    _must_be_known(controller, dialect)
     draft = draft_of(files or (), folder)
     draft.name = name or draft.name
     draft.controller = controller or draft.controller
@@ -113,17 +112,6 @@ def _check_output(output: str, force: bool) -> None:
         raise MachineError(
             f"{output} is there already", "give another name, or --force to replace it"
         )
-
-
-def _must_be_known(controller: str | None, dialect: str | None) -> None:
-    """Refuse names of options that nothing bears, before anything is read or asked."""
-    from gcodejerk.emit import load_controller
-    from gcodejerk.nc import AUTO, find_dialect
-
-    if controller is not None:
-        load_controller(controller)
-    if dialect is not None and dialect != AUTO:
-        find_dialect(dialect)
 
 
 def _prove(text: str, name: str, draft: Draft) -> None:

@@ -12,6 +12,7 @@ import typer
 
 from gcodejerk.cli.common import (
     ControllerOption,
+    DialectOption,
     MachineOption,
     ProfileOption,
     console,
@@ -55,7 +56,7 @@ def process(
     controller: ControllerOption = None,
     form: Annotated[str, typer.Option("--as", help="one of the controller's forms")] = "stream",
     profile: ProfileOption = None,
-    dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    dialect: DialectOption = None,
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,
@@ -277,7 +278,7 @@ def inspect(
     file: Annotated[str, typer.Argument(metavar="FILE", help="a program; - is standard input")],
     machine: MachineOption = None,
     profile: ProfileOption = None,
-    dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    dialect: DialectOption = None,
     expand_cycles: Annotated[
         bool, typer.Option("--expand-cycles", help="write drilling cycles out as explicit moves")
     ] = False,

@@ -14,6 +14,7 @@ import typer
 
 from gcodejerk.cli.common import (
     Bar,
+    DialectOption,
     JsonOption,
     MachineOption,
     ProfileOption,
@@ -38,7 +39,7 @@ def verify(
     ],
     machine: MachineOption = None,
     profile: ProfileOption = None,
-    dialect: Annotated[str | None, typer.Option(help="how the program is read")] = None,
+    dialect: DialectOption = None,
     controller: Annotated[
         str | None, typer.Option(metavar="NAME", help="what the streams are written for")
     ] = None,

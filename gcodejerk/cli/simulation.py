@@ -18,7 +18,9 @@ from gcodejerk.cli.common import (
     MachineOption,
     ProfileOption,
     console,
+    known_dialect,
     load_machine,
+    positive,
     progress,
     say,
     waiting,
@@ -45,14 +47,19 @@ def simulate(
     machine: MachineOption = None,
     profile: ProfileOption = None,
     time: Annotated[
-        float | None, typer.Option(metavar="S", help="of a move: T_SUM; today's by default")
+        float | None,
+        typer.Option(metavar="S", help="of a move: T_SUM; today's by default", callback=positive),
     ] = None,
     t1: Annotated[
-        float | None, typer.Option("--T1", metavar="S", help="of a move: T1 of a four-segment one")
+        float | None,
+        typer.Option(
+            "--T1", metavar="S", help="of a move: T1 of a four-segment one", callback=positive
+        ),
     ] = None,
     controller: ControllerOption = None,
     dialect: Annotated[
-        str | None, typer.Option(metavar="NAME", help="of a program: how it is read")
+        str | None,
+        typer.Option(metavar="NAME", help="of a program: how it is read", callback=known_dialect),
     ] = None,
     as_written: Annotated[
         bool,

@@ -10,6 +10,7 @@ import typer
 
 from gcodejerk.cli.common import (
     ControllerOption,
+    DialectOption,
     MachineOption,
     console,
     load_machine,
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 FIGURES = (".png", ".svg", ".pdf")
 LENGTHS = 60
 """Lengths between the two of --lengths."""
+LONGEST = 300.0
+"""Longest rapid that is reckoned with where nothing says how far an axis goes. [mm]"""
 
 
 def parameters(
@@ -43,7 +46,7 @@ def parameters(
     lengths: Annotated[
         str | None,
         typer.Option(metavar="FROM:TO", help="in place of programs: rapids of these lengths [mm] "
-                     "on every axis with a mode"),
+                     "on every axis with a mode; with neither, 1 mm to the longest travel"),
     ] = None,
     goal: Annotated[
         str,
@@ -78,7 +81,7 @@ def parameters(
         bool,
         typer.Option("--no-curve", help="do not search what more or less time would buy: quicker"),
     ] = False,
-    dialect: Annotated[str | None, typer.Option(help="how the programs are read")] = None,
+    dialect: DialectOption = None,
 ) -> None:  # fmt: skip
     """Tune the control's own time constants, jerk limits and shapers for a shop's rapids."""
     from gcodejerk.batch.files import new_file, refuse_clashes
@@ -168,8 +171,8 @@ def _moves(
     from gcodejerk.nc import read_program
     from gcodejerk.parameters import Moves, joined_moves, program_moves
 
-    if lengths is not None:
-        first, last = _range(lengths)
+    if not files:
+        first, last = _travelled(machine) if lengths is None else _range(lengths)
         steps = np.unique(np.geomspace(first, last, LENGTHS).round(3))
         return Moves.of_lengths(steps.tolist(), machine), f"{first:g} to {last:g} mm on each axis"
     found, problems = find_inputs(files, None)
@@ -195,14 +198,14 @@ def _refuse_idle(
     written: list[str],
 ) -> None:
     """Refuse options beside which others do nothing."""
-    alone = lengths is not None and dialect is not None
+    alone = not files and dialect is not None
     beside = "--try shows its numbers beside the others, where standard output is free"
     refuse(
         (
-            bool(files) == (lengths is not None),
-            "give programs, or --lengths FROM:TO such as 1:500, and not both",
+            files and lengths is not None,
+            "programs say what lengths their rapids have: leave --lengths out",
         ),
-        (alone, "--dialect is of programs, and --lengths has none: leave --dialect out"),
+        (alone, "--dialect is of programs, and there are none: leave --dialect out"),
         (own and "-" in written, f"{beside}: leave --try out, or name a file in place of -"),
     )
 
@@ -219,6 +222,13 @@ def _numbers(tried: list[str]) -> dict[str, float]:
         if not equals or not key.strip():
             raise typer.BadParameter(f"--try {text}: give a setting and its number, KEY=NUMBER")
     return out
+
+
+def _travelled(machine: Machine) -> tuple[float, float]:
+    """Lengths of the rapids of a shop that names none: up to the longest travel."""
+    travels = [axis.travel for axis in machine.axes if axis.travel is not None]
+    last = max((high - low for low, high in travels), default=LONGEST)
+    return min(1.0, last / 10.0), last
 
 
 def _range(text: str) -> tuple[float, float]:

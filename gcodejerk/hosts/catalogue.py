@@ -188,4 +188,6 @@ HOSTS: dict[str, Host] = {
         for name in WATCHED
     },
 }
+ALIASES = {"fusion": "fusion360"}
+"""Other names that hosts go by."""
 assert set(TEXTS) | set(WATCHED) | set(SLICERS) < set(HOSTS)

@@ -33,14 +33,14 @@ class Stream(Protocol):
 
 
 def moves(
-    machine: Machine, shortest: float = 0.05, longest: float = 400.0
+    machine: Machine | None = None, shortest: float = 0.05, longest: float = 400.0
 ) -> st.SearchStrategy[dict[str, float]]:
     """Moves of one or more axes of a machine.
 
     Parameters
     ----------
-    machine : Machine
-        Whose axes move.
+    machine : Machine, optional
+        Whose axes move; X, Y and Z where left out.
     shortest, longest : float
         Least and greatest displacement of an axis that moves. [mm] or [deg]
 
@@ -51,8 +51,9 @@ def moves(
     """
     size = st.floats(np.log(shortest), np.log(longest)).map(lambda x: round(float(np.exp(x)), 4))
     length = st.builds(lambda x, sign: x * sign, size, st.sampled_from((-1.0, 1.0)))
-    axes = st.sets(st.sampled_from(machine.axis_names), min_size=1)
-    return axes.flatmap(lambda names: st.fixed_dictionaries({a: length for a in sorted(names)}))
+    names = ("X", "Y", "Z") if machine is None else machine.axis_names
+    axes = st.sets(st.sampled_from(names), min_size=1)
+    return axes.flatmap(lambda some: st.fixed_dictionaries({a: length for a in sorted(some)}))
 
 
 def assert_stream_valid(stream: Stream, machine: Machine) -> None:

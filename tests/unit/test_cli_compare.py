@@ -161,7 +161,7 @@ def test_a_picture_as_pdf(run, tmp_path):
         (("Z=1", "z=2"), 2, "axis Z stands twice"),
         ((), 2, "AXIS=LENGTH"),
         (("Z=1", "--time", "0.01"), 1, "allow at least 0.03 s"),
-        (("Z=1", "--time", "-1"), 1, "expected more than zero"),
+        (("Z=1", "--time", "-1"), 2, "expected more than zero"),
         (("Z=1", "--time", "soon"), 2, "--time"),
         (("Z=1", "--plot", "c.gif"), 2, "a figure is one of .png, .svg, .pdf"),
         (("Z=1", "--plot", "-"), 2, "a figure is one of .png, .svg, .pdf"),

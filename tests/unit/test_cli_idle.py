@@ -51,6 +51,25 @@ IDLE = {
 }
 
 
+WRONG = {
+    "process plate.ngc -m vmc --profile foo": "there is no profile 'foo'",
+    "process plate.ngc -m vmc --controller linuxnc": "did you mean 'linuxcnc'?",
+    "process plate.ngc -m vmc --dialect fanucc": "did you mean fanuc?",
+    "inspect plate.ngc -m vmc --dialect foo": "dialect 'foo' is not known",
+    "simulate plate.ngc -m vmc --profile foo": "there is no profile 'foo'",
+    "simulate plate.ngc -m vmc --dialect foo": "dialect 'foo' is not known",
+    "verify plate.ngc plate.ngc -m vmc --dialect foo": "dialect 'foo' is not known",
+    "parameters plate.ngc -m vmc --controller foo": "there is no controller 'foo'",
+    "machine new config/printer.cfg --controller foo": "there is no controller 'foo'",
+    "plan -m vmc Z=1 --profile foo": "there is no profile 'foo'",
+    "plan -m vmc Z=1 --time -1": "expected more than zero",
+    "plan -m vmc Z=1 --T1 0": "expected more than zero",
+    "compare -m vmc Z=1 --time 0": "expected more than zero",
+    "simulate Z=1 -m vmc --time nan": "expected more than zero",
+    "map -m vmc --axis Z --length 0": "--length 0 is no move",
+}
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -64,6 +83,14 @@ def folder(tmp_path, monkeypatch):
 
 def call(text, **given):
     return CliRunner().invoke(cli.app, text.split(), **given)
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_value_that_no_machine_could_take_is_wrong_usage(folder, text):
+    done = call(text)
+    said = re.sub(r"\s+", " ", done.output.replace("│", " "))
+    assert done.exit_code == 2, said
+    assert WRONG[text] in said
 
 
 @pytest.mark.parametrize("text", IDLE)

@@ -254,7 +254,7 @@ def test_a_name_that_nothing_has_is_said_before_a_program_is_processed(
     command, tmp_path, key, option
 ):
     code, out = command("machine", "new", "--axis", AXIS, f"--{key}", option, "-o", "m.yaml")
-    assert code == 1
+    assert code == 2
     assert "did you mean" in out
     assert not (tmp_path / "m.yaml").exists()
     (tmp_path / "n.yaml").write_text(

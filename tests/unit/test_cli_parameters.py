@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from gcodejerk.cli import app
 from gcodejerk.errors import GcodejerkError
+from gcodejerk.machine import Machine, find_machine
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 PLATE = str(SAMPLES / "plate.ngc")
@@ -53,6 +54,20 @@ def test_sheet_and_json(tmp_path):
     assert len(found["robustness"]["chosen"]) == len(found["robustness"]["frequency_error"])
 
 
+def test_without_programs_it_is_tuned_up_to_the_longest_travel(tmp_path):
+    given, own = tmp_path / "given.json", tmp_path / "own.json"
+    asked = ("-m", "vmc33", "--controller", "grbl", "--no-curve", "--json")
+    assert run(*asked, own).exit_code == 0
+    travels = [axis.travel for axis in Machine.load(find_machine("vmc33")).axes if axis.travel]
+    longest = max(high - low for low, high in travels)
+    assert longest > 1.0
+    assert run("--lengths", f"1:{longest}", *asked, given).exit_code == 0
+    assert own.read_bytes() == given.read_bytes()
+    done = run(PLATE, "--lengths", "1:5", *asked, "-")
+    assert done.exit_code == 2
+    assert "leave --lengths out" in done.output
+
+
 def test_standard_output_takes_the_sheet_alone():
     done = run("--lengths", "5:50", "-m", "paper", "--controller", "grbl", "-o", "-")
     assert done.exit_code == 0
@@ -88,7 +103,6 @@ def test_numbers_of_the_users_are_tried():
         ((PLATE, "-m", "vmc", "--controller", "haas"), "nothing is known that could be set"),
         ((PLATE, "-m", "vmc", "--controller", "twincat"), "axes.X.rapid.jerk"),
         ((PLATE, "-m", "vmc", "--controller", "fanuc", "--settings", "x"), "it has: constant-acc"),
-        ((PLATE, "-m", "vmc", "--controller", "none"), "there is no controller"),
         (("absent.nc", "-m", "vmc"), "absent.nc"),
     ],
 )
@@ -108,7 +122,6 @@ def test_program_without_rapids_writes_nothing(tmp_path):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("-m", "vmc"),
         (PLATE, "--lengths", "1:2", "-m", "vmc"),
         ("--lengths", "5", "-m", "vmc"),
         ("--lengths", "9:1", "-m", "vmc"),

@@ -46,6 +46,12 @@ def test_each_host_names_this_command_and_the_machine(command, tmp_path, host):
     assert command("install", host, "-m", tmp_path / "none.yaml")[0] == 1
 
 
+def test_a_host_goes_by_its_short_name_too(command):
+    status, said = command("install", "fusion", "--machine", "vmc")
+    assert status == 0
+    assert (status, said) == command("install", "fusion360", "--machine", "vmc")
+
+
 def machine_file():
     from gcodejerk.machine import find_machine
 
