@@ -49,6 +49,35 @@ def test_every_damage_is_listed_with_its_line(run, processed):
     assert (code, "1 or more violations" in out) == (1, True)
 
 
+def test_the_walk_goes_on_behind_lines_that_were_changed_lost_and_added(run, processed):
+    """Of every kind, in one file, and a rapid's block, and a stream that is none any more."""
+    lines = processed.read_bytes().split(b"\n")
+    starts = [k for k, line in enumerate(lines) if line.startswith(b"(gcodejerk: ")]
+    kept = [k for k, line in enumerate(lines) if line.startswith(b"N")]
+    damaged = {
+        starts[1] + 5: b"G1 nonsense",  # within a stream
+        kept[3]: b"N1 (changed)",
+        kept[7]: b"(added)\n" + lines[kept[7]],
+        starts[-2] + 6: b"G2 X1",
+        kept[-2]: None,
+    }
+    for k in sorted(damaged, reverse=True):
+        lines[k : k + 1] = [] if damaged[k] is None else damaged[k].split(b"\n")
+    processed.write_bytes(b"\n".join(lines))
+    code, out = run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "vmc")
+    assert code == 1
+    listed = {
+        int(line.split(":")[1])
+        for line in out.splitlines()
+        if line.startswith("plate.jerk.ngc:") and line.split(":")[1].isdigit()
+    }
+    moved = sum(1 for k in damaged if damaged[k] is not None and b"\n" in damaged[k])
+    for k in damaged:
+        at = k + 1 + moved * (k > kept[7])
+        assert at in listed or at + 1 in listed, (at, out)
+    assert len(listed) <= 2 * len(damaged), out
+
+
 def test_another_machines_limits_are_not_kept(run, processed):
     assert run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "router")[0] == 1
 

@@ -1,8 +1,9 @@
 """Both files in step: what was kept, what was replaced, and nothing else.
 
 Rule: the original leads. Up to each rapid that may be replaced the processed file must go on with
-the very bytes of the original; there it either keeps the block or holds a stream; where neither is
-the case, the walk ends with a violation, since everything behind would be guesswork.
+the very bytes of the original; there it either keeps the block or holds a stream. Where neither is
+the case, that is a violation, and the walk goes on where both files agree again, so that every
+violation is listed; where they do not within reach, it ends.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ from gcodejerk.verification.bytes.form import LINE_ENDS, Stream, StreamReader
 from gcodejerk.verification.bytes.guarded_form import GuardedReader
 from gcodejerk.verification.bytes.proven import Key, Proven, Reported
 from gcodejerk.verification.bytes.recognised import Recognised
+from gcodejerk.verification.bytes.resumption import TRACES, pass_changed, pass_stream
 from gcodejerk.verification.bytes.source import Window, skip_common
 from gcodejerk.verification.bytes.states import States
 from gcodejerk.verification.findings import Findings, Kind
 
 _STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
-_TRACES = (b"(gcodejerk: ", b"; gcodejerk: ", b"G1 ", b"G4 P", b"M400", b"M6")
+_TRACES = (*TRACES, b"G1 ", b"G4 P", b"M400", b"M6")
 """How a stream may begin."""
 AT_ONCE = 4096
 """Rapids of which plain lists are made."""
@@ -114,12 +116,15 @@ class Alignment:
                 self.kept += 1
             elif not self._proven(i, block):
                 text = block[: end - begin]
+                tried = self.processed.peek_line().startswith(_TRACES)
                 stream = self._read(i, block, text)
-                if stream is None:
+                if stream is not None or tried:
+                    self.replaced.append(i)
+                if stream is not None:
+                    self.block = text
+                    yield stream
+                elif self.found.full or not pass_stream(self.original, self.processed, len(block)):
                     return
-                self.replaced.append(i)
-                self.block = text
-                yield stream
             self.original.skip(len(block))
             self.at += len(block)
         if self._same(None):
@@ -223,7 +228,10 @@ class Alignment:
         return head is not None
 
     def _same(self, size: int | None) -> bool:
-        """Pass this many bytes of the original, all the rest for None; whether they are kept."""
+        """Pass this many bytes of the original, all the rest for None.
+
+        Whether they were passed: what is not kept there is complained of.
+        """
         if self._stamp_at is not None and (size is None or self._stamp_at <= self.at + size):
             first = self._stamp_at - self.at
             self._stamp_at = None
@@ -231,11 +239,14 @@ class Alignment:
                 return False
             self._stamp()
             size = None if size is None else size - first
-        before = self.processed.line
-        lines = skip_common(self.original, self.processed, size)
-        if lines is None:
+        before, begin = self.processed.line, self.original.passes
+        left = size
+        while (lines := skip_common(self.original, self.processed, left)) is None:
             self._different()
-            return False
+            left = None if size is None else size - (self.original.passes - begin)
+            if self.found.full or not pass_changed(self.original, self.processed, left):
+                return False
+            left = None if size is None else size - (self.original.passes - begin)
         self.kept += lines
         if size is None:
             self.kept += bool(self.program.lines > self.original.line - 1)

@@ -20,7 +20,18 @@ _SUM = re.compile(rb"gcodejerk stamp [ -~]{1,40}? sum:([0-9a-f]{16})")
 class Window:
     """A place in a file, with what follows it."""
 
-    __slots__ = ("_begun", "_digest", "_ended", "at", "claimed", "data", "file", "line", "passed")
+    __slots__ = (
+        "_begun",
+        "_digest",
+        "_ended",
+        "at",
+        "claimed",
+        "data",
+        "file",
+        "line",
+        "passed",
+        "passes",
+    )
 
     def __init__(self, file: BinaryIO) -> None:
         self.file = file
@@ -29,6 +40,8 @@ class Window:
         self.at = 0
         self.line = 1
         """Number of the line that the place is in."""
+        self.passes = 0
+        """Bytes that were passed."""
         self._ended = False
         self._digest = hashlib.blake2b(digest_size=8)
         self._begun = False
@@ -78,6 +91,7 @@ class Window:
         if self.passed is not None:
             self.passed.append(self.data[self.at : self.at + size])
         self.at += size
+        self.passes += size
 
     def take(self, size: int) -> bytes:
         """Take the next bytes."""
