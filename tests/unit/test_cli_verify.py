@@ -78,6 +78,17 @@ def test_the_walk_goes_on_behind_lines_that_were_changed_lost_and_added(run, pro
     assert len(listed) <= 2 * len(damaged), out
 
 
+def test_what_differs_is_shown_where_it_stands_far_to_the_right(run, processed):
+    lines = (SAMPLES / "plate.ngc").read_bytes().split(b"\n")
+    comment = next(line for line in lines if len(line) > 70)
+    processed.write_bytes(processed.read_bytes().replace(comment, comment + b" G91", 1))
+    code, out = run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "vmc")
+    end = comment[-15:].decode()
+    assert code == 1
+    assert f"{end}' as in the original, found '..." in out
+    assert f"{end} G91'" in out
+
+
 def test_another_machines_limits_are_not_kept(run, processed):
     assert run("verify", "plate.ngc", "plate.jerk.ngc", "-m", "router")[0] == 1
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
+from itertools import takewhile
 
 import numpy as np
 
@@ -281,7 +282,7 @@ class Alignment:
     def _different(self) -> None:
         """Say how the files differ where they stand."""
         mine, theirs = self.original.peek_line(), self.processed.peek_line()
-        shown = [line[:60].rstrip(b"\r\n").decode("latin-1") for line in (mine, theirs)]
+        shown = _shown(mine, theirs)
         rapids = self.program.rapids
         at = int(np.searchsorted(rapids.line, self.original.line))
         left = at < len(rapids) and rapids.line[at] == self.original.line
@@ -324,3 +325,12 @@ class Alignment:
     def _complain(self, kind: Kind, problem: str) -> None:
         line = None if self.original.ended else self.original.line
         self.found.add(kind, self.processed.line, line, problem)
+
+
+def _shown(one: bytes, other: bytes) -> list[str]:
+    """Lines as messages quote them: from somewhat in front of where they begin to differ."""
+    alike = takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False))
+    same = sum(1 for _ in alike)
+    begin = same - 20 if same > 40 else 0
+    cut = [line[begin : begin + 60].rstrip(b"\r\n").decode("latin-1") for line in (one, other)]
+    return [f"...{part}" if begin else part for part in cut]
