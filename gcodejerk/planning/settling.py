@@ -11,7 +11,7 @@ are; what is not known is counted, never taken for zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from gcodejerk.motion import Profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.arrival import arrival_response
-from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, same_rows
+from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length, same_rows
 from gcodejerk.planning.task import Task
 from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.storage import Growing, column, windows
@@ -31,7 +31,7 @@ KNOWN = tuple(
     for reason in (
         Reason.BLOCK_DELETE, Reason.MIXED_AXES, Reason.OTHER_WORDS, Reason.FEED_UNKNOWN,
         Reason.TOO_SHORT, Reason.TOO_LONG, Reason.LIMITS, Reason.NOT_BETTER, Reason.NO_MODE,
-        Reason.NO_BLENDING, Reason.CONTROL_SET,
+        Reason.NO_BLENDING, Reason.CONTROL_SET, Reason.NOT_PLAYED,
     )
 )  # fmt: skip
 """Reasons of rapids that run once, on a straight line from their start to their end."""
@@ -52,11 +52,18 @@ class Left:
         Conventional time, 0 where planned or not known. [s]
     unknown : ndarray of bool, shape (n,)
         Left alone, and what it leaves cannot be computed.
+    length : ndarray, shape (n,)
+        Of the way, 0 where planned or not known. [mm] or [deg]
     """
 
     residual: Array
     time: Array
     unknown: NDArray[np.bool_]
+    length: Array
+
+    def of(self, rows: NDArray[np.int64]) -> Left:
+        """The same of some rapids."""
+        return Left(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
 def left_alone(rapids: Rapids, plans: Plans) -> Left:
@@ -76,6 +83,7 @@ def left_alone(rapids: Rapids, plans: Plans) -> Left:
     modes = plans.modes
     residual: Array = np.broadcast_to(np.nan, (len(plans), len(modes.poles)))
     time: Array = np.broadcast_to(0.0, len(plans))
+    length = time
     unknown = np.zeros(len(plans), dtype=np.bool_)
     rows_, moved_ = Growing(np.int64), Growing(np.float64, width=len(AXES))
     for part in windows(len(plans)):
@@ -87,12 +95,14 @@ def left_alone(rapids: Rapids, plans: Plans) -> Left:
         moved_.extend(ways[certain])
     rows, moved = rows_.finish(), moved_.finish()
     if len(rows):
-        residual, time = column(residual.shape, np.nan), column(len(plans), 0.0)
+        residual = column(residual.shape, np.nan)
+        time, length = column(len(plans), 0.0), column(len(plans), 0.0)
         first, like = same_rows(moved, rapids.lone[rows])
         left, lasts = _today(plans, moved[first], rapids.lone[rows[first]])
         for part in windows(len(rows)):
             residual[rows[part]], time[rows[part]] = left[like[part]], lasts[like[part]]
-    return Left(residual, time, unknown)
+            length[rows[part]] = path_length(moved[part], plans.machine)
+    return Left(residual, time, unknown, length)
 
 
 def known_moves(rapids: Rapids, plans: Plans, rows: NDArray[np.int64]) -> Array:

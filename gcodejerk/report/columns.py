@@ -22,6 +22,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.planning.plans import Plans
+from gcodejerk.planning.settling import Left
 from gcodejerk.report.records import Record, Records, place_record, process_head
 from gcodejerk.rewrite.result import Result
 from gcodejerk.storage import release
@@ -94,16 +95,17 @@ def _motions(
     result: Result, rows: NDArray[np.int64], limit: Array | None, known: dict[bytes, bytes]
 ) -> list[bytes]:
     """What was made of some rapids, as text; of those that have one plan, once."""
-    plans = result.plans.repeated(rows)
+    plans, rest = result.plans.repeated(rows), result.rest.of(rows)
     records = Records(
         plans,
         result.residual[rows],
         result.conventional_residual[rows],
         None if limit is None else limit[rows],
         result.deviation[rows],
+        rest,
     )
     out = []
-    for row, key in enumerate(_keys(plans, records)):
+    for row, key in enumerate(_keys(plans, records, rest)):
         text = known.get(key)
         if text is None:
             if len(known) >= REMEMBERED:
@@ -113,12 +115,13 @@ def _motions(
     return out
 
 
-def _keys(plans: Plans, records: Records) -> list[bytes]:
+def _keys(plans: Plans, records: Records, rest: Left) -> list[bytes]:
     """All that the record of each move is made of."""
     columns = [
         plans.reason, plans.displacement, plans.length, plans.conventional_time, plans.counts,
         plans.times, records.residual, records.conventional, records.acceleration,
         records.conventional_acceleration, records.extension, records.limit, records.deviation,
+        rest.length, rest.time,
     ]  # fmt: skip
     matrix = np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])
     numbers = memoryview(np.ascontiguousarray(matrix).tobytes())

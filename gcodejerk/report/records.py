@@ -146,12 +146,15 @@ class Records:
         """Status, times, segments, peaks and residuals of one move."""
         plans = self.plans
         planned = bool(plans.planned[row])
+        length, usual = plans.length[row], plans.conventional_time[row]
+        if not planned and self.rest is not None:
+            length, usual = self.rest.length[row], self.rest.time[row]
         record: Record = {
             "status": "planned" if planned else "left",
             "reason": None if planned else str(REASONS[plans.reason[row]]),
-            "length": number(float(plans.length[row])) if plans.length[row] > 0.0 else None,
+            "length": number(float(length)) or None,
             "time": None,
-            "conventional_time": number(float(plans.conventional_time[row])) or None,
+            "conventional_time": number(float(usual)) or None,
             "extension": None,
             "profile": None,
             "segments": None,
@@ -308,6 +311,7 @@ def process_record(
         result.conventional_residual,
         limit,
         result.deviation,
+        result.rest,
     )
     rapids = result.program.rapids
     rows = [
