@@ -7,7 +7,7 @@ thing here: a profile has a *share*, the displacement of every axis that it carr
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,6 +25,8 @@ from gcodejerk.storage import gathered, kept, windows
 
 STANDSTILL = 1e-9
 """An axis that moves less than this does not move [mm] or [deg]."""
+MIXING = np.uint64(0x9E3779B97F4A7C15)
+"""An odd number, 2^64 over the golden ratio: multiplied by it, all bits change many others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -276,29 +278,49 @@ def same_rows(*columns: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray
     >>> first.tolist(), like.tolist()
     ([0, 1, 3], [0, 1, 0, 2])
     """
-    return sorted_rows(columns, len(columns[0]))
+    return sorted_rows(lambda: columns, len(columns[0]))
 
 
 def sorted_rows(
-    columns: Iterable[NDArray[np.generic]], count: int
+    columns: Callable[[], Iterable[NDArray[np.generic]]], count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The same of columns that are made one by one, each of `count` rows."""
-    like = np.zeros(count, dtype=np.int64)
-    sorts = min(count, 1)
-    for column in columns if count else ():
+    """The same of columns that are made one by one, each of `count` rows, as often as asked."""
+    if not count:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    like, first = _sorts(_mixed(columns(), count))
+    # What is mixed may agree by chance: what is told apart here, each column has to confirm.
+    for column in columns():
         for values in _words(column):
-            if (values == values[0]).all():
+            if (values == values[first][like]).all():
                 continue
             found, own = np.unique(values, return_inverse=True)
             # Two counts below 2^31 each: their product is exact.
-            found, like = np.unique(like * len(found) + own.reshape(-1), return_inverse=True)
-            like, sorts = like.reshape(-1), len(found)
-    first = np.empty(sorts, dtype=np.int64)
-    first[like[::-1]] = np.arange(count)[::-1]
+            like, first = _sorts(like * len(found) + own.reshape(-1))
     order = np.argsort(first)
-    rank = np.empty(sorts, dtype=np.int64)
-    rank[order] = np.arange(sorts)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[order] = np.arange(len(first))
     return first[order], rank[like]
+
+
+def _mixed(columns: Iterable[NDArray[np.generic]], count: int) -> NDArray[np.uint64]:
+    """A number for each row that is the same where all columns are, and hardly elsewhere."""
+    out = np.zeros(count, dtype=np.uint64)
+    for column in columns:
+        for values in _words(column):
+            if (values != values[0]).any():
+                out ^= values
+                out *= MIXING
+                out ^= out >> np.uint64(32)
+    return out
+
+
+def _sorts(values: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The sort of each value, and where the first of each sort stands."""
+    found, like = np.unique(values, return_inverse=True)
+    like = like.reshape(-1)
+    first = np.empty(len(found), dtype=np.int64)
+    first[like[::-1]] = np.arange(len(like))[::-1]
+    return like, first
 
 
 def _words(column: NDArray[np.generic]) -> Iterator[NDArray[np.unsignedinteger[Any]]]:

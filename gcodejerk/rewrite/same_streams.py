@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.batch import NumberFormat
-from gcodejerk.planning.plans import Plans, sorted_rows
+from gcodejerk.planning.plans import Plans, same_rows, sorted_rows
 from gcodejerk.storage import column, gathered, kept, windows
 
 PLACES = ("line", "begin", "end", "start", "target", "offset", "reason")
@@ -68,7 +68,7 @@ def same_streams(
         follows &= ~rapids.entered[here]
         behind[part] = np.where(follows, like[before], -1)
     blocks = _digests(rapids, moves, source)
-    first, like = sorted_rows((like, behind, blocks), len(moves))
+    first, like = same_rows(like, behind, blocks)
     own = np.arange(len(plans))
     own[moves] = moves[_kept(first, like, gathered(plans.counts, moves) // stride)]
     return kept(own) if (own[moves] != moves).any() else None
@@ -78,7 +78,7 @@ def _ways(
     plans: Plans, rapids: Rapids, number_format: NumberFormat, moves: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Sorts of moves that go the same way in the same modes, as `same_rows` has them."""
-    return sorted_rows(_columns(plans, rapids, number_format, moves), len(moves))
+    return sorted_rows(lambda: _columns(plans, rapids, number_format, moves), len(moves))
 
 
 def _columns(

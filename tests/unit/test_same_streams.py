@@ -9,7 +9,7 @@ from gcodejerk import Machine, find_machine, process, verify
 from gcodejerk.emit import load_controller
 from gcodejerk.motion.profiles.repeated import RepeatedProfiles
 from gcodejerk.nc import read_program
-from gcodejerk.planning.plans import same_rows
+from gcodejerk.planning.plans import MIXING, same_rows
 from gcodejerk.planning.rapids import plan_rapids
 from gcodejerk.planning.stream import make_streams
 from gcodejerk.reasons import REASONS, Reason
@@ -137,7 +137,10 @@ def test_an_emitter_that_writes_more_than_the_key_holds_makes_each():
     assert not load_controller("linuxcnc-hal").repeats
 
 
-def test_sorts_of_rows_are_those_of_their_bits():
+@pytest.mark.parametrize("mixing", [MIXING, np.uint64(0)])
+def test_sorts_of_rows_are_those_of_their_bits(mixing, monkeypatch):
+    """Also where all rows look alike at first sight, as they do when multiplied by 0."""
+    monkeypatch.setattr("gcodejerk.planning.plans.MIXING", mixing)
     rng = np.random.default_rng(3)
     columns = (
         rng.integers(0, 3, (200, 2)).astype(float) * rng.choice([1.0, -1.0, np.nan], (200, 2)),
