@@ -30,6 +30,8 @@ SHARED = Path(__file__).resolve().parents[2].parent / "shared"
         (b"; FLAVOR:Marlin\nG0 X1\n", "marlin"),
         (b"%_N_PART_MPF\n;$PATH=/_N_MPF_DIR\nG0 X1\n", "siemens"),
         (b'N30 MSG("ROUGH")\nG0 X1\n', "siemens"),
+        (b"N10 G40 G17 G90\nN20 G3 X-22.3 Y19.7 CR=4. F250\nN30 G0 Z5\n", "siemens"),
+        (b"N10 G90\nN20 G0 X=IC(5) Y20\n", "siemens"),
         (b"%PART G71 *\nN10 G00 X+1*\n", "heidenhain-iso"),
         (b"N10 G00 X+1*\nN20 G15 H30 R5*\n", "heidenhain-iso"),  # an arc around a pole
         (b"%\nO1000 (HAAS VF2)\nG0 X1.\n", "haas"),

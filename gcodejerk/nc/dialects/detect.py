@@ -75,6 +75,10 @@ CODE = (
     _code("siemens", rb"(?<![A-Z_])(DIAMON|DIAMOF|DIAM90|A?TRANS|AROT|GOTOF|GOTOB|SUPA|LIMS)\b",
           "a Siemens word"),
     _code("siemens", rb"^\s*DEF\s+(REAL|INT|BOOL|STRING)", "a Siemens declaration"),
+    # Programming manual 12/2019 (6FC5398-2EP40-0BA0), p. 192
+    _code("siemens", rb"(?<![A-Z_])[CA]R\s*=\s*[-+.\d]", "the radius CR= of an arc", sure=False),
+    _code("siemens", rb"(?<![A-Z_])[A-Z]\d*\s*=\s*(AC|IC|DC|ACP|ACN)\b", "a place X=IC( )",
+          sure=False),  # its brackets look like a comment, and are out of the code
     _code("siemens", rb"(?<![A-Z_])G(64[1-5]|50[5-9]|5[1-9]\d)\b", "a Siemens G code", sure=False),
     _code("heidenhain-iso", rb"^\s*%\S+\s+G7[01]\s*\*", "a program head %NAME G71 *"),
     _code("heidenhain-iso", rb"^\s*N?\d*\s*G[0-9].*\*\s*$", "blocks that end with *", sure=False),
