@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from gcodejerk._version import __version__
-from gcodejerk.emit import load_controller
+from gcodejerk.emit import controller_of
 from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import Machine
 from gcodejerk.rewrite.pipeline import Settings
@@ -77,7 +77,7 @@ def _is_of(source: str, output: str, machine: Machine, settings: Settings) -> bo
 
 def _hash(machine: Machine, settings: Settings) -> str:
     """What the stamp would hold."""
-    emitter = load_controller(settings.controller or machine.controller)
+    emitter = controller_of(machine, settings.controller)
     form = settings.form if settings.form == PARAMETERS else emitter.in_form(settings.form).form
     return choices_hash(
         machine.settings_hash,

@@ -69,9 +69,8 @@ def _unknown_names(described: Machine) -> list[MachineError]:
         try:
             load(name)
         except GcodejerkError as error:
-            found.append(
-                MachineError(f"{key}: {error.problem}", error.remedy, Place(described.source))
-            )
+            place = described.named_at.get(key, Place(described.source))
+            found.append(MachineError(f"{key}: {error.problem}", error.remedy, place))
     return found
 
 

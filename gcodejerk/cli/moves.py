@@ -65,7 +65,7 @@ def plan(
 ) -> None:
     """Plan one move: its profile, peaks and residuals, the conventional ones beside it."""
     from gcodejerk.batch.files import new_file, refuse_clashes
-    from gcodejerk.emit import load_controller
+    from gcodejerk.emit import controller_of
     from gcodejerk.planning.lines import Play
     from gcodejerk.planning.move import not_planned, plan_move
     from gcodejerk.report.move_record import conventional_motion, move_record, stream_csv
@@ -74,7 +74,7 @@ def plan(
 
     described = load_machine(machine)
     refuse_clashes([csv, as_json, plot], [described.source])
-    emitter = load_controller(described.controller)
+    emitter = controller_of(described)
     # LinuxCNC follows the profile between the points: judged at every interval, like a table.
     held = emitter.play is Play.HELD
     move = displacement_of(moves)

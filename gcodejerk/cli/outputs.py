@@ -16,7 +16,7 @@ from gcodejerk.batch.inputs import (
     report_name,
 )
 from gcodejerk.batch.jobs import Job
-from gcodejerk.emit import load_controller
+from gcodejerk.emit import controller_of
 from gcodejerk.machine import Machine
 from gcodejerk.report.page import SUFFIX
 from gcodejerk.rewrite.control_settings import PARAMETERS
@@ -95,7 +95,7 @@ class Outputs:
         self, found: list[Input], machine: Machine, settings: Settings, *, mode: str, strict: bool
     ) -> list[Job]:
         """One job for each program; two outputs of one name are wrong usage."""
-        emitter = load_controller(settings.controller or machine.controller)
+        emitter = controller_of(machine, settings.controller)
         suffix, beside = emitter.suffix, emitter.beside
         if settings.form == PARAMETERS and settings.profile is not None:
             raise typer.BadParameter(

@@ -147,7 +147,7 @@ def _move(
     written: bool,
 ) -> None:
     """Simulate one move."""
-    from gcodejerk.emit import load_controller
+    from gcodejerk.emit import controller_of
     from gcodejerk.planning.move import plan_move
     from gcodejerk.report.simulation_figure import plot_move_simulation
     from gcodejerk.report.simulation_record import move_simulation_csv, move_simulation_record
@@ -156,7 +156,7 @@ def _move(
 
     played: dict[str, Any] = {}
     if written:
-        emitter = load_controller(machine.controller)
+        emitter = controller_of(machine)
         played = {"stride": emitter.stride(machine.interval), "play": _played(emitter)}
     move = displacement_of(moves)
     with waiting("simulating"):

@@ -85,7 +85,7 @@ def parameters(
 ) -> None:  # fmt: skip
     """Tune the control's own time constants, jerk limits and shapers for a shop's rapids."""
     from gcodejerk.batch.files import new_file, refuse_clashes
-    from gcodejerk.emit import load_controller
+    from gcodejerk.emit import controller_of
     from gcodejerk.emit.sheets import Sheets
     from gcodejerk.errors import EmitError
     from gcodejerk.parameters import GOALS, tune
@@ -100,7 +100,7 @@ def parameters(
     programs = files or []
     described = load_machine(machine, programs)
     refuse_clashes(written, [described.source, *programs])
-    emitter = load_controller(controller or described.controller)
+    emitter = controller_of(described, controller)
     if not isinstance(emitter, Sheets):
         raise EmitError(
             f"controller {emitter.name}: nothing is known that could be set in it",

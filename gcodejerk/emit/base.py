@@ -251,6 +251,32 @@ def controllers() -> Mapping[str, EntryPoint]:
     return MappingProxyType({entry.name: entry for entry in entry_points(group=GROUP)})
 
 
+def controller_of(machine: Machine, chosen: str | None = None) -> Controller:
+    """Load the emitter that was chosen, or the machine file's own.
+
+    Parameters
+    ----------
+    machine : Machine
+        Names one.
+    chosen : str, optional
+        Instead of it.
+
+    Returns
+    -------
+    Controller
+
+    Raises
+    ------
+    EmitError
+        As `load_controller`; with its place where the machine file names it.
+    """
+    try:
+        return load_controller(chosen or machine.controller)
+    except EmitError as error:
+        error.place = None if chosen else machine.named_at.get("controller")
+        raise
+
+
 def load_controller(name: str) -> Controller:
     """Load an emitter.
 

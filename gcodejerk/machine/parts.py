@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from gcodejerk.errors import MachineError
+from gcodejerk.errors import MachineError, Place
 from gcodejerk.machine.drives import Servo, Structure
 from gcodejerk.machine.subprograms import Subprograms
 from gcodejerk.start import CycleSettings, RapidFeed
@@ -380,6 +380,8 @@ class Description:
     """The file, as it was named."""
     warnings: tuple[MachineError, ...] = field(default=(), compare=False, repr=False)
     """What the file says that is possible, but hardly meant; each with its place."""
+    named_at: Mapping[str, Place] = field(default_factory=dict, compare=False, repr=False)
+    """Where the file names what need not be there: `controller` and `dialect`."""
 
     @property
     def axis_names(self) -> tuple[str, ...]:

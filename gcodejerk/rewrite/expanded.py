@@ -27,6 +27,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import Program, Rapids
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.line_map import Chain, Lines
+from gcodejerk.rewrite.language import dialect_of
 from gcodejerk.start import Start
 from gcodejerk.storage import made
 from gcodejerk.unrolling.unrolling import Unrolling, unroll
@@ -164,7 +165,7 @@ def written_out(
     EmitError
         There are subprograms in other files, whose cycles would stay.
     """
-    names, language = (name, f"the output for {name}"), dialect or machine.dialect
+    names, language = (name, f"the output for {name}"), dialect_of(machine, dialect)
     chosen = Chosen(name, language, machine.program_start(), comments)
     with contextlib.ExitStack() as files:
         used, unrolling, expansion = source, None, None

@@ -17,7 +17,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.emit import Controller, Options, load_controller
+from gcodejerk.emit import Controller, Options, controller_of
 from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
@@ -42,6 +42,7 @@ from gcodejerk.rewrite.expanded import (
 )
 from gcodejerk.rewrite.feed_moves import instead_notes
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
+from gcodejerk.rewrite.language import dialect_of
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
 from gcodejerk.rewrite.rapid_feed import check_dialect, check_rapid_feed
 from gcodejerk.rewrite.result import ReportedProfiles, Result
@@ -188,7 +189,7 @@ def process_file(
     Result
         Without `output` and `beside`.
     """
-    emitter = load_controller(settings.controller or machine.controller)
+    emitter = controller_of(machine, settings.controller)
     check_rapid_feed(machine, emitter, form=settings.form, cycles=settings.expand_cycles)
     if settings.form == PARAMETERS:
         return _set(source, target, machine, settings, name, emitter, progress or silent)
@@ -348,7 +349,7 @@ def _read(
     program = read_program(
         source,
         name=name,
-        dialect=settings.dialect or machine.dialect,
+        dialect=dialect_of(machine, settings.dialect),
         start=written_for.program_start(),
         progress=lambda done: report("reading", done, size),
         neighbours=written_for.neighbours_matter,
@@ -375,9 +376,8 @@ def _plan(
     """All rapids of the program that are certain, and that the control could read as streams."""
     rapids = program.rapids
     if emitter.in_place:
-        dialect = program.language
-        reason = reasons_to_leave(program, source, machine, dialect)
-        unguardable = emitter.unguardable(program, source, machine, dialect)
+        reason = reasons_to_leave(program, source, machine, program.language)
+        unguardable = emitter.unguardable(program, source, machine, program.language)
         reason[unguardable & (reason == CERTAIN)] = REASONS.index(Reason.SUBPROGRAM)
         rapids = replace(rapids, reason=reason)
     plans = plan_rapids(

@@ -263,8 +263,15 @@ def test_a_name_that_nothing_has_is_said_before_a_program_is_processed(
     )
     code, out = command("machine", "check", "n.yaml")
     assert code == 0
-    assert f"n.yaml: warning: {key}: " in out
+    place = f"n.yaml:3:{len(key) + 3}: "
+    assert f"{place}warning: {key}: " in out
     assert "did you mean" in out
+    (tmp_path / "part.nc").write_text(PROGRAM)
+    assert command("process", "part.nc", "-m", "n.yaml")[0] == 1
+    assert place in command("process", "part.nc", "-m", "n.yaml")[1]
+    instead = {"controller": "grbl", "dialect": "grbl"}
+    words = [word for name, value in instead.items() for word in (f"--{name}", value)]
+    assert command("process", "part.nc", "-m", "n.yaml", *words)[0] == 0
 
 
 def test_a_number_that_no_machine_has_is_refused_with_where_it_comes_from(command, tmp_path):

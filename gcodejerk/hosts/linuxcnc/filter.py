@@ -17,7 +17,7 @@ import time
 from typing import BinaryIO, TextIO
 
 from gcodejerk.batch.files import STANDARD, new_file, open_input
-from gcodejerk.emit import load_controller
+from gcodejerk.emit import controller_of
 from gcodejerk.errors import EmitError, Place
 from gcodejerk.machine import Machine
 from gcodejerk.report.records import summary_of
@@ -91,7 +91,7 @@ def filter_program(
     GcodejerkError
         The program cannot be processed; nothing was written.
     """
-    emitter = load_controller(settings.controller or machine.controller)
+    emitter = controller_of(machine, settings.controller)
     if not emitter.in_place or emitter.beside:
         raise EmitError(
             f"controller {emitter.name} writes a file beside the program or in its place, and a "

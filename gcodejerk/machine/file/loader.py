@@ -305,6 +305,9 @@ def _machine(
                 key=place_order,
             )
         ),
+        named_at={
+            key: checker.place((key,)) for key in ("controller", "dialect") if checker.given((key,))
+        },
     )
 
 
