@@ -31,6 +31,7 @@ from gcodejerk.verification.findings import Findings, Kind
 
 _STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
 _TRACES = (*TRACES, b"G1 ", b"G4 P", b"M400", b"M6")
+_LONGEST_TRACE = max(map(len, _TRACES))
 """How a stream may begin."""
 AT_ONCE = 4096
 """Rapids of which plain lists are made."""
@@ -64,6 +65,8 @@ class Alignment:
         """Indices of the rapids that have a stream."""
         self.block = b""
         """Text of the block whose stream was found last."""
+        self._follows = False
+        """The line in front of the rapid is one that has a stream: the machine then rests."""
         self.dialect = program.language
         self.decimals = decimals_of(machine)
         self.aligned = machine.controller in ALIGNED
@@ -90,7 +93,8 @@ class Alignment:
         follows : bool
             The first rapid has a stream.
         """
-        self.at, self.original.line = at, line
+        self.at = at
+        self.original.begin_line(line)
         self._stamp_at = None
         if follows:
             self.replaced.append(0)
@@ -107,17 +111,18 @@ class Alignment:
 
     def streams(self) -> Iterator[Stream]:
         """Find the streams, in the order of the file."""
-        for i, begin, end, terminator in self._certain():
+        replaced = self.replaced
+        for i, begin, end, terminator, behind in self._certain():
             if self.found.full or not self._same(begin - self.at):
                 return
-            line_end = LINE_ENDS[terminator]
-            block = self.original.peek(end - begin + len(line_end))
-            if self.processed.peek(len(block)) == block and not self._goes_on(block):
+            self._follows = behind and bool(replaced) and replaced[-1] == i - 1
+            block = self.original.peek(end - begin + len(LINE_ENDS[terminator]))
+            if self.processed.follows(block) and not self._goes_on(block):
                 self.processed.skip(len(block))
                 self.kept += 1
             elif not self._proven(i, block):
                 text = block[: end - begin]
-                tried = self.processed.peek_line().startswith(_TRACES)
+                tried = self.processed.peek(_LONGEST_TRACE).startswith(_TRACES)
                 stream = self._read(i, block, text)
                 if stream is not None or tried:
                     self.replaced.append(i)
@@ -131,15 +136,19 @@ class Alignment:
         if self._same(None):
             self._end()
 
-    def _certain(self) -> Iterator[tuple[int, int, int, int]]:
-        """Index, begin, end and terminator of each rapid that may be replaced."""
+    def _certain(self) -> Iterator[tuple[int, int, int, int, bool]]:
+        """Index, begin, end and terminator of each rapid that may be replaced.
+
+        And whether it stands right behind the rapid in front of it.
+        """
         rapids = self.program.rapids
         certain = kept(np.flatnonzero(rapids.reason == CERTAIN))
         for k in range(0, len(certain), AT_ONCE):
             if self.progress is not None:
                 self.progress(k, len(certain))
             rows = certain[k : k + AT_ONCE]
-            columns = (rows, rapids.begin[rows], rapids.end[rows], rapids.terminator[rows])
+            behind = (rapids.line[rows - 1] + 1 == rapids.line[rows]) & ~rapids.entered[rows]
+            columns = (rows, rapids.begin[rows], rapids.end[rows], rapids.terminator[rows], behind)
             yield from zip(*(column.tolist() for column in columns), strict=True)
             release()
 
@@ -147,7 +156,7 @@ class Alignment:
         """Pass a replacement that was proven before; whether one stands here."""
         if self.proven is None or not block.endswith(b"\n"):
             return False
-        self._key = self.proven.key(i, block, self._follows(i))
+        self._key = self.proven.key(i, block, self._follows)
         if not self.proven.passes(self._key):
             return False
         self.replaced.append(i)
@@ -161,13 +170,12 @@ class Alignment:
     def _read(self, i: int, block: bytes, text: bytes) -> Stream | None:
         """Read what stands in the place of a rapid; None where the walk ends."""
         plain = self.recognised.plain(i, text) if self.recognised is not None else None
-        follows = self._follows(i)
         before = len(self.found.violations)
         passed: list[bytes] | None = [] if self.proven is not None else None
         self.processed.passed = passed
         stream = None
         if plain is not None and self.recognised is not None:
-            stream = self.recognised.read(i, plain, follows)
+            stream = self.recognised.read(i, plain, self._follows)
         known = stream is not None
         if stream is None:
             reader = self._reader(i, text)
@@ -178,7 +186,7 @@ class Alignment:
             return stream
         new = b"".join(passed)
         if self.recognised is not None and plain and not known:
-            self.recognised.learn(reader, stream, plain, follows, new)
+            self.recognised.learn(reader, stream, plain, self._follows, new)
         if self.proven is not None and block.endswith(b"\n"):
             self.proven.read(self._key, new)
         return stream
@@ -202,14 +210,8 @@ class Alignment:
             self.found,
             self.dialect,
             self.decimals,
-            self._follows(i),
+            self._follows,
         )
-
-    def _follows(self, i: int) -> bool:
-        """Whether the line in front of a rapid is one that has a stream: the machine then rests."""
-        line, entered = self.program.rapids.line, self.program.rapids.entered[i]
-        stands = bool(self.replaced) and self.replaced[-1] == i - 1 and not entered
-        return stands and bool(line[i - 1] + 1 == line[i])
 
     def _goes_on(self, block: bytes) -> bool:
         """Whether a last line without end is followed by more."""
@@ -240,8 +242,7 @@ class Alignment:
                 return False
             self._stamp()
             size = None if size is None else size - first
-        before, begin = self.processed.line, self.original.passes
-        left = size
+        begin, left = self.original.passes, size
         while (lines := skip_common(self.original, self.processed, left)) is None:
             self._different()
             left = None if size is None else size - (self.original.passes - begin)
@@ -253,7 +254,6 @@ class Alignment:
             self.kept += bool(self.program.lines > self.original.line - 1)
         else:
             self.at += size
-        assert self.processed.line >= before
         return True
 
     def _stamp(self) -> None:

@@ -68,7 +68,7 @@ class Proven:
         profile = self.reported.get(int(self.line[i])) if self.reported else None
         # As many numbers in a row as any other: the bytes say how many rows there are.
         said = None if profile is None else profile.tobytes()
-        return self.states.state(i), self.states.place(i), follows, said, block
+        return *self.states.state_and_place(i), follows, said, block
 
     def passes(self, key: Key) -> bool:
         """Pass a replacement that was proven; whether one stands here."""

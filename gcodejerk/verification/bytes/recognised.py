@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
 
-from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids
 from gcodejerk.verification.bytes.allowed import feed_pattern
 from gcodejerk.verification.bytes.form import COMMENT_LENGTH, LINE_ENDS, Stream, StreamReader
@@ -113,9 +112,11 @@ class _Form:
     pattern: re.Pattern[bytes]
     """Of all behind these."""
     letters: str
+    lines: int
+    """How many stand between these and the first number."""
     lead: tuple[tuple[str, ...], ...]
     """Letters of the numbers in each line in front of the points."""
-    last: tuple[bytes, ...]
+    last: tuple[str, ...]
     """Letters of the axes in the last point."""
     fed: bool
     """F stands there."""
@@ -132,6 +133,7 @@ class Recognised:
         self.states = states
         writing = dialect.writing
         self.comment = (b"", b"") if writing is None else writing.comment
+        self.opens = self.comment[0] + b"gcodejerk: "
         self.usable = writing is not None
 
     def _key(self, i: int, plain: Plain, follows: bool) -> tuple[bytes, bytes, bool]:
@@ -165,7 +167,7 @@ class Recognised:
             return None
         opening = b""
         if form.commented:
-            opening = self.comment[0] + b"gcodejerk: " + plain.comment + self.comment[1]
+            opening = self.opens + plain.comment + self.comment[1]
             if len(opening) > COMMENT_LENGTH:
                 return None
             opening += line_end
@@ -176,24 +178,19 @@ class Recognised:
         match = form.pattern.match(data, at + len(opening), at + have)
         if match is None:
             return None
-        text = match["points"]
-        if form.limit and max(map(len, text.splitlines())) > form.limit:
-            return None
         groups = match.groups()
         lead, k = [], 0
         for letters in form.lead:
             lead.append({a: Decimal(groups[k + j].decode()) for j, a in enumerate(letters)})
             k += len(letters)
-        numbers = groups[k + 1 :]
-        rest = {a.decode(): Decimal(n.decode()) for a, n in zip(form.last, numbers, strict=False)}
+        text, numbers = groups[k], groups[k + 1 :]
+        if form.limit and max(map(len, text.splitlines())) > form.limit:
+            return None
+        rest = {a: Decimal(n.decode()) for a, n in zip(form.last, numbers, strict=False)}
         if form.fed:
             rest["F"] = Decimal(numbers[len(form.last)].decode())
         own = [number for _, number in plain.axes]
-        line = (
-            window.line
-            + opening.count(b"\n")
-            + data.count(b"\n", at + len(opening), match.start(1))
-        )
+        line = window.line + form.commented + bool(form.head) + form.lines
         ends = list(numbers[: len(own)]) == own and not self.rapids.incremental[i]
         stream = Stream(i, int(self.rapids.line[i]), line, form.letters, text, [rest], lead)
         window.skip(match.end() - at)
@@ -256,22 +253,22 @@ class Recognised:
         if letters != [a for a, _ in plain.axes] or not moving <= set(words):
             return None
         run = reader.run(stream.letters).pattern
-        widest = 25 * len(AXES) + 40
+        widest = 25 * len(stream.letters) + 40
         return _Form(
             commented,
             head,
             self._pattern(setup, lead, run, last, back[1:], end),
             stream.letters,
+            len(setup),
             tuple((one[2].decode(), *("F" if one[4] else "")) for one in lead),
-            tuple(letters),
+            tuple(letter.decode() for letter in letters),
             bool(last[3]),
             0 if reader.allowed.limit >= widest else reader.allowed.limit,
         )
 
     def _opened(self, front: list[bytes], plain: Plain) -> tuple[bool, int, list[bytes]] | None:
         """Whether a comment names the block, how its head stands, and the lines behind these."""
-        opens, closes = self.comment
-        commented = front[:1] == [opens + b"gcodejerk: " + plain.comment + closes]
+        commented = front[:1] == [self.opens + plain.comment + self.comment[1]]
         front = front[commented:]
         if plain.head.strip() in (b"", b"G0", b"G00"):
             return commented, 0, front
@@ -295,7 +292,7 @@ class Recognised:
         for one in lead:
             pattern += re.escape(one[1] + b" " + one[2]) + _NUMBER
             pattern += (b" F" + _FEED if one[4] else b"") + re.escape(end)
-        pattern += rb"(?P<points>" + run + rb")" + re.escape(last[1])
+        pattern += rb"(" + run + rb")" + re.escape(last[1])
         pattern += b"".join(b" " + word[:1] + number for word in last[2].split())
         feed = b" F(" + feed_pattern(self.dialect) + b")"
         pattern += (feed if last[3] else b"") + re.escape(end)

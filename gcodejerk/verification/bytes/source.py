@@ -22,13 +22,14 @@ class Window:
 
     __slots__ = (
         "_begun",
+        "_counted",
         "_digest",
         "_ended",
+        "_line",
         "at",
         "claimed",
         "data",
         "file",
-        "line",
         "passed",
         "passes",
     )
@@ -38,8 +39,8 @@ class Window:
         self.data = b""
         """What is in memory; the place itself is ``data[at]``."""
         self.at = 0
-        self.line = 1
-        """Number of the line that the place is in."""
+        self._line, self._counted = 1, 0
+        """Number of a line, and the place in it up to which lines were counted."""
         self.passes = 0
         """Bytes that were passed."""
         self._ended = False
@@ -49,6 +50,17 @@ class Window:
         """Takes what is passed, where somebody wants to know."""
         self.claimed: str | None = None
         """The sum of the whole file, as its stamp states it."""
+
+    @property
+    def line(self) -> int:
+        """Number of the line that the place is in; lines are counted when somebody asks."""
+        self._line += self.data.count(b"\n", self._counted, self.at)
+        self._counted = self.at
+        return self._line
+
+    def begin_line(self, line: int) -> None:
+        """Say which line the place is in."""
+        self._line, self._counted = line, self.at
 
     @property
     def sum(self) -> str:
@@ -66,9 +78,12 @@ class Window:
 
     def fill(self, size: int) -> int:
         """Have this many bytes in memory behind the place, or all there are; how many they are."""
-        if len(self.data) - self.at < size and not self._ended:
+        have = len(self.data) - self.at
+        if have >= size:
+            return size
+        if not self._ended:
+            line = self.line
             parts = [self.data[self.at :]]
-            have = len(parts[0])
             while have < size:
                 piece = self.file.read(max(PIECE, size - have))
                 if not piece:
@@ -78,16 +93,23 @@ class Window:
                 parts.append(piece)
                 have += len(piece)
             self.data, self.at = b"".join(parts), 0
-        return min(size, len(self.data) - self.at)
+            self.begin_line(line)
+        return min(size, have)
 
     def peek(self, size: int) -> bytes:
         """Look at the next bytes, fewer at the end of the file."""
-        self.fill(size)
+        if self.at + size > len(self.data):
+            self.fill(size)
         return self.data[self.at : self.at + size]
+
+    def follows(self, text: bytes) -> bool:
+        """Whether these are the next bytes."""
+        if self.at + len(text) > len(self.data):
+            self.fill(len(text))
+        return self.data.startswith(text, self.at)
 
     def skip(self, size: int) -> None:
         """Go on by bytes that are in memory."""
-        self.line += self.data.count(b"\n", self.at, self.at + size)
         if self.passed is not None:
             self.passed.append(self.data[self.at : self.at + size])
         self.at += size
@@ -129,7 +151,7 @@ def skip_common(one: Window, other: Window, size: int | None) -> int | None:
     lines = 0
     if size is not None and size <= PIECE:  # the most usual: a few lines between two streams
         text = one.peek(size)
-        if len(text) == size and other.peek(size) == text:
+        if len(text) == size and other.follows(text):
             one.skip(size)
             other.skip(size)
             return text.count(b"\n")

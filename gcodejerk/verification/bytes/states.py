@@ -35,10 +35,14 @@ class States:
         row = self._row(i)
         return self._states[row]
 
-    def place(self, i: int) -> bytes:
-        """Where the axes begin and end that its block names, or that move, and in which frame."""
+    def state_and_place(self, i: int) -> tuple[bytes, bytes]:
+        """All that the columns say: as `state`, and the places.
+
+        These are where the axes begin and end that its block names, or that move, and in which
+        frame.
+        """
         row = self._row(i)
-        return self._places[row]
+        return self._states[row], self._places[row]
 
     def _row(self, i: int) -> int:
         """Have the bytes of a rapid; which of those that are at hand it is."""

@@ -95,18 +95,31 @@ class Alike:
         of_rows, of_streams = memoryview(rows.tobytes()), memoryview(streams.tobytes())
         wide, width = rows.itemsize * rows.shape[1], streams.itemsize * streams.shape[1]
         named = bytes(1 if k in axes else 0 for k in range(len(AXES)))
+        said = self._reported(paths)
         out = []
         at = zip((wide * paths.begin).tolist(), (wide * paths.end).tolist(), strict=True)
         for k, (begin, end) in enumerate(at):
-            key = hashlib.blake2b(named, digest_size=16)
-            key.update(of_streams[k * width : (k + 1) * width])
-            key.update(of_rows[begin:end])
-            out.append(key)
-        if self.reported:
-            for key, line in zip(out, paths.original_line.tolist(), strict=True):
-                profile = self.reported.get(line)
-                key.update(b"none" if profile is None else _rounded(profile))
-        return [key.digest() for key in out]
+            own = of_streams[k * width : (k + 1) * width]
+            key = b"".join((named, own, of_rows[begin:end], said[k]))
+            out.append(hashlib.blake2b(key, digest_size=16).digest())
+        return out
+
+    def _reported(self, paths: Paths) -> list[bytes]:
+        """What was reported of each stream, without its own rounding."""
+        if not self.reported:
+            return [b""] * len(paths.original_line)
+        # Streams of one profile have one array: it is held here, or another could take its place.
+        known: dict[int, tuple[Array, bytes]] = {}
+        out = []
+        for line in paths.original_line.tolist():
+            profile = self.reported.get(line)
+            if profile is None:
+                out.append(b"none")
+                continue
+            if id(profile) not in known:
+                known[id(profile)] = profile, _rounded(profile)
+            out.append(known[id(profile)][1])
+        return out
 
 
 def _whole(distance: Array) -> Array:
