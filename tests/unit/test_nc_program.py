@@ -6,9 +6,10 @@ import math
 import numpy as np
 import pytest
 
+from gcodejerk import Machine, find_machine, process, verify
 from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import CERTAIN, REASONS, Start, read_program, trace
+from gcodejerk.nc import CERTAIN, DIALECTS, REASONS, Start, read_program, trace
 from gcodejerk.reasons import Reason
 
 HEAD = b"G21 G90 G94 G17 G40 G0 X0 Y0 Z0 A0\n"
@@ -335,3 +336,17 @@ def test_a_cycle_that_may_be_in_force_makes_no_position_a_rapid(lines):
     rapids = read_program(io.BytesIO(data), dialect="fanuc", start=Start()).rapids
     later = rapids.line > 2 + lines.count(b"\n")
     assert not (later & (rapids.reason == CERTAIN)).any()
+
+
+@pytest.mark.parametrize("word", [b"G" + b"9" * 400, b"M" + b"9" * 5000, b"G1." + b"0" * 5000])
+@pytest.mark.parametrize("dialect", sorted(set(DIALECTS) - {"klartext"}))
+@pytest.mark.parametrize("after", [b"", b"M99\n"])
+def test_code_of_more_digits_than_a_number_has_is_a_block_that_is_not_understood(
+    word, dialect, after
+):
+    """With M99 the whole program is looked through for what the last pass may have left on."""
+    program = b"G21 G90\nG0 X0. Y0.\nG1 X1. F9.\n? %s\nG0 X5.\n%s" % (word, after)
+    machine = Machine.load(find_machine("vmc"))
+    result = process(program, machine, dialect=dialect)
+    assert result.planned == 0
+    assert verify(program, result.output, machine, dialect=dialect).ok

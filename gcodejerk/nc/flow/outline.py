@@ -15,7 +15,7 @@ from typing import BinaryIO
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.jumps import EVERYWHERE, jumps_of
-from gcodejerk.nc.interpreter.left_on import NOTHING, LeftOn, left_on
+from gcodejerk.nc.interpreter.left_on import NOTHING, LeftOn, code_of, left_on
 from gcodejerk.nc.text.block import Line, Name
 from gcodejerk.nc.text.chunks import Chunk, read_chunks
 from gcodejerk.nc.text.tokenizer import parse_line
@@ -158,7 +158,7 @@ def _groups(file: BinaryIO, dialect: Dialect, name: str) -> frozenset[str] | Non
         if b"#" in chunk.data:
             return None
         for number in set(_G_CODE.findall(chunk.data)):
-            code = round(float(number) * 10.0)
+            code = code_of(number)
             if dialect.effect(code) in ("flow", "modal cycle"):
                 return None
             found.add(dialect.groups.get(code, ""))

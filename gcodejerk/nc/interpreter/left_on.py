@@ -23,6 +23,7 @@ from gcodejerk.nc.text.chunks import read_chunks
 _G_CODE = re.compile(rb"G[ \t]*0*([0-9]+(?:\.[0-9]*)?)", re.IGNORECASE)
 _M_CODE = re.compile(rb"M[ \t]*0*([0-9]+)(?![0-9.])", re.IGNORECASE)
 _NAME = re.compile(rb"\$|[A-Z_][A-Z_][A-Z0-9_]*", re.IGNORECASE)
+NO_CODE = 10**6
 _TRANSFORMS: dict[Effect, str] = {
     "modal cycle": MODAL_MACRO,
     "transform": "frame",
@@ -64,11 +65,17 @@ class LeftOn(NamedTuple):
 NOTHING = LeftOn()
 
 
+def code_of(number: bytes, times: float = 10.0) -> int:
+    """The number of a code, times ten as in `gcodes`; `NO_CODE` for one that no control has."""
+    value = times * float(number)
+    return round(value) if value < NO_CODE else NO_CODE
+
+
 # Complex: one line for each kind of code.
 def left_by(text: bytes, dialect: Dialect) -> LeftOn:
     """Look text through, as it is written."""
-    codes = [round(float(number) * 10.0) for number in set(_G_CODE.findall(text))]
-    orders = [int(number) for number in set(_M_CODE.findall(text))]
+    codes = [code_of(number) for number in set(_G_CODE.findall(text))]
+    orders = [code_of(number, 1.0) for number in set(_M_CODE.findall(text))]
     names = set(_NAME.findall(text.upper())) if dialect.text.names else set()
     effects = [dialect.effect(code) for code in codes]
     effects += [dialect.names.get(each.decode(), "none") for each in names]

@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 
 _CODES = re.compile(rb"([GM])[ \t]*([0-9]+(?:\.[0-9]+)?)", re.IGNORECASE)
+_LARGEST = 1e6
+"""More than any code's number."""
 _NAMES = re.compile(rb"[A-Z]{2}[A-Z0-9_]*|[A-Z]_[A-Z0-9_]+", re.IGNORECASE)
 _TELLING: frozenset[Effect] = frozenset(
     ("transform", "swivel", "modal cycle", "corner", "corners", "watch")
@@ -53,7 +55,8 @@ def may_begin(
     """
     found, frames, bars = set(effects) & _TELLING, set[str](), dict[str, bool | None]()
     for letter, number in _CODES.findall(text):
-        code, m = round(10.0 * float(number)), int(float(number))
+        value = min(float(number), _LARGEST)
+        code, m = round(10.0 * value), int(value)
         if letter in b"Gg":
             found.add(dialect.effect(code))
             frames |= {name for name, _ in [dialect.transforms.get(code, ("", False))] if name}
