@@ -338,7 +338,7 @@ def test_a_cycle_that_may_be_in_force_makes_no_position_a_rapid(lines):
     assert not (later & (rapids.reason == CERTAIN)).any()
 
 
-@pytest.mark.parametrize("word", [b"G" + b"9" * 400, b"M" + b"9" * 5000, b"G1." + b"0" * 5000])
+@pytest.mark.parametrize("word", [b"G" + b"9" * 400, b"M" + b"9" * 3999, b"G1." + b"0" * 3999])
 @pytest.mark.parametrize("dialect", sorted(set(DIALECTS) - {"klartext"}))
 @pytest.mark.parametrize("after", [b"", b"M99\n"])
 def test_code_of_more_digits_than_a_number_has_is_a_block_that_is_not_understood(
@@ -350,3 +350,14 @@ def test_code_of_more_digits_than_a_number_has_is_a_block_that_is_not_understood
     result = process(program, machine, dialect=dialect)
     assert result.planned == 0
     assert verify(program, result.output, machine, dialect=dialect).ok
+
+
+@pytest.mark.parametrize("front", [0, 37, 99, 100, 250_000])
+@pytest.mark.parametrize("end", [b"", b"\n", b"\nG0 X5\n"])
+def test_a_number_without_end_is_refused_with_its_place(front, end):
+    lines = b"G1 X1\n" * (front // 6) + b" " * (front % 6)
+    read(lines + b"N" + b"1" * 3999 + b" X2" + end)
+    with pytest.raises(ProgramError, match="4000 digits") as caught:
+        read(lines + b"N" + b"1" * 4000 + b" X2" + end)
+    place = caught.value.place
+    assert (place.line, place.column) == (front // 6 + 1, front % 6 + 2)

@@ -1,7 +1,7 @@
 """Reading a file in pieces that end at a line end, in memory that does not grow with the file.
 
 Rule: what cannot be an NC program is refused here, before anything looks at its words: an empty
-file, binary data, UTF-16, a line that never ends.
+file, binary data, UTF-16, a line or a number that never ends.
 """
 
 from __future__ import annotations
@@ -20,6 +20,13 @@ CHUNK = 512 * 1024
 
 LONGEST_LINE = 64 * 1024
 """A line of more bytes is refused. Controllers read 80 to 512."""
+
+MOST_DIGITS = 4000
+"""A longer row of digits is refused: Python makes no number of it, and nobody wrote one."""
+_EVERY = 100
+_SAMPLED = re.compile(rb"[0-9]{%d}" % (MOST_DIGITS // _EVERY - 1))
+"""Digits at every hundredth byte, as they stand in such a row and hardly anywhere else."""
+_ENDLESS = re.compile(rb"[0-9]{%d}" % MOST_DIGITS)
 
 # Tab, LF, VT, FF and CR occur in text; 0x1A ended DOS files, DC1 and DC3 ran paper tapes.
 _BINARY = bytes(sorted(set(range(32)) - {9, 10, 11, 12, 13, 0x11, 0x13, 0x1A}))
@@ -117,7 +124,7 @@ def read_chunks(file: BinaryIO, name: str) -> Iterator[Chunk]:
     Raises
     ------
     ProgramError
-        The file is empty, binary or UTF-16, or a line of it is longer than 64 KiB.
+        The file is empty, binary or UTF-16, or a line or a number of it is longer than any.
     """
     kept, offset, line = b"", 0, 1
     while piece := file.read(CHUNK):
@@ -134,12 +141,14 @@ def read_chunks(file: BinaryIO, name: str) -> Iterator[Chunk]:
         first = data.find(b"\n")
         _check_line(data[:first], line, name)
         _check_lines(data, line, name)
+        _check_numbers(data, line, name)
         yield Chunk(data, offset, line, feeds)
         offset += len(data)
         line += feeds
         _check_line(kept, line, name)
     if kept:
         _check_bytes(kept, line, name)
+        _check_numbers(kept, line, name)
         yield Chunk(kept, offset, line, 0)
     elif not offset:
         raise ProgramError("file is empty", "give an NC program", Place(name))
@@ -153,3 +162,15 @@ def _check_lines(data: bytes, line: int, name: str) -> None:
         if end < 0:
             _check_line(data[at : at + LONGEST_LINE + 1], line + data.count(b"\n", 0, at), name)
         at = end + 1
+
+
+def _check_numbers(data: bytes, line: int, name: str) -> None:
+    """Refuse an endless number."""
+    if not _SAMPLED.search(data[::_EVERY]) or not (found := _ENDLESS.search(data)):
+        return
+    begin = data.rfind(b"\n", 0, found.start()) + 1
+    raise ProgramError(
+        f"a number has {MOST_DIGITS} digits or more",
+        "give an NC program; no controller reads such a number",
+        Place(name, line + data.count(b"\n", 0, begin), found.start() - begin + 1),
+    )
