@@ -361,3 +361,5 @@ def test_a_number_without_end_is_refused_with_its_place(front, end):
         read(lines + b"N" + b"1" * 4000 + b" X2" + end)
     place = caught.value.place
     assert (place.line, place.column) == (front // 6 + 1, front % 6 + 2)
+    with pytest.raises(ProgramError, match="4000 digits"):
+        read(lines + b"1" * 4000)

@@ -23,10 +23,7 @@ LONGEST_LINE = 64 * 1024
 
 MOST_DIGITS = 4000
 """A longer row of digits is refused: Python makes no number of it, and nobody wrote one."""
-_EVERY = 100
-_SAMPLED = re.compile(rb"[0-9]{%d}" % (MOST_DIGITS // _EVERY - 1))
-"""Digits at every hundredth byte, as they stand in such a row and hardly anywhere else."""
-_ENDLESS = re.compile(rb"[0-9]{%d}" % MOST_DIGITS)
+_ENDLESS = re.compile(rb"(?<![0-9])[0-9]{%d}" % MOST_DIGITS)
 
 # Tab, LF, VT, FF and CR occur in text; 0x1A ended DOS files, DC1 and DC3 ran paper tapes.
 _BINARY = bytes(sorted(set(range(32)) - {9, 10, 11, 12, 13, 0x11, 0x13, 0x1A}))
@@ -141,36 +138,32 @@ def read_chunks(file: BinaryIO, name: str) -> Iterator[Chunk]:
         first = data.find(b"\n")
         _check_line(data[:first], line, name)
         _check_lines(data, line, name)
-        _check_numbers(data, line, name)
         yield Chunk(data, offset, line, feeds)
         offset += len(data)
         line += feeds
         _check_line(kept, line, name)
     if kept:
         _check_bytes(kept, line, name)
-        _check_numbers(kept, line, name)
+        _check_lines(kept, line, name)
         yield Chunk(kept, offset, line, 0)
     elif not offset:
         raise ProgramError("file is empty", "give an NC program", Place(name))
 
 
 def _check_lines(data: bytes, line: int, name: str) -> None:
-    """Refuse an endless line among whole ones."""
+    """Refuse an endless line, and an endless number, which only a long line can hold."""
     at = 0
-    while len(data) - at > LONGEST_LINE:
-        end = data.rfind(b"\n", at, at + LONGEST_LINE + 1)
+    while len(data) - at >= MOST_DIGITS:
+        end = data.rfind(b"\n", at, at + MOST_DIGITS)
         if end < 0:
-            _check_line(data[at : at + LONGEST_LINE + 1], line + data.count(b"\n", 0, at), name)
+            end = data.find(b"\n", at)
+            end = len(data) if end < 0 else end
+            if end - at > LONGEST_LINE:
+                _check_line(data[at:end], line + data.count(b"\n", 0, at), name)
+            if found := _ENDLESS.search(data, at, end):
+                raise ProgramError(
+                    f"a number has {MOST_DIGITS} digits or more",
+                    "give an NC program; no controller reads such a number",
+                    Place(name, line + data.count(b"\n", 0, at), found.start() - at + 1),
+                )
         at = end + 1
-
-
-def _check_numbers(data: bytes, line: int, name: str) -> None:
-    """Refuse an endless number."""
-    if not _SAMPLED.search(data[::_EVERY]) or not (found := _ENDLESS.search(data)):
-        return
-    begin = data.rfind(b"\n", 0, found.start()) + 1
-    raise ProgramError(
-        f"a number has {MOST_DIGITS} digits or more",
-        "give an NC program; no controller reads such a number",
-        Place(name, line + data.count(b"\n", 0, begin), found.start() - begin + 1),
-    )
