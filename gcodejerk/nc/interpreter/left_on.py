@@ -24,6 +24,7 @@ _G_CODE = re.compile(rb"G[ \t]*0*([0-9]+(?:\.[0-9]*)?)", re.IGNORECASE)
 _M_CODE = re.compile(rb"M[ \t]*0*([0-9]+)(?![0-9.])", re.IGNORECASE)
 _NAME = re.compile(rb"\$|[A-Z_][A-Z_][A-Z0-9_]*", re.IGNORECASE)
 NO_CODE = 10**6
+"""Above all codes of all controls, times ten."""
 _TRANSFORMS: dict[Effect, str] = {
     "modal cycle": MODAL_MACRO,
     "transform": "frame",
