@@ -55,21 +55,16 @@ def _piped() -> Machine:
 
 def _unknown_names(described: Machine) -> list[MachineError]:
     """A controller or dialect that nothing installed has: no program can be processed with it."""
-    from gcodejerk.emit import load_controller
+    from gcodejerk.emit import controller_of
     from gcodejerk.errors import GcodejerkError, MachineError, Place
-    from gcodejerk.nc import AUTO, find_dialect
+    from gcodejerk.rewrite.language import dialect_of
 
     found = []
-    for key, name, load in (
-        ("controller", described.controller, load_controller),
-        ("dialect", described.dialect, find_dialect),
-    ):
-        if name == AUTO:
-            continue
+    for key, load in (("controller", controller_of), ("dialect", dialect_of)):
         try:
-            load(name)
+            load(described)
         except GcodejerkError as error:
-            place = described.named_at.get(key, Place(described.source))
+            place = error.place or Place(described.source)
             found.append(MachineError(f"{key}: {error.problem}", error.remedy, place))
     return found
 

@@ -170,6 +170,7 @@ def _moves(
     from gcodejerk.errors import ProgramError
     from gcodejerk.nc import read_program
     from gcodejerk.parameters import Moves, joined_moves, program_moves
+    from gcodejerk.rewrite.language import dialect_of
 
     if not files:
         first, last = _travelled(machine) if lengths is None else _range(lengths)
@@ -182,7 +183,7 @@ def _moves(
     for one in found:
         with open_input(one.path) as source:
             program = read_program(
-                source, name=one.path, dialect=dialect or machine.dialect,
+                source, name=one.path, dialect=dialect_of(machine, dialect),
                 start=machine.program_start(),
             )  # fmt: skip
             parts.append(program_moves(program.rapids, source, machine))

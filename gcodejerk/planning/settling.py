@@ -61,8 +61,8 @@ class Left:
     unknown: NDArray[np.bool_]
     length: Array
 
-    def of(self, rows: NDArray[np.int64]) -> Left:
-        """The same of some rapids."""
+    def take(self, rows: NDArray[np.int64]) -> Left:
+        """Some of the rapids."""
         return Left(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 

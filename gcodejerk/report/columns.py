@@ -95,7 +95,7 @@ def _motions(
     result: Result, rows: NDArray[np.int64], limit: Array | None, known: dict[bytes, bytes]
 ) -> list[bytes]:
     """What was made of some rapids, as text; of those that have one plan, once."""
-    plans, rest = result.plans.repeated(rows), result.rest.of(rows)
+    plans, rest = result.plans.repeated(rows), result.rest.take(rows)
     records = Records(
         plans,
         result.residual[rows],

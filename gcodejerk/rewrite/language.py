@@ -7,7 +7,7 @@ from gcodejerk.machine import Machine
 from gcodejerk.nc import AUTO, find_dialect
 
 
-def dialect_of(machine: Machine, chosen: str | None) -> str:
+def dialect_of(machine: Machine, chosen: str | None = None) -> str:
     """The name of a dialect that there is, or `auto`.
 
     Parameters

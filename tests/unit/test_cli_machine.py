@@ -269,9 +269,8 @@ def test_a_name_that_nothing_has_is_said_before_a_program_is_processed(
     (tmp_path / "part.nc").write_text(PROGRAM)
     assert command("process", "part.nc", "-m", "n.yaml")[0] == 1
     assert place in command("process", "part.nc", "-m", "n.yaml")[1]
-    instead = {"controller": "grbl", "dialect": "grbl"}
-    words = [word for name, value in instead.items() for word in (f"--{name}", value)]
-    assert command("process", "part.nc", "-m", "n.yaml", *words)[0] == 0
+    instead = ("--controller", "grbl", "--dialect", "grbl")
+    assert command("process", "part.nc", "-m", "n.yaml", *instead)[0] == 0
 
 
 def test_a_number_that_no_machine_has_is_refused_with_where_it_comes_from(command, tmp_path):

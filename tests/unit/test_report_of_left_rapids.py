@@ -37,10 +37,13 @@ M2
 """
 
 
+@pytest.mark.parametrize("few", [2000, 0])
 @pytest.mark.parametrize("report", ["known.json", "known.json.gz"])
 def test_length_and_time_of_a_rapid_that_is_left_alone_are_told_where_they_are_known(
-    command, tmp_path, report
+    command, tmp_path, report, few, monkeypatch
 ):
+    """In a report of many rapids, too, which is written as it is made."""
+    monkeypatch.setattr("gcodejerk.batch.reports.FEW", few)
     (tmp_path / "known.nc").write_text(KNOWN)
     assert command("process", "known.nc", "-m", "vmc", "--report", report)[0] == 0
     text = (tmp_path / report).read_bytes()

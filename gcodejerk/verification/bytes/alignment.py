@@ -31,8 +31,8 @@ from gcodejerk.verification.findings import Findings, Kind
 
 _STAMPS = (b"(gcodejerk stamp", b"; gcodejerk stamp")
 _TRACES = (*TRACES, b"G1 ", b"G4 P", b"M400", b"M6")
-_LONGEST_TRACE = max(map(len, _TRACES))
 """How a stream may begin."""
+_LONGEST_TRACE = max(map(len, _TRACES))
 AT_ONCE = 4096
 """Rapids of which plain lists are made."""
 Progress = Callable[[int, int], None]
