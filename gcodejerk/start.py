@@ -134,6 +134,9 @@ class Start:
     """Dialect that the machine's own control reads; empty: nobody says."""
     subprograms: Mapping[str, bytes] = field(default_factory=dict)
     """Files in which the control finds what a program calls: name -> text."""
+    restores: bool = True
+    """F and its mode have to be restored behind a stream; False: it stands in a file of its own,
+    and the program's F stays as it is."""
 
 
 NOTHING_KNOWN = Start()

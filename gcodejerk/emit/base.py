@@ -11,7 +11,7 @@ import difflib
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
@@ -29,6 +29,7 @@ from gcodejerk.planning.lines import Play
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.pvt import Rows
 from gcodejerk.planning.told import RowFormat
+from gcodejerk.start import Start
 from gcodejerk.units import MM_PER_INCH
 
 GROUP = "gcodejerk.controllers"
@@ -139,6 +140,11 @@ class Controller(ABC):
     def render_beside(self, batch: Batch, rapids: Rapids) -> list[bytes]:
         """What the file beside holds of each move of a batch."""
         return [b""] * len(batch)
+
+    def start(self, machine: Machine) -> Start:
+        """What a program may assume that is read to be written for this controller."""
+        own = replace(machine, controller=self.name)
+        return replace(own.program_start(), restores=self.in_place)
 
     def stride(self, interval: float) -> int:
         """Intervals from one written point to the next."""

@@ -270,7 +270,7 @@ def _process(
             spread, edits,
         )  # fmt: skip
         report("verifying", 1, 1)
-    what_if = entry_notes(source, program, machine.program_start())
+    what_if = entry_notes(source, program, emitter.start(machine))
     differences = hunks(edits, program.rapids, program.insert_at, lines)
     program = in_original(program, written)
     return Result(
@@ -345,14 +345,13 @@ def _read(
     source.seek(0)
     refuse_foreign(source.read(HEAD), name)
     source.seek(0)
-    written_for = replace(machine, controller=emitter.name)
     program = read_program(
         source,
         name=name,
         dialect=dialect_of(machine, settings.dialect),
-        start=written_for.program_start(),
+        start=emitter.start(machine),
         progress=lambda done: report("reading", done, size),
-        neighbours=written_for.neighbours_matter,
+        neighbours=replace(machine, controller=emitter.name).neighbours_matter,
     )
     program.rapids.freeze()
     if program.stamp is not None and not settings.force:

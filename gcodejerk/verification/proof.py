@@ -207,7 +207,7 @@ def verify_files(
     ProgramError
         The original cannot be a program.
     """
-    start = machine.program_start() if start is None else start
+    start = replace(machine.program_start() if start is None else start, restores=not table)
     begin = original.tell()
     if program is None or _digest(original) != program.digest:
         program = _read(original, machine, names[0], dialect, start)

@@ -119,3 +119,30 @@ def test_the_library_verifies_what_it_wrote_from_bytes_and_from_a_file_of_any_na
     rows = output.splitlines(keepends=True)
     damaged = verify(program, b"".join(rows[:20] + rows[21:]), MACHINE)
     assert [str(one.kind) for one in damaged.violations] == ["duration"]
+
+
+@pytest.mark.parametrize(
+    ("dialect", "program", "reason"),
+    [
+        ("linuxcnc", b"G21 G90 G94 G64\nG0 X0 Z0\nG0 X3\nG1 Z-1\nM2\n", "feed to restore unknown"),
+        (
+            "siemens",
+            b"G71 G90 G94 G64 F500\nG1 X0 Z0\nG0 X3\nM30\n",
+            "unit of F unknown, or not that of lengths",
+        ),
+        (
+            "fanuc",
+            b"G21 G90 G94 G64 G40 G49 G69 G15\nG0 X0. Z0. A0.\nG0 X9. A40.\nM30\n",
+            "linear and rotary axes move together",
+        ),
+    ],
+)
+def test_what_f_means_is_asked_for_streams_in_the_program_alone(dialect, program, reason):
+    in_place = process(program, MACHINE, controller="fanuc", dialect=dialect)
+    lost = [rapid.reason for rapid in in_place.rapids].count(reason)
+    assert lost > 0
+    result = process(program, MACHINE, controller="csv", dialect=dialect)
+    assert result.planned == in_place.planned + lost
+    assert result.verification.ok
+    assert result.verification.confirmed == result.planned
+    assert verify(program, result.output, MACHINE, dialect=dialect, controller="csv").ok

@@ -283,6 +283,8 @@ class Dialect:
     """G92 means the same in G91."""
     units_once: bool = False
     """Another unit in the midst of a program leaves no position and no offset certain."""
+    inches_turn: bool = False
+    """In inches nobody knows how far a rotary axis turns: some controls convert degrees, too."""
     feed_before_units: bool = False
     """F counts in the unit in force in front of a block that also states one."""
     lengths_only: frozenset[int] = frozenset()
@@ -377,16 +379,14 @@ class Dialect:
         ----------
         start : Start
             Codes that are harmless, M codes that run before the motion of their block, or behind
-            it, and the axes that there are. Of M codes that do more than switch a spindle, coolant
-            or auxiliaries, nothing is believed.
-
-        Returns
-        -------
-        Dialect
+            it, the axes that there are, and whether F matters to a rapid. Of M codes that do more
+            than switch a spindle, coolant or auxiliaries, nothing is believed.
         """
         dialect = self.with_harmless(start.harmless)
         if lacking := self.refuses.axes - start.limits.keys():
             dialect = replace(dialect, letters="".join(a for a in self.letters if a not in lacking))
+        if not start.restores and start.rapid_feed is None:
+            dialect = replace(dialect, lengths_only=frozenset(), feed_of_mixed=True)
         before, after = (
             frozenset(m for m in codes if dialect.m_groups.get(m) in _SWITCHES)
             for codes in (start.m_before, start.m_after)

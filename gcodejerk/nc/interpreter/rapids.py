@@ -126,9 +126,11 @@ class RapidLog:
     ----------
     stoppable : bool
         A path mode that something may have changed may be an exact stop.
+    restores : bool
+        F and its mode have to be known behind a rapid that is rewritten.
     """
 
-    def __init__(self, stoppable: bool = False) -> None:
+    def __init__(self, stoppable: bool = False, restores: bool = True) -> None:
         self._parts = {
             name: Growing(dtype, width, once=name not in DIFFER)
             for name, (dtype, width) in _TYPES.items()
@@ -142,7 +144,7 @@ class RapidLog:
         """See `beams.Dark`."""
         self.stops = False
         """The program has exact stops (G61), or runs others that may."""
-        self.stoppable = stoppable
+        self.stoppable, self.restores = stoppable, restores
         self.visits = Visits()
         """Rapids of lines that may run more than once."""
 
@@ -238,7 +240,7 @@ class RapidLog:
         mode, feed = columns["feed_mode"], columns["feed"]
         unknown = (mode == 0) | ((mode != 93) & columns["feed_needed"] & np.isnan(feed))
         reason = columns["reason"]
-        reason[(reason == CERTAIN) & unknown] = FEED_UNKNOWN
+        reason[(reason == CERTAIN) & unknown & self.restores] = FEED_UNKNOWN
         lost = columns["path"] == LOST_PATH
         if lost.any():
             columns["path"] = np.where(lost, np.uint8(0), columns["path"])

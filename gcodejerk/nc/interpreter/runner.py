@@ -43,7 +43,7 @@ class Runner:
         self.name = name
         self.dialect = dialect
         stoppable = "path" in dialect.groups.values() and not dialect.path_has_to_be_stated
-        self.log = RapidLog(stoppable=stoppable)
+        self.log = RapidLog(stoppable=stoppable, restores=start.restores)
         state = initial_state(dialect, start)
         self.executor = Executor(dialect, state, start)
         self.syntax_problems: list[Finding] = []
