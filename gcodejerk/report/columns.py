@@ -18,22 +18,27 @@ from typing import BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion.profiles.profile import Array, Profiles
 from gcodejerk.motion.profiles.repeated import RepeatedProfiles
+from gcodejerk.nc import Rapids
 from gcodejerk.planning.plans import Plans
 from gcodejerk.planning.settling import Left
-from gcodejerk.report.records import Record, Records, place_record, process_head
+from gcodejerk.report.records import Record, Records, number, process_head
 from gcodejerk.rewrite.result import Result
+from gcodejerk.spread import ahead
 from gcodejerk.storage import release
 
 FEW = 2000
 """Rapids up to which a report is written with blanks and line ends."""
-AT_ONCE = 4096
+AT_ONCE = 1024
 """Rapids whose records are made together."""
 REMEMBERED = 4096
 """Records of plans that are kept, some kB each."""
 PACKED = ".gz"
+_SPELL = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode
+"""What is not ASCII stands as it is."""
 Progress = Callable[[int, int], None]
 
 
@@ -70,17 +75,20 @@ def write_rapids(
     """
     head = _text(process_head(result, machine, output) | more)
     file.write(head[:-1] + b',\n"rapids":[')
-    count, known = len(result.plans), dict[bytes, bytes]()
-    for begin in range(0, count, AT_ONCE):
-        rows = np.arange(begin, min(begin + AT_ONCE, count))
-        motions = _motions(result, rows, limit, known)
-        lines = []
-        for row, motion in zip(rows.tolist(), motions, strict=True):
-            place = _text(place_record(result.program.rapids, row, next(blocks)))
-            lines.append(place[:-1] + b"," + motion[1:])
-        file.write((b",\n" if begin else b"\n") + b",\n".join(lines))
-        progress(begin + len(rows), count)
-        release()
+    count, places, known = len(result.plans), _Places(result.program.rapids), dict[bytes, bytes]()
+
+    def texts() -> Iterator[bytes]:
+        for begin in range(0, count, AT_ONCE):
+            rows = np.arange(begin, min(begin + AT_ONCE, count))
+            motions = _motions(result, rows, limit, known)
+            lines = map(bytes.__add__, places.texts(rows, blocks), motions)
+            yield (b",\n" if begin else b"\n") + b",\n".join(lines)
+            progress(begin + len(rows), count)
+            release()
+
+    # Most of the writing is packing, in which the interpreter has no part.
+    for _ in ahead(file.write, texts()):
+        pass
     file.write(b"]}\n")
 
 
@@ -91,10 +99,63 @@ def packed(file: BinaryIO) -> Iterator[BinaryIO]:
         yield cast(BinaryIO, into)
 
 
+class _Places:
+    """Where rapids stand, and from where to where they lead, as text; `place_record` has the keys.
+
+    Numbers come again and again, and each is spelled once.
+    """
+
+    def __init__(self, rapids: Rapids) -> None:
+        self.rapids = rapids
+        self._spelled: dict[int, str] = {}
+        self._axes: dict[int, list[tuple[int, str]]] = {}
+
+    def texts(self, rows: NDArray[np.int64], blocks: Iterator[str]) -> list[bytes]:
+        """The beginnings of their records, up to what was made of them."""
+        rapids, out = self.rapids, []
+        table = zip(
+            rapids.line[rows].tolist(),
+            rapids.words[rows].tolist(),
+            rapids.start[rows].view(np.int64).tolist(),
+            rapids.target[rows].view(np.int64).tolist(),
+            blocks,
+            strict=False,
+        )
+        for line, words, start, target, block in table:
+            axes = self._axes_of(words)
+            out.append(
+                f'{{"line":{line},"block":{_SPELL(block)},'
+                f'"start":{{{self._positions(axes, start)}}},'
+                f'"end":{{{self._positions(axes, target)}}},'.encode("utf-8", "backslashreplace")
+            )
+        return out
+
+    def _axes_of(self, words: int) -> list[tuple[int, str]]:
+        """Index and key of each axis that a block names."""
+        if words not in self._axes:
+            named = [(k, f'"{axis}":') for k, axis in enumerate(AXES) if words >> k & 1]
+            self._axes[words] = named
+        return self._axes[words]
+
+    def _positions(self, axes: list[tuple[int, str]], position: list[int]) -> str:
+        """Positions of these axes, given by the bits of their numbers: 0.0 and -0.0 differ."""
+        return ",".join([key + self._number(position[k]) for k, key in axes])
+
+    def _number(self, bits: int) -> str:
+        """How a number is written."""
+        text = self._spelled.get(bits)
+        if text is None:
+            if len(self._spelled) >= REMEMBERED:
+                self._spelled.clear()
+            text = _SPELL(number(float(np.int64(bits).view(np.float64))))
+            self._spelled[bits] = text
+        return text
+
+
 def _motions(
     result: Result, rows: NDArray[np.int64], limit: Array | None, known: dict[bytes, bytes]
 ) -> list[bytes]:
-    """What was made of some rapids, as text; of those that have one plan, once."""
+    """What was made of some rapids, as text without its bracket; of those of one plan, once."""
     plans, rest = result.plans.repeated(rows), result.rest.take(rows)
     records = Records(
         plans,
@@ -110,7 +171,7 @@ def _motions(
         if text is None:
             if len(known) >= REMEMBERED:
                 known.clear()
-            text = known[key] = _text(records.motion(row))
+            text = known[key] = _text(records.motion(row))[1:]
         out.append(text)
     return out
 
@@ -149,5 +210,4 @@ def _index(profiles: Profiles) -> NDArray[np.int64]:
 
 def _text(record: Record) -> bytes:
     """A record without blanks; what is not UTF-8 as `records.dump` has it."""
-    text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.encode("utf-8", "backslashreplace")
+    return _SPELL(record).encode("utf-8", "backslashreplace")
