@@ -205,10 +205,12 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.START_UNKNOWN: Explanation(
         "no absolute word has yet said where an axis stands, or something may have moved it: tool "
-        "change, offset, homing, probing, somebody who jogs at M0 or M1",
+        "change, offset, homing, probing, somebody who jogs at M0 or M1; A, B or C in inches, "
+        "on controls that may convert degrees (grbl, Duet)",
         "usual for the first move of each axis, and behind T0101 of a lathe; `program.start` says "
         "where the axes stand, `program.offsets` work offsets and tool lengths, `program.home` "
-        "where G28 leads, `program.tool_change` M6, `program.resume_after_stop` what happens at M0",
+        "where G28 leads, `program.tool_change` M6, `program.resume_after_stop` what M0 "
+        "does; write programs that turn axes in mm",
     ),
     Reason.ROTARY_WAY: Explanation(
         "an absolute rapid of A, B or C, which may go the short way round, or by the sign of its "

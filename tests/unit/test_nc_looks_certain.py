@@ -21,6 +21,7 @@ from gcodejerk.verification.second_reading.known import KINDS, Facts, Known
 
 WRITTEN, NO_DISTANCE = Reason.SYSTEM_WRITTEN, Reason.DISTANCE_MODE_UNKNOWN
 START, PATH = Reason.START_UNKNOWN, Reason.PATH_UNKNOWN
+NO_BLOCK = Reason.NOT_UNDERSTOOD
 CALLED = Reason.NOT_FOLLOWED
 HEADS = {
     "siemens": b"G71 G90 G94 G17 G40 G64 F100\nG0 X0 Y0 Z50\n",
@@ -101,6 +102,13 @@ NOT_CERTAIN = {
     "H without G43": ("fanuc", b"G43 H1 Z5.\nH2\nG0 Z9.\n", Reason.START_UNKNOWN),
     "another program": ("fanuc", b"M198 P1000\nG90 G40 G0 X5.\nX6.\n", Reason.UNITS_UNKNOWN),
     "an interrupt": ("fanuc", b"M96 P1000\nG90 G40 G0 X5.\nX6.\n", Reason.UNITS_UNKNOWN),
+    # RepRapFirmware's SetPositions leaves the offset of the work system out.
+    "G92 beside an offset of a Duet": ("duet", b"G92 X3\nG0 X7\n", START),
+    "a tool that M109 may change": ("duet", b"M109 S200\nG0 X7\n", NO_BLOCK),
+    "an exponent, which runs feed moves": (
+        "duet", b"G1 X1 Y1\nG1 X2 Y2\n" * 9 + b"G1 X1.E1 Y3\nG1 Y4\nG0 X7\n", NO_BLOCK
+    ),
+    "an exponent": ("duet", b"G1 X1E3 F100\nG0 X7\n", NO_BLOCK),
     "a hexadecimal number": ("marlin", b"G0Y0X10\n", Reason.NOT_UNDERSTOOD),
     "no look-ahead": ("haas", b"G103 P1\nG0 X5.\n", Reason.LOOK_AHEAD),
     "inches with F in mm": ("siemens", b"G70\nG0 X5\nX6\n", Reason.FEED_UNIT),
@@ -1008,6 +1016,23 @@ def test_what_a_word_of_an_a_that_slides_means_in_inches_is_not_known(dialect):
     # Where it turns, degrees are degrees.
     assert START not in read(text, dialect, head, wraps={"A": "none"})
     also_noticed(head + text, dialect, **slides)
+
+
+@pytest.mark.parametrize("dialect", ["duet", "grbl", "rs274", "any-mill"])
+def test_how_far_an_a_turns_in_inches_is_not_known_where_a_firmware_converts_degrees(dialect):
+    """RepRapFirmware converts words of every axis, grblHAL those of axes outside of $376."""
+    turns = {"wraps": {"A": "none"}, "limits": dict.fromkeys("XYZA", (math.inf,) * 3)}
+    head = b"G21 G90 G94 G17 G40 G49 G54 F100\nG0 X0. Y0. Z50.\n"
+    head = HEADS["duet"] if dialect == "duet" else head
+    text = b"G0 A10.\nG0 A20.\nG0 X9.\n"
+    assert read(text, dialect, head, **turns) == [START, None, None]
+    inches = head.replace(b"G21", b"G20")
+    assert read(text, dialect, inches, **turns) == [START, START, None]
+    data = inches + text[:16]
+    another = replace(DIALECTS[dialect], inches_turn=False)
+    rapids = read_program(io.BytesIO(data), dialect=another, start=Start(**turns)).rapids
+    assert rapids.reason[-1] == CERTAIN
+    assert not confirm(io.BytesIO(data), dialect, Start(**turns), rapids, [1], Findings(100))
 
 
 def test_an_a_that_slides_is_known_in_no_program_for_a_machine_in_inches():

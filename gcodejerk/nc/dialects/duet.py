@@ -14,6 +14,8 @@ src/GCodes/GCodes2.cpp (HandleGcode, HandleMcode). What is different from Marlin
 - ``( )`` is a comment in CNC mode alone; one that does not close ends with its line.
 - ``if``, ``while``, ``var`` and their kin in small letters are commands, whose blocks are told by
   their indentation: behind one, nothing is rewritten any more.
+- ``X1E3`` is X1000 (RRFLibraries, SafeStrtof). M109 may select a tool, and run its macros.
+- In inches the words of every axis are converted, those of rotary ones, too (GetDistance).
 - G28 and codes without a meaning run macros of the owner's; M30 deletes a file.
 """
 
@@ -25,7 +27,7 @@ from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 SILENT = (
-    *(7, 8, 9, 17, 20, 21, 22, 27, 36, 39, 42, 73, 82, 83, 104, 105, 106, 107, 109, 110, 111, 114),
+    *(7, 8, 9, 17, 20, 21, 22, 27, 36, 39, 42, 73, 82, 83, 104, 105, 106, 107, 110, 111, 114),
     *(115, 116, 119, 122, 140, 141, 144, 150, 190, 191, 201, 203, 204, 205, 207, 300, 302, 303),
     *(308, 400, 408, 409, 453, 500, 503, 566, 572, 593, 906, 913),
 )
@@ -49,7 +51,8 @@ _EFFECTS: dict[int, Effect] = {
     **dict.fromkeys((110, 280, 290, 300, 310, 320, 380, 382, 383, 384, 385), "home"),
     **dict.fromkeys(SYSTEMS, "frames"),
     530: "frames",
-    920: "set",
+    # SetPositions takes the words for places without the offset of the work system.
+    920: "home",
 }
 _MODES = frozenset({170, 180, 190, 200, 210, 690, 900, 910, 930, 940})
 _NAMES = frozenset(f"M{m}" for m in (0, 1, 2, 3, 4, 5, 6, *SILENT)) | code_names("G4", "G10", "G68")
@@ -72,6 +75,7 @@ DUET = Dialect(
         variables="none",
         blanks="between",
         checksum=True,
+        exponents=True,
         line_limit=200,
     ),
     groups=grouped(
@@ -112,7 +116,7 @@ DUET = Dialect(
     feed_lost=True,
     in_turn=_MODES,
     dark_rapids=True,
-    incremental_set=True,
+    inches_turn=True,
     limits=limits.DUET,
     tool_frame=frozenset("T"),
     macro_change=True,

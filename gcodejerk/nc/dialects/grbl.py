@@ -150,6 +150,8 @@ GRBL = Dialect(
     dark_rapids=True,
     beam_codes=frozenset({4}),
     incremental_set=True,
+    # grblHAL (gcode.c): all axes that $376 does not name.
+    inches_turn=True,
     redrawn=frozenset({382, 383, 384, 385}),
     harmless=frozenset({0, 40, 170, 180, 190, 200, 210, 400, 610, 900, 910, 911, 930, 940}),
     # gcode.c, step 4 of gc_execute_line: spindle, coolant, overrides, motion, then program flow.

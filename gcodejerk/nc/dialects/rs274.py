@@ -97,6 +97,7 @@ RS274 = Dialect(
     # grbl knows none of these, and behind G61.1 the others may have moved.
     refused=GRBL.refused | code_names("G15", "G16", "G61.1", "G68", "G69"),
     refuses=GRBL.refuses,
+    inches_turn=GRBL.inches_turn,
     feed_before_units=True,
     arcs_refused=True,
     feed_needed=True,

@@ -77,6 +77,8 @@ class Text:
     """A word may hold a name: ``T="DRILL 8.5"``."""
     hexadecimal: bool = False
     """A zero in front of an X begins a hexadecimal number: ``Y0X10`` is Y16."""
+    exponents: bool = False
+    """An E behind a digit or a point begins an exponent: ``X1E3`` is X1000."""
     end: bytes = b""
     """What ends every block."""
     line_limit: int = 512

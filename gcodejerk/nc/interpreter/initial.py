@@ -22,7 +22,7 @@ def initial_state(dialect: Dialect, start: Start) -> State:
     """Make the state in which a program starts."""
     state = State()
     _set_defaults(state, dialect)
-    _set_frames(state, start)
+    _set_frames(state, dialect, start)
     if start.startup and not dialect.text.klartext:  # which has no codes, and says its modes
         _run_startup(state, dialect, start)
     for axis, letter in enumerate(AXES):
@@ -59,10 +59,12 @@ def _fixed(dialect: Dialect) -> frozenset[str]:
     return frozenset(fields)
 
 
-def _set_frames(state: State, start: Start) -> None:
+def _set_frames(state: State, dialect: Dialect, start: Start) -> None:
     """Take what the machine file says of axes and work systems."""
     state.wraps = tuple(start.wraps.get(axis) for axis in AXES)
-    state.slides = tuple(start.linear.get(axis) for axis in AXES)
+    # Degrees that may be converted are known where those of a slide are.
+    turning = True if dialect.inches_turn else None
+    state.slides = tuple(start.linear.get(axis, turning) for axis in AXES)
     state.limits, state.along, state.straight = start.limits, start.along, start.straight
     state.diameter = state.turns = start.diameter
     for system, offsets in start.offsets.items():

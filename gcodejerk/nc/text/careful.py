@@ -50,6 +50,7 @@ _LEADER = re.compile(
     re.IGNORECASE,
 )
 _HEXADECIMAL = re.compile(rb"[A-Z][ \t]*[-+]?0[Xx]", re.IGNORECASE)
+_EXPONENT = re.compile(rb"[A-Z][ \t]*[-+]?[0-9.]+E", re.IGNORECASE)
 
 
 class CarefulLine(Cursor):
@@ -126,6 +127,8 @@ class CarefulLine(Cursor):
         function = ""
         if self.rules.hexadecimal and _HEXADECIMAL.match(self.text, begin):
             raise SyntaxProblem("0X begins a hexadecimal number", self.at)
+        if self.rules.exponents and _EXPONENT.match(self.text, begin):
+            raise SyntaxProblem("E begins an exponent", self.at)
         if match and SHAPE.fullmatch(match[2]):  # the usual case, made quick
             self.at = match.end(2)
             value: float | None = float(match[2])

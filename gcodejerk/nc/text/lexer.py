@@ -144,6 +144,9 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
     if dialect.text.hexadecimal:
         xs = np.flatnonzero(kind == ord("X"))
         bad[xs] |= text.take(place.take(xs) - 1) == ord("0")
+    if dialect.text.exponents:
+        es = np.flatnonzero(kind == ord("E"))
+        bad[es] |= text.take(place.take(es) - 1) != ord(" ")
 
     wide = np.flatnonzero(width > _SHORT + 1)
     if len(wide):

@@ -246,8 +246,9 @@ class Known:
     def scale(self, axis: str) -> float:
         """Mm or deg for 1 of an axis word."""
         if axis not in LINEAR:
-            told = axis not in self.facts.linear or (self.facts.linear[axis] and self.unit == 1.0)
-            return 1.0 if told else NAN
+            slides = self.facts.linear.get(axis)
+            converted = slides is not None or self.dialect.inches_turn
+            return 1.0 if slides is not False and (self.unit == 1.0 or not converted) else NAN
         if self.unit is None or (axis == "X" and self.diameter is None):
             return NAN
         return self.unit / 2.0 if axis == "X" and self.diameter else self.unit

@@ -14,6 +14,8 @@ _LOOSE = re.compile(rb"[A-Z] *\t|^\t[ \t\0]*[A-Z]|[GMT] *[-+]|[-+] ", re.IGNOREC
 _COMMENT = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
 _SAYING = re.compile(rb"^([ \t]*(?:N[0-9]+[ \t]*)?M11[78])(?:[^0-9.].*)?$")
 _NUMBER = re.compile(rb"N([0-9]+)")
+_HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
+_EXPONENT = re.compile(rb"[0-9.]E")
 _LONG = re.compile(rb"(?<![0-9.N])[0-9]{5,}\.?[0-9]*")
 
 
@@ -55,6 +57,14 @@ def is_too_much(text: bytes, dialect: Dialect) -> bool:
         return True
     numbers = _LONG.findall(text) if rules.digits else []
     return any(len(n) - n.count(b".") > rules.digits for n in numbers)
+
+
+def is_one_number(text: bytes, dialect: Dialect) -> bool:
+    """Whether two words may be read as one number; capitals, comments are taken out."""
+    rules = dialect.text
+    if rules.hexadecimal and _HEXADECIMAL.search(text):
+        return True
+    return rules.exponents and _EXPONENT.search(text) is not None
 
 
 def written_frame(text: bytes) -> str:

@@ -24,6 +24,7 @@ from gcodejerk.verification.second_reading.klartext import read_statement
 from gcodejerk.verification.second_reading.lengths import (
     is_cut,
     is_loose,
+    is_one_number,
     is_too_much,
     unsaid,
     written_frame,
@@ -63,7 +64,6 @@ _NAME = re.compile(rb"([A-Z_][A-Z_][A-Z0-9_]*)([ \t]*\((?:[^()\"]|\"[^\"]*\")*\)
 _PARAMETER = re.compile(rb"R[0-9]+[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;]*")
 _PADDED = re.compile(rb"(?<![A-Z_])[GM](?:[ \t]|0[0-9])", re.IGNORECASE)
 _NUMBERED = re.compile(rb"[ \t]*N[-+ 0-9]", re.IGNORECASE)
-_HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
 _SPINDLE = re.compile(rb"\$(-?[0-9]+)\.?(?![-+0-9.#\[])")
 _STRING = re.compile(rb"([A-Z])[ \t]*=[ \t]*\"[^\"]*\"")
@@ -216,8 +216,8 @@ class Text:
             end = more.end()
         text = data[at:end]
         lines = text.count(b"\n")
-        most = self.dialect.text.characters
-        if most and max(map(len, text.split(b"\n"))) > most:
+        most = self.dialect.text.characters or len(text)
+        if max(map(len, text.split(b"\n"))) > most or is_one_number(text, self.dialect):
             return None
         text = re.sub(rb"\([^()]*\)", b"", text) if b"(" in text else text
         last: dict[str, float] = {}
@@ -319,7 +319,7 @@ class Text:
                 line.understood, line.words = True, [("G", float(unit[1]), True)]
         elif rules.o_word != "error" and (match := _O_WORD.match(text)):
             line.flow = match[2].decode()
-        elif (rules.hexadecimal and _HEXADECIMAL.search(text)) or is_too_much(text, self.dialect):
+        elif is_one_number(text, self.dialect) or is_too_much(text, self.dialect):
             line.understood = False
         elif rules.names and "$" in self.dialect.names and _SYSTEM_DATA.match(text):
             line.effects.append("written")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G1, G40
 from gcodejerk.verification.second_reading.circling import NO_FEED
+from gcodejerk.verification.second_reading.lengths import is_one_number
 from gcodejerk.verification.second_reading.tracking import Tracker
 
 Column = NDArray[np.float64]
@@ -35,7 +36,6 @@ _FEED_LINES = 15
 _NUMBERS_ONLY = bytes(32 if chr(c) in "GNXYZF\r\n\t" else c for c in range(256))
 _FRONT = re.compile(rb"^[ \t]*(?:[0-9]+[ \t]+)?L", re.MULTILINE)
 """What stands in front of the words of a line in Klartext."""
-_HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +142,7 @@ class PlainLines:
         if match is None:
             return None
         text, rules = match[0], self.dialect.text
-        if rules.hexadecimal and _HEXADECIMAL.search(text):
+        if is_one_number(text, self.dialect):
             return None
         characters = np.frombuffer(text, dtype=np.uint8)
         ends = np.flatnonzero(characters == 10)
