@@ -108,6 +108,10 @@ NOT_CERTAIN = {
     "an exponent, which runs feed moves": (
         "duet", b"G1 X1 Y1\nG1 X2 Y2\n" * 9 + b"G1 X1.E1 Y3\nG1 Y4\nG0 X7\n", NO_BLOCK
     ),
+    "a command that a blank takes apart": ("duet", b"G 91\nG0 X7\n", NO_BLOCK),
+    "a comment and a blank in front of it": ("duet", b"(rapids)\n(a) G91\nG0 X7\n", NO_BLOCK),
+    "two of them, behind N": ("duet", b"N5 (a)(b) G91\nG0 X7\n", NO_BLOCK),
+    "a checksum, which may be wrong": ("duet", b"N5 G91*9\nG0 X7\n", NO_BLOCK),
     "an exponent": ("duet", b"G1 X1E3 F100\nG0 X7\n", NO_BLOCK),
     "a hexadecimal number": ("marlin", b"G0Y0X10\n", Reason.NOT_UNDERSTOOD),
     "no look-ahead": ("haas", b"G103 P1\nG0 X5.\n", Reason.LOOK_AHEAD),
@@ -406,6 +410,9 @@ STILL_CERTAIN = {
         "siemens", b"$P_UIFR[1]=CTRANS(X,5)\nG54 D1\nG0 X5\nX6\n"
     ),
     "parameters of LinuxCNC": ("linuxcnc", b"#5221=3\nG0 X5\n"),
+    "comments of a Duet": (
+        "duet", b"(a (b)\n (a)\n(a)G0 X5 (b) Y3 (c)\nN5 (a)G1 X6 F9 (d\n(a) ; b\nG0 X7 ; (a) G9\n"
+    ),
     "an offset of a Duet": ("duet", b"G10 L2 P1 X5\nG54\nG0 X5 Y5 Z5\nG0 X6\n"),
     "behind MCALL, which a call may have left": (
         "siemens", b"SUB_OF_THE_BUILDER\nG710 G90 G94 G17 G40 G64 F100\nMCALL\nG0 X5 Y5 Z5\nX6\n"

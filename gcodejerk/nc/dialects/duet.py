@@ -13,8 +13,11 @@ src/GCodes/GCodes2.cpp (HandleGcode, HandleMcode). What is different from Marlin
   is a rapid behind which a feed move relies on the F before, which no G0 could restore.
 - ``( )`` is a comment in CNC mode alone; one that does not close ends with its line.
 - ``if``, ``while``, ``var`` and their kin in small letters are commands, whose blocks are told by
-  their indentation: behind one, nothing is rewritten any more.
+  their indentation: behind one, nothing is rewritten any more, nor behind ``echo``, which is one in
+  front of a line alone.
 - ``X1E3`` is X1000 (RRFLibraries, SafeStrtof). M109 may select a tool, and run its macros.
+- ``G 0`` is no command, nor is one behind a comment and a blank; a line with N whose checksum is
+  wrong is thrown away (so no ``*`` is read here).
 - In inches the words of every axis are converted, those of rotary ones, too (GetDistance).
 - G28 and codes without a meaning run macros of the owner's; M30 deletes a file.
 """
@@ -74,8 +77,8 @@ DUET = Dialect(
         names=True,
         variables="none",
         blanks="between",
-        checksum=True,
         exponents=True,
+        adjoining=True,
         line_limit=200,
     ),
     groups=grouped(
@@ -97,7 +100,7 @@ DUET = Dialect(
     # No code changes these.
     defaults={"compensation": 400, "path": 640},
     effects=_EFFECTS,
-    names={**dict.fromkeys(_META, "watch"), "ECHO": "none"},
+    names=dict.fromkeys(_META, "watch"),
     letters="FSTXYZABCUVWDEHIJKLPQR",
     # H and R make moves of another kind of G1, S is the power of a beam
     uses={

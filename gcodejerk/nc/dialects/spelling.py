@@ -26,6 +26,9 @@ class Text:
     tight: bool = False
     """A tab, a blank behind a sign or a sign in front of a code makes another word of it, or none.
     """
+    adjoining: bool = False
+    """A blank behind G, M or T, or behind a comment in front of them, leaves no command: ``G 0``,
+    ``(rapid) G0 X5``."""
     numbered: bool = True
     """N in front of a block is passed over; otherwise it may make no command of it: who sends the
     program puts another N in front."""

@@ -70,6 +70,8 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     width = np.diff(joint, append=joint[-1])
     bad |= _misplaced(kind, width > 1)
     bad |= _doubtful_numbers(joints, width, dialect)
+    if dialect.text.adjoining:
+        bad |= _behind_comments(kind)
 
     # The first joint is the line end in front of all lines, the last one stands behind them.
     at = np.flatnonzero(kind == END)[:-1]
@@ -122,6 +124,13 @@ def _misplaced(kind: NDArray[np.uint8], digits: Flags) -> Flags:
     bad |= (kind >= OPEN) & ~letter & ~((kind == STAR) & _next((kind == END) | (kind == CR)))
     bad |= (kind >= BLANK) & ~letter & digits
     bad |= (kind == CR) & ~_next(kind == END)
+    return bad
+
+
+def _behind_comments(kind: NDArray[np.uint8]) -> Flags:
+    """What closes a comment in front of something."""
+    bad: Flags = (kind == BLANK) & _before(kind == COMMENT)
+    bad &= ~_next((kind == END) | (kind == CR) | (kind == COMMENT))
     return bad
 
 

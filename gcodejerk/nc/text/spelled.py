@@ -17,6 +17,11 @@ _TIGHT = re.compile(
     rb"|[^;]*?(?:[A-Z] *\t|[GMT] *[-+]|[A-Z] *[-+] )",
     re.IGNORECASE,
 )
+_APART = re.compile(
+    rb"[ \t]*(?:N[0-9]+[ \t]*)?(?:\([^)]*\))+[ \t](?:[ \t]|\([^)]*\))*[^ \t(;]"
+    rb"|(?:[^;(]|\([^)]*\))*?[GMT][ \t]+[0-9]",
+    re.IGNORECASE,
+)
 _COMMENTS = re.compile(rb"\([^)]*\)?|;.*")
 _FEW = 4
 """Digits in front of the point up to which those that are lost are none that matter."""
@@ -41,6 +46,8 @@ def check_line(rules: Text, text: bytes) -> None:
             raise SyntaxProblem(f"more than {rules.characters} characters", rules.characters)
     if rules.tight and (found := _TIGHT.match(_COMMENTS.sub(_blanks, text))):
         raise SyntaxProblem("a blank, tab or sign that makes another word of it", found.end() - 1)
+    if rules.adjoining and (found := _APART.match(text)):
+        raise SyntaxProblem("a blank in front of it leaves no command", found.end() - 1)
 
 
 def is_too_long(rules: Text, text: bytes) -> bool:

@@ -11,6 +11,9 @@ from gcodejerk.nc.dialects.dialect import Dialect
 
 _LOOSE = re.compile(rb"[A-Z] *\t|^\t[ \t\0]*[A-Z]|[GMT] *[-+]|[-+] ", re.IGNORECASE)
 """What Marlin takes for another word, or for none."""
+_FRONT = re.compile(rb"^[ \t]*(?:N[0-9]+[ \t]*)?", re.IGNORECASE)
+_ROUND = re.compile(rb"\([^)]*\)?")
+_SPLIT = re.compile(rb"[GMT][ \t]+[0-9]", re.IGNORECASE)
 _COMMENT = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
 _SAYING = re.compile(rb"^([ \t]*(?:N[0-9]+[ \t]*)?M11[78])(?:[^0-9.].*)?$")
 _NUMBER = re.compile(rb"N([0-9]+)")
@@ -20,13 +23,21 @@ _LONG = re.compile(rb"(?<![0-9.N])[0-9]{5,}\.?[0-9]*")
 
 
 def is_cut(text: bytes, dialect: Dialect) -> bool:
-    """Whether the control may not read a line to its end."""
+    """Whether the control may not read a line to its end, or not see its command."""
     rules = dialect.text
     long = len(text) > rules.line_limit
     if long and not (rules.long_comments and not _COMMENT.sub(b"", text).strip()):
         return True
+    if rules.adjoining and _is_no_command(text):
+        return True
     ended = rules.inner_semicolon and b";" in text and b"(" in text and _may_end_within(text)
     return ended or (b"\r" in text and not rules.returns)
+
+
+def _is_no_command(text: bytes) -> bool:
+    """Whether a blank is left in front of the command, or stands within it."""
+    said = _ROUND.sub(b"", _FRONT.sub(b"", text)).partition(b";")[0]
+    return (said[:1].isspace() and bool(said.strip())) or _SPLIT.search(said) is not None
 
 
 def _may_end_within(text: bytes) -> bool:
