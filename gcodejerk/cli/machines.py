@@ -57,7 +57,7 @@ def _unknown_names(described: Machine) -> list[MachineError]:
     """A controller or dialect that nothing installed has: no program can be processed with it."""
     from gcodejerk.emit import controller_of
     from gcodejerk.errors import GcodejerkError, MachineError, Place
-    from gcodejerk.rewrite.language import dialect_of
+    from gcodejerk.nc import dialect_of
 
     found = []
     for key, load in (("controller", controller_of), ("dialect", dialect_of)):

@@ -168,9 +168,8 @@ def _moves(
     from gcodejerk.batch.files import open_input
     from gcodejerk.batch.inputs import find_inputs
     from gcodejerk.errors import ProgramError
-    from gcodejerk.nc import read_program
+    from gcodejerk.nc import dialect_of, read_program
     from gcodejerk.parameters import Moves, joined_moves, program_moves
-    from gcodejerk.rewrite.language import dialect_of
 
     if not files:
         first, last = _travelled(machine) if lengths is None else _range(lengths)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects import AUTO, DIALECTS, find_dialect
+from gcodejerk.nc.dialects import AUTO, DIALECTS, dialect_of, find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.interpreter.rapids import Rapids
 from gcodejerk.nc.interpreter.runner import Finding
@@ -24,6 +24,7 @@ __all__ = [
     "Rapids",
     "Start",
     "Word",
+    "dialect_of",
     "find_dialect",
     "parse_block",
     "read_program",

@@ -24,10 +24,9 @@ from numpy.typing import NDArray
 from gcodejerk.cycles.expansion import Expansion, expand
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Program, Rapids
+from gcodejerk.nc import Program, Rapids, dialect_of
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.line_map import Chain, Lines
-from gcodejerk.rewrite.language import dialect_of
 from gcodejerk.start import Start
 from gcodejerk.storage import made
 from gcodejerk.unrolling.unrolling import Unrolling, unroll

@@ -22,7 +22,7 @@ from gcodejerk.emit.fits import reasons_to_leave
 from gcodejerk.emit.program_lines import require_way
 from gcodejerk.errors import EmitError, Place, ProgramError, VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Program, read_program
+from gcodejerk.nc import Program, dialect_of, read_program
 from gcodejerk.nc.line_map import Lines
 from gcodejerk.planning.independent_axes import dogleg_notes
 from gcodejerk.planning.lines import Play
@@ -42,7 +42,6 @@ from gcodejerk.rewrite.expanded import (
 )
 from gcodejerk.rewrite.feed_moves import instead_notes
 from gcodejerk.rewrite.foreign import HEAD, refuse_foreign
-from gcodejerk.rewrite.language import dialect_of
 from gcodejerk.rewrite.notes import band_notes, operator_notes, program_notes, tick_notes
 from gcodejerk.rewrite.rapid_feed import check_dialect, check_rapid_feed
 from gcodejerk.rewrite.result import ReportedProfiles, Result

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.errors import VerifyError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Dialect, Program, Start, read_program
+from gcodejerk.nc import Dialect, Program, Start, dialect_of, read_program
 from gcodejerk.spread import Spread
 from gcodejerk.verification.bytes.alignment import Alignment, Progress
 from gcodejerk.verification.bytes.guarded_form import check_guarded
@@ -341,7 +341,7 @@ def _read(
     program = read_program(
         original,
         name=name,
-        dialect=dialect or machine.dialect,
+        dialect=dialect if isinstance(dialect, Dialect) else dialect_of(machine, dialect),
         start=start,
         neighbours=machine.neighbours_matter,
     )

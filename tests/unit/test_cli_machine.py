@@ -269,6 +269,8 @@ def test_a_name_that_nothing_has_is_said_before_a_program_is_processed(
     (tmp_path / "part.nc").write_text(PROGRAM)
     assert command("process", "part.nc", "-m", "n.yaml")[0] == 1
     assert place in command("process", "part.nc", "-m", "n.yaml")[1]
+    if key == "dialect":
+        assert place in command("verify", "part.nc", "part.nc", "-m", "n.yaml")[1]
     instead = ("--controller", "grbl", "--dialect", "grbl")
     assert command("process", "part.nc", "-m", "n.yaml", *instead)[0] == 0
 

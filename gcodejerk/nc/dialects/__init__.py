@@ -7,9 +7,11 @@ group `gcodejerk.dialects`; it cannot take the name of one of ours.
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from importlib.metadata import entry_points
+from typing import Protocol
 
-from gcodejerk.errors import ProgramError
+from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.dialects.any_mill import ANY_MILL
 from gcodejerk.nc.dialects.centroid import CENTROID
 from gcodejerk.nc.dialects.dialect import Dialect
@@ -50,6 +52,47 @@ DIALECTS: dict[str, Dialect] = {
 def lathe_dialects() -> list[str]:
     """Names of those in which programs of lathes are written."""
     return [name for name, dialect in DIALECTS.items() if dialect.lathe != "no"]
+
+
+class NamesDialect(Protocol):
+    """A machine file: it names a dialect, somewhere."""
+
+    @property
+    def dialect(self) -> str:
+        """The name, or `auto`."""
+
+    @property
+    def named_at(self) -> Mapping[str, Place]:
+        """Key -> where what it says stands."""
+
+
+def dialect_of(machine: NamesDialect, chosen: str | None = None) -> str:
+    """The name of a dialect that there is, or `auto`.
+
+    Parameters
+    ----------
+    machine : Machine
+        Names one.
+    chosen : str, optional
+        Instead of it.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ProgramError
+        There is none of that name; with its place where the machine file names it.
+    """
+    name = chosen or machine.dialect
+    try:
+        if name != AUTO:
+            find_dialect(name)
+    except ProgramError as error:
+        error.place = None if chosen else machine.named_at.get("dialect")
+        raise
+    return name
 
 
 def find_dialect(dialect: str | Dialect) -> Dialect:
