@@ -1073,6 +1073,13 @@ def test_what_fluidnc_takes_otherwise_is_not_known(line, dialect):
 
 
 @pytest.mark.parametrize("dialect", ["grbl", "rs274"])
+def test_what_the_second_reading_does_not_know_it_does_not_refuse(dialect):
+    """An axis that the machine does not have leaves it without a motion, the first one with G0."""
+    head = b"G21 G90 G94 G17 G54 G40 G49\nG0 X1 Y1 Z1\n"
+    assert read(head + b"W-3\nX9\nZ9\n", dialect, b"", limits={})[-2:] == [None, None]
+
+
+@pytest.mark.parametrize("dialect", ["grbl", "rs274"])
 @pytest.mark.parametrize(
     "line",
     [

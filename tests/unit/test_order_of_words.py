@@ -159,3 +159,16 @@ def test_a_word_with_an_equals_sign_is_the_word_without_it():
     written = made.output.decode().splitlines()
     assert any(line.startswith("G1 X3 Y+5 F") for line in written)
     assert not any("=" in line for line in written if line.startswith("G1"))
+
+
+@pytest.mark.parametrize(
+    ("word", "restored"), [("F0", "F0"), ("F0.", "F0.0"), ("F700", "F700"), ("F700.", "F700.0")]
+)
+def test_f_is_restored_as_it_was_written_with_a_point_or_without(word, restored):
+    program = f"{HEADS['fanuc']} {word}\nG0 X0. Y0. Z0.\nG0 X-9.\nG1 X-12.\nM30\n"
+    program = program.replace(" F100.", "").encode()
+    result = process(program, VMC, dialect="fanuc", controller="fanuc")
+    assert result.planned == 1
+    lines = result.output.decode().split("\n")
+    assert lines[lines.index("G1 X-12.") - 1].split()[-1] == restored
+    assert verify(program, result.output, VMC).ok

@@ -407,8 +407,8 @@ class StreamReader:
     def _same_scale(self, line: bytes) -> None:
         """F is restored as it was written: with a decimal point or without."""
         whole = _WHOLE.search(line) is not None
-        machine = self.dialect.whole_numbers == "machine"
-        if machine and b"F" in line and whole != bool(self.rapids.feed_whole[self.i]):
+        wanted = bool(self.rapids.feed_whole[self.i] and self.rapids.feed[self.i])
+        if self.dialect.whole_numbers == "machine" and b"F" in line and whole != wanted:
             how = "without" if whole else "with"
             self.complain(Kind.FEED_RESTORED, f"F is restored {how} a decimal point")
 

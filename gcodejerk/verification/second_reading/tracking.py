@@ -170,6 +170,8 @@ class Tracker(Circling):
         self.join(before)
         if not self.stays():
             self.lose()
+        if before.g.get("motion") is None and "motion" not in block.g:
+            return Observation()  # here it is not known what they would do
         return Observation(against="some of the controls refuse it")
 
     def _lost(self, line: Line) -> Observation:
