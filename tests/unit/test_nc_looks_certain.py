@@ -1072,6 +1072,14 @@ def test_what_fluidnc_takes_otherwise_is_not_known(line, dialect):
     assert read(head + line + b"\nG0 X9 Y9\n", dialect, b"")[-1] is not None
 
 
+def test_the_name_of_the_file_means_nothing_to_either_reading_beside_calls():
+    head = b"%\nPART-2.NC (post)\nG21 G90 G94 G17 G40 G49 G80 G54 G64 F100.\nG0 Z50.\n"
+    text = b"G0 Z5.\nG1 X5.\nM98 P1000\nM30\n%\n"
+    assert read(text, "fanuc", head) == [None]
+    rapids = read_program(io.BytesIO(head + text), dialect="fanuc").rapids
+    assert confirm(io.BytesIO(head + text), "fanuc", Start(), rapids, [1], Findings(9)) == 1
+
+
 @pytest.mark.parametrize("dialect", ["grbl", "rs274"])
 def test_what_the_second_reading_does_not_know_it_does_not_refuse(dialect):
     """An axis that the machine does not have leaves it without a motion, the first one with G0."""

@@ -306,10 +306,14 @@ class Walker:
         upper = self.routes.lines[at]
         head = upper.strip(b" \t\0")
         if at == part.begin and self.routes.by_code and head[:1] in (b"%", b"O", b":"):
-            state.begun = state.started = True
+            state.started = True
+            if head[:1] == b"%":
+                state.opened = True  # the name of the file may stand behind it
+            else:
+                state.begun = True
             return [(at + 1, state)]
         if head == b"%":
-            return [(at + 1, state)] if not state.begun else []
+            return [(at + 1, state)] if not (state.begun or state.opened) else []
         if b"PROC" in head.split() and self._calls:
             return [(at + 1, state)]
         if self.routes.named:
