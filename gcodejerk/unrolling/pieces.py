@@ -101,7 +101,8 @@ def put_together(
         begin, line, ends = out, first.number + added, _ends(last)
         spans.append((line, len(piece.lines), out, 0, first.number, first.begin, last.end, 0))
         for k, written in enumerate(piece.lines):
-            end = newline if k < len(piece.lines) - 1 or ends else b""
+            # Of a file that ends in a carriage return, the last line keeps that.
+            end = newline if k < len(piece.lines) - 1 or ends.endswith(b"\n") else ends
             if target is not None:
                 target.write(written.text + end)
             size, own = len(written.text) + len(end), written.line

@@ -234,3 +234,10 @@ def test_who_leaves_loops_as_they_are_is_told_what_writes_them_out(front):
     assert any("--unroll writes out" in note for note in notes) is not front
     # Lines of a subprogram are read by themselves first: nothing is unknown since the call.
     assert not any("is unknown since" in note for note in notes)
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r", b""])
+def test_the_last_line_of_the_file_keeps_its_end(end):
+    program = b"M98 P1\nX152.156" + end
+    result = process(program, VMC, unroll=True, dialect="fanuc-lathe-a", controller="fanuc")
+    assert result.output.endswith(b"\nX152.156" + end.replace(b"\r\n", b"\n"))
