@@ -113,6 +113,10 @@ NOT_CERTAIN = {
     "two of them, behind N": ("duet", b"N5 (a)(b) G91\nG0 X7\n", NO_BLOCK),
     "a checksum, which may be wrong": ("duet", b"N5 G91*9\nG0 X7\n", NO_BLOCK),
     "an exponent": ("duet", b"G1 X1E3 F100\nG0 X7\n", NO_BLOCK),
+    # Fanuc tells macro statements from NC statements: a block is one or the other.
+    "words beside an assignment": ("fanuc", b"G1 X2.\n#1=2 G91\nG0 X5.\n", NO_DISTANCE),
+    "words behind a sum": ("haas", b"#1=2.+#3 G91\nG0 X5.\n", NO_DISTANCE),
+    "words in front of an assignment": ("haas", b"G91 #1=2.\nG0 X5.\n", NO_DISTANCE),
     "a hexadecimal number": ("marlin", b"G0Y0X10\n", Reason.NOT_UNDERSTOOD),
     "no look-ahead": ("haas", b"G103 P1\nG0 X5.\n", Reason.LOOK_AHEAD),
     "inches with F in mm": ("siemens", b"G70\nG0 X5\nX6\n", Reason.FEED_UNIT),
@@ -1070,6 +1074,12 @@ def test_what_fluidnc_takes_otherwise_is_not_known(line, dialect):
     ).rapids
     assert np.isnan(rapids.start[-1, :2]).any()
     assert read(head + line + b"\nG0 X9 Y9\n", dialect, b"")[-1] is not None
+
+
+def test_a_g40_behind_what_one_reading_does_not_know_is_not_held_against_a_rapid():
+    head = b"X=R1 ) A5\nG17 G54 G40 G49 G80 G90 G94 G21 F800.\n"
+    text = b"G2 X47.5 Y30. Z2.1 I-2.5 J0.\nG0 Z21.\n"
+    assert read(text, "haas", head) == [None]
 
 
 def test_the_name_of_the_file_means_nothing_to_either_reading_beside_calls():

@@ -236,6 +236,12 @@ def test_who_leaves_loops_as_they_are_is_told_what_writes_them_out(front):
     assert not any("is unknown since" in note for note in notes)
 
 
+def test_a_file_may_have_lines_of_both_ends():
+    program = b"G21 G90\nM98 P1\n%\r\n(1001)\r\n"
+    result = process(program, VMC, unroll=True, dialect="fanuc-lathe-b", controller="fanuc")
+    assert result.output.endswith(b"\nM98 P1\n%\r\n(1001)\r\n")
+
+
 @pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r", b""])
 def test_the_last_line_of_the_file_keeps_its_end(end):
     program = b"M98 P1\nX152.156" + end

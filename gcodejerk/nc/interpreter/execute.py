@@ -95,6 +95,9 @@ class Executor(Phases):
         for target in block.assigns:
             self._assign(target)
         refused = codes.fault or block.problem is not None
+        if block.assigns and self.dialect.text.open_expressions:
+            # A block is a macro statement or an NC statement, says Fanuc: who is both, may be none.
+            refused = refused or any(word.letter != "N" for word in block.words)
         if refused or not is_complete(codes, state, self.dialect):
             assign(block, [NAN] * len(block.assigns), state, rules)
             self._switch_overrides(block, [NAN] * len(block.assigns))

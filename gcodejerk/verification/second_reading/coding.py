@@ -246,14 +246,17 @@ class Codes(Known):
             self.turn_tool()
         if "distance" in g and self.g.get("distance") != g["distance"]:
             self.level = self.r = NAN
-        was_off = self.g.get("compensation") == G40
+        before = self.g.get("compensation")
         for group, code in g.items():
             if group not in ("motion", "non-modal", "cycle"):
                 self.g[group] = code
             if code in dialect.transforms:
                 self._transform(*dialect.transforms[code], group == "mirror", values)
-            if code in dialect.bars and not (dialect.bars[code][0] == LEFT_OVER and was_off):
-                self._bar(*dialect.bars[code], values)
+            name, begins = dialect.bars.get(code, ("", False))
+            if name and not (name == LEFT_OVER and before == G40):
+                self._bar(name, begins, values)
+            if name == LEFT_OVER and before is None:
+                self.bars[name] = None  # there may have been none to end
         if "units" in g:
             self._units(g["units"], beside_feed="F" in values)
         if "path" in g:

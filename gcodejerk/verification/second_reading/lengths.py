@@ -19,6 +19,9 @@ _SAYING = re.compile(rb"^([ \t]*(?:N[0-9]+[ \t]*)?M11[78])(?:[^0-9.].*)?$")
 _NUMBER = re.compile(rb"N([0-9]+)")
 _HEXADECIMAL = re.compile(rb"[A-Z][-+ \t]*0X")
 _EXPONENT = re.compile(rb"[0-9.]E")
+_ASSIGNS = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+)?[ \t]*(#[0-9]+)[ \t]*=[^=#;()]*")
+_OPERATOR = re.compile(rb"MOD|AND|XOR|OR")
+_LETTER = re.compile(rb"[A-Z]")
 _LONG = re.compile(rb"(?<![0-9.N])[0-9]{5,}\.?[0-9]*")
 
 
@@ -76,6 +79,12 @@ def is_one_number(text: bytes, dialect: Dialect) -> bool:
     if rules.hexadecimal and _HEXADECIMAL.search(text):
         return True
     return rules.exponents and _EXPONENT.search(text) is not None
+
+
+def assigns_alone(text: bytes) -> bool:
+    """Whether nothing but variables is set, as Fanuc asks for; capitals, functions taken out."""
+    match = _ASSIGNS.match(text)
+    return match is not None and not _LETTER.search(_OPERATOR.sub(b"", text[match.start(1) :]))
 
 
 def written_frame(text: bytes) -> str:

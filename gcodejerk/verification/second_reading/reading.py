@@ -22,6 +22,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 from gcodejerk.verification.second_reading.klartext import read_statement
 from gcodejerk.verification.second_reading.lengths import (
+    assigns_alone,
     is_cut,
     is_loose,
     is_one_number,
@@ -42,9 +43,6 @@ _VARIABLE = re.compile(rb"#(?:[ \t]*#)*" + _INDEX)
 _INNERMOST = re.compile(rb"\[[^\[\]]*\]")
 _SETTINGS = re.compile(rb"#[ \t]*([0-9]+)[ \t]*=[ \t]*([0-9]+\.?(?![0-9])(?=[ \t]*(?:$|[#\0])))?")
 _CALL = re.compile(rb"[A-Z]{2,6}[ \t]*#0?(?:[ \t]*/[ \t]*#0?)?")
-_ASSIGNMENTS = re.compile(
-    rb"[ \t]*(?:N[ \t]*[0-9]+)?(?:[ \t]*(#[0-9]+|#[ \t]*<[^<>]*>)[ \t]*=[^=#;()]*)"
-)
 _TARGET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
 _SETTING = re.compile(rb"#+(?:[0-9]+|<[^<>]*>)=[-+]*(?:#+(?:[0-9]+|<[^<>]*>)|" + _NUMBER + rb")")
 """An assignment of one operand, behind which words may follow; without blanks."""
@@ -388,7 +386,7 @@ class Text:
             return _VARIABLE.sub(b"#", text) if line.understood else b""
         if b"=" in text:
             # Values of a line are read before any is set: what follows an = belongs to it.
-            line.understood = bool(_ASSIGNMENTS.match(text)) and text.count(b"=") == len(targets)
+            line.understood = assigns_alone(text) and text.count(b"=") == len(targets)
             return b""
         return _VARIABLE.sub(b"#", text)
 

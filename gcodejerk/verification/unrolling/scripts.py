@@ -361,7 +361,9 @@ def check_script(
         found.add(
             Kind.FLOW, walker.k + 1, len(mine), "blocks follow that the original does not run"
         )
-    ends = {line.endswith(b"\r") for line in other.split(b"\n")[:-1]}
-    if ends - {original.split(b"\n", 1)[0].endswith(b"\r")}:
+    ends, own = (
+        {line.endswith(b"\r") for line in text.split(b"\n")[:-1]} for text in (other, original)
+    )
+    if ends - own:
         found.add(Kind.LINE_END, None, None, "lines do not end as in the original")
     return len(mine)
