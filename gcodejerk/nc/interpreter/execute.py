@@ -94,11 +94,7 @@ class Executor(Phases):
         values = assigned_values(block, state, rules) if block.assigns else []
         for target in block.assigns:
             self._assign(target)
-        refused = codes.fault or block.problem is not None
-        if block.assigns and self.dialect.text.open_expressions:
-            # A block is a macro statement or an NC statement, says Fanuc: who is both, may be none.
-            refused = refused or any(word.letter != "N" for word in block.words)
-        if refused or not is_complete(codes, state, self.dialect):
+        if self._is_refused(block, codes):
             assign(block, [NAN] * len(block.assigns), state, rules)
             self._switch_overrides(block, [NAN] * len(block.assigns))
             self._doubt(block, codes, step)
@@ -117,6 +113,16 @@ class Executor(Phases):
                 step.fault, step.refused = False, ""  # nothing is known against it
         else:
             self.act(codes, step)
+
+    def _is_refused(self, block: Block, codes: Codes) -> bool:
+        """Whether the control refuses the block, or may."""
+        if codes.fault or block.problem is not None:
+            return True
+        if not is_complete(codes, self.state, self.dialect):
+            return True
+        # A block is a macro statement or an NC statement, says Fanuc: what is both may be neither.
+        sets = bool(block.assigns) and self.dialect.text.open_expressions
+        return sets and any(word.letter != "N" for word in block.words)
 
     def _run_or_refuse(self, codes: Codes, step: Step, code: str) -> None:
         """Run a block that some of the dialect's controls refuse: what both leave, is known."""
