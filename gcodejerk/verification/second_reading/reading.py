@@ -214,8 +214,9 @@ class Text:
             end = more.end()
         text = data[at:end]
         lines = text.count(b"\n")
-        most = self.dialect.text.characters or len(text)
-        if max(map(len, text.split(b"\n"))) > most or is_one_number(text, self.dialect):
+        most = self.dialect.text.characters
+        too_long = most and max(map(len, text.split(b"\n"))) > most
+        if too_long or is_one_number(text, self.dialect):
             return None
         text = re.sub(rb"\([^()]*\)", b"", text) if b"(" in text else text
         last: dict[str, float] = {}
