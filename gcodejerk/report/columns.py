@@ -119,7 +119,7 @@ class _Places:
             rapids.start[rows].view(np.int64).tolist(),
             rapids.target[rows].view(np.int64).tolist(),
             blocks,
-            strict=False,
+            strict=False,  # blocks go on behind these rows, and stand last: none is lost
         )
         for line, words, start, target, block in table:
             axes = self._axes_of(words)

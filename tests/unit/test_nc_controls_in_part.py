@@ -232,4 +232,5 @@ def test_behind_a_command_in_small_letters_nothing_is_rewritten():
         found = reasons(b"G0 X5\n%s\nG90\nG0 X7\nG0 X8\n" % line, "duet")
         assert found[0] is None
         assert None not in found[1:]
+    assert reasons(b'G0 X5\necho "G0 X9"\nG0 X7\n', "duet") == [None, None]
     assert reasons(b'G0 X5\nG94 echo "a" G91\nG0 X7\n', "duet")[-1] is not None

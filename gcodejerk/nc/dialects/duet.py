@@ -13,8 +13,8 @@ src/GCodes/GCodes2.cpp (HandleGcode, HandleMcode). What is different from Marlin
   is a rapid behind which a feed move relies on the F before, which no G0 could restore.
 - ``( )`` is a comment in CNC mode alone; one that does not close ends with its line.
 - ``if``, ``while``, ``var`` and their kin in small letters are commands, whose blocks are told by
-  their indentation: behind one, nothing is rewritten any more, nor behind ``echo``, which is one in
-  front of a line alone.
+  their indentation: behind one, nothing is rewritten any more. They are commands in front of a line
+  alone, and so is ``echo``, which does nothing to the machine.
 - ``X1E3`` is X1000 (RRFLibraries, SafeStrtof). M109 may select a tool, and run its macros.
 - ``G 0`` is no command, nor is one behind a comment and a blank; a line with N whose checksum is
   wrong is thrown away (so no ``*`` is read here).
@@ -100,7 +100,7 @@ DUET = Dialect(
     # No code changes these.
     defaults={"compensation": 400, "path": 640},
     effects=_EFFECTS,
-    names=dict.fromkeys(_META, "watch"),
+    names={**dict.fromkeys(_META, "watch"), "ECHO": "none"},
     letters="FSTXYZABCUVWDEHIJKLPQR",
     # H and R make moves of another kind of G1, S is the power of a beam
     uses={

@@ -220,6 +220,8 @@ class CarefulLine(Cursor):
         self.at = match.end()
         name, begin = match[0].decode().upper(), self.at
         if self.dialect.one_command:
+            if any(word.letter != "N" for word in self.words):
+                raise SyntaxProblem("a name behind a command is no command", match.start())
             self.at = len(self.text)  # all that follows belongs to the command
         elif self.dialect.names.get(name) in ("flow", "declaration") and self.skip() != b":":
             self.at = _TO_COMMENT.match(self.text, self.at).end()  # type: ignore[union-attr]
