@@ -74,8 +74,8 @@ def column(shape: int | tuple[int, ...], fill: Any, dtype: Any = np.float64) -> 
 
 
 def kept(values: NDArray[Any]) -> NDArray[Any]:
-    """The same values, where columns of so many rows are kept; of one value, that value once."""
-    if len(values) < MANY or not any(values.strides) or _is_mapped(values):
+    """The same values, where columns of so many rows are kept; if all rows are one, that once."""
+    if len(values) < MANY or not values.strides[0] or _is_mapped(values):
         return values
     return _stored(lambda part: values[part], values.shape, values.dtype)
 

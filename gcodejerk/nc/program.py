@@ -17,6 +17,7 @@ import numpy as np
 from gcodejerk.errors import Place, ProgramError
 from gcodejerk.nc.dialects import AUTO, find_dialect, lathe_dialects
 from gcodejerk.nc.dialects.any_mill import written_for
+from gcodejerk.nc.dialects.at_start import codes_at_start
 from gcodejerk.nc.dialects.detect import detect_dialect, refuse_klartext
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.again import begins_again
@@ -224,6 +225,12 @@ def open_reader(
         reader.runner.syntax_problems.append(Finding(None, message))
     if why:
         reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
+    if left_out := codes_at_start(start.startup, chosen)[1]:
+        message = (
+            f"of program.startup, {left_out} is not used: not every control that {chosen.name} "
+            "stands for has that, or means the same by it"
+        )
+        reader.runner.syntax_problems.append(Finding(None, message))
     if chosen.note:
         reader.runner.syntax_problems.append(Finding(None, f"dialect {chosen.name}: {chosen.note}"))
     return reader, file

@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, note
+from hypothesis import assume, given, note
 from hypothesis import strategies as st
 
+from gcodejerk.errors import ProgramError
 from gcodejerk.nc import DIALECTS, Start, read_program
 from gcodejerk.nc.dialects import any_mill, iso_mill, rs274
 from gcodejerk.reasons import CERTAIN
@@ -37,9 +38,25 @@ START = Start(
 )
 
 
-def certain(text, dialect):
+STARTING = (
+    *("G0", "G1", "G8", "G15", "G49", "G50", "G50.1", "G54", "G61", "G64", "G64 P0.01", "G67"),
+    *("G69", "G80", "G90.1", "G91.1", "G97", "G98", "G99", "M5", "M9", "M48"),
+)
+"""Further codes that a control may start with."""
+
+
+def accepts(dialect, codes):
+    """Whether a reading takes codes for those that its control starts with."""
+    try:
+        read_program(io.BytesIO(b"M30\n"), dialect=dialect, start=replace(START, startup=codes))
+    except ProgramError:
+        return False
+    return True
+
+
+def certain(text, dialect, start=START):
     """The certain rapids of a program by line, and all of them."""
-    rapids = read_program(io.BytesIO(text), dialect=dialect, start=START).rapids
+    rapids = read_program(io.BytesIO(text), dialect=dialect, start=start).rapids
     lines = rapids.line.tolist()
     return {lines[i]: i for i in range(len(lines)) if rapids.reason[i] == CERTAIN}, rapids
 
@@ -51,8 +68,18 @@ def test_what_is_certain_is_so_for_each_of_them(common, member, data):
     own = [member] if member == "siemens" else [common, member]
     text = data.draw(programs(data.draw(st.sampled_from(own))))
     note(text.decode("latin-1"))
-    mine, rapids = certain(text, common)
-    start = replace(START, startup="G71 G90 G17 G94 G40") if member == "siemens" else START
+    start = START
+    if member != "siemens":
+        ours = [codes for codes in STARTING if all(accepts(d, codes) for d in (common, member))]
+        further = data.draw(st.lists(st.sampled_from(ours), max_size=3, unique=True))
+        modes = data.draw(st.sampled_from(["G21 G90", "G21 G91", "G20 G90", "G21"]))
+        startup = " ".join([modes, "G17 G94 G40", *further])
+        assume(all(accepts(d, startup) for d in (common, member)))
+        start = replace(START, startup=startup)
+    note(start.startup)
+    mine, rapids = certain(text, common, start)
+    if member == "siemens":
+        start = replace(START, startup="G71 G90 G17 G94 G40")
     theirs = read_program(io.BytesIO(text), dialect=member, start=start).rapids
     where = {line: i for i, line in enumerate(theirs.line.tolist())}
     for line, i in mine.items():
@@ -71,6 +98,34 @@ def test_what_is_certain_is_so_for_each_of_them(common, member, data):
             columns = [*["feed_whole"] * whole, *["diameter"] * ("X" in axes)]
             for column in ("inch", "incremental", *columns):
                 assert getattr(rapids, column)[i] == getattr(theirs, column)[j], (line, column)
+
+
+PLAIN = b"G0 X1. Y2.\nG1 Z-1. F100.\nG0 Z5.\nG0 X30. Y4.\nG3 X40. Y4. I5. J0. F100.\nG0 X3. Y9.\n"
+"""A program that leaves every mode to the control."""
+
+
+@pytest.mark.parametrize("common", COMMON)
+def test_what_a_control_starts_with_holds_for_the_program(common):
+    compared = 0
+    for member in COMMON[common]:
+        for modes in ("G21 G90", "G21 G91", "G20 G90", "G20 G91"):
+            for codes in ("", "G17", "G18", "G94", "G95", "G40", *STARTING):
+                startup = f"{modes} {codes}".strip()
+                if not all(accepts(d, startup) for d in (common, member.name)):
+                    continue
+                start = replace(START, startup=startup)
+                mine, rapids = certain(PLAIN, common, start)
+                theirs = read_program(io.BytesIO(PLAIN), dialect=member.name, start=start).rapids
+                where = {line: i for i, line in enumerate(theirs.line.tolist())}
+                for line, i in mine.items():
+                    j = where[line]
+                    assert theirs.reason[j] == CERTAIN, (startup, line)
+                    for column in ("start", "target", "inch", "incremental", "feed_mode"):
+                        one, other = getattr(rapids, column)[i], getattr(theirs, column)[j]
+                        known = ~np.isnan(one)  # an axis that stands still need not be
+                        assert np.array_equal(one[known], other[known]), (startup, line, column)
+                    compared += 1
+    assert compared > 50
 
 
 @pytest.mark.parametrize("name", COMMON)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import Place, ProgramError
+from gcodejerk.nc.dialects.at_start import codes_at_start, dialect_at_start, is_of_several
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.interpreter.execute import Executor
 from gcodejerk.nc.interpreter.frames import system_key
@@ -81,20 +82,27 @@ def _set_frames(state: State, dialect: Dialect, start: Start) -> None:
 
 def _run_startup(state: State, dialect: Dialect, start: Start) -> None:
     """Execute the codes that the machine file says are in force when a program starts."""
-    block = parse_line(start.startup.encode("latin-1", "replace"), dialect)
+    taken, _ = codes_at_start(start.startup, dialect)
+    block = parse_line(taken.encode("latin-1", "replace"), dialect)
     if block.problem is not None:
         raise ProgramError(
             f"startup codes: {block.problem}",
             "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
             Place("startup", 1, block.column, start.startup),
         )
-    executor = Executor(dialect, state, start)
+    executor = Executor(dialect_at_start(dialect), state, start)
     each = [Block(words=(word,)) for word in block.words]
     steps = [executor.run(line) for line in (each if dialect.one_command else [block])]
     if any(step.fault or step.unknown for step in steps):
+        remedy = "give codes that it has, and that may stand together"
+        if is_of_several(dialect):
+            remedy = (
+                "state the dialect of the control that starts so (--dialect, or dialect in the "
+                f"machine file): {dialect.name} is {dialect.title}"
+            )
         raise ProgramError(
-            f"startup codes: the dialect {dialect.name} refuses {start.startup!r}",
-            "give codes that it has, and that may stand together",
+            f"startup codes: the dialect {dialect.name} refuses {taken!r}",
+            remedy,
             Place("startup", 1, None, start.startup),
         )
     state.feed_unit = state.unit  # what holds at the start is the control's own unit

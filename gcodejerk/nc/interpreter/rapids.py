@@ -188,7 +188,7 @@ class RapidLog:
         at = np.flatnonzero(events)
         if len(at):
             self.feed_event(int(events[at[0]]))
-            following = np.searchsorted(at, lines, side="right")
+            following = np.cumsum(events != NO_FEED).take(lines)
             settled = following[following < len(at)]
             self._parts["feed_needed"].extend(events[at[settled]] == USES_FEED)
             self._waiting = len(lines) - len(settled)

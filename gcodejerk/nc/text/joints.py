@@ -106,10 +106,11 @@ def _comments(
         bad[index] = bad[index] or _ACTIVE.match(text, int(joint[at[index]])) is not None
     opens = opens[~bad.take(opens)]
     last = at.take(opens + 1)
-    step = np.zeros(len(kind), dtype=np.int64)
-    step[at.take(opens)], step[last] = 1, -1
+    inside = np.zeros(len(kind), dtype=np.int8)
+    inside[at.take(opens)], inside[last] = 1, -1
+    np.add.accumulate(inside, out=inside)  # comments do not overlap
     # A carriage return within a comment may end the line, so it is not passed over.
-    kind = np.where((np.cumsum(step) != 0) & (kind != CR), np.uint8(COMMENT), kind)
+    kind = np.where(inside.view(np.bool_) & (kind != CR), np.uint8(COMMENT), kind)
     # The bracket that closes a comment is a blank; the end of a line stays what it is.
     kind[last[kind.take(last) == CLOSE]] = BLANK
     wrong = np.zeros(len(kind), dtype=np.bool_)

@@ -21,6 +21,7 @@ import numpy as np
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc import Dialect, Rapids, Start, find_dialect
+from gcodejerk.nc.dialects.at_start import codes_at_start, dialect_at_start
 from gcodejerk.storage import kept, release
 from gcodejerk.verification.findings import Findings, Kind
 from gcodejerk.verification.second_reading.ahead import Ahead
@@ -299,9 +300,12 @@ def _begin(text: Text, dialect: Dialect, start: Start) -> Tracker:
             (start.rapid_feed.feed, start.rapid_feed.clearance) if start.rapid_feed else None,
         ),
     )
-    codes = text.read(start.startup.encode("latin-1", "replace"), first=False)
+    taken, _ = codes_at_start(start.startup, dialect)
+    codes = text.read(taken.encode("latin-1", "replace"), first=False)
+    tracker.dialect = dialect_at_start(dialect)
     for words in [[word] for word in codes.words] if dialect.one_command else [codes.words]:
         tracker.follow(Line(words=words))
+    tracker.dialect = dialect
     tracker.place()
     return tracker
 

@@ -1,0 +1,71 @@
+"""The codes that a control starts with (`program.startup`), for a reading of several controls.
+
+The machine file states what its own control starts with. A program that could be of several is read
+as what they read alike, and some of them lack a code that another starts with: G64 of LinuxCNC, G80
+and G98 of Fanuc. This module owns how such a reading takes them.
+
+Rule 1: that there are controls which refuse a code says nothing against a control that starts with
+it. So none is refused for that (`dialect_at_start`).
+Rule 2: what the reading does not have is left out where nothing is then known that is not so. What
+would hold something else (G95, G90.1) is left to whoever runs the codes, and refused there.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.dialects.refusals import Refusals
+
+# No rapid hangs on the spindle's speed (G97), nor on overrides that are let (M48); which motion G80
+# has ended need not be known. Centres of arcs that count from their start (G91.1) are the only ones
+# that Fanuc has.
+_LEFT_OUT = {
+    "rs274": frozenset(("G97", "G80")),
+    "iso-mill": frozenset(("G91.1",)),
+    "any-mill": frozenset(("G97", "G80", "G91.1", "M48")),
+}
+_WORD = re.compile(r"([A-Za-z])([+-]?[0-9.]+)")
+
+
+def is_of_several(dialect: Dialect) -> bool:
+    """Whether a dialect is what several controls read alike."""
+    return dialect.name in _LEFT_OUT
+
+
+def dialect_at_start(dialect: Dialect) -> Dialect:
+    """The dialect in which the codes are run."""
+    if not is_of_several(dialect):
+        return dialect
+    return replace(dialect, refused=frozenset(), refuses=Refusals(), feed_needed=False)
+
+
+def codes_at_start(startup: str, dialect: Dialect) -> tuple[str, str]:
+    """Which of a control's codes a reading takes, and which it leaves out.
+
+    Parameters
+    ----------
+    startup : str
+        Words, as `Start.startup` has them.
+    dialect : Dialect
+        How the program is read.
+
+    Returns
+    -------
+    taken, left_out : str
+        The words of either, in their order; all are taken where the dialect is one control's own.
+
+    Examples
+    --------
+    >>> from gcodejerk.nc.dialects import find_dialect
+    >>> codes_at_start("G21 G64 P0.01 G80 G90", find_dialect("any-mill"))
+    ('G21 G64 P0.01 G90', 'G80')
+    """
+    names = _LEFT_OUT.get(dialect.name)
+    if names is None:
+        return startup, ""
+    words = [(letter.upper(), number) for letter, number in _WORD.findall(startup)]
+    left_out = [word for word in words if f"{word[0]}{float(word[1]):g}" in names]
+    taken = [word for word in words if word not in left_out]
+    return " ".join(map("".join, taken)), " ".join(map("".join, left_out))

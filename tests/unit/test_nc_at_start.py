@@ -1,0 +1,79 @@
+"""Codes that a control starts with, where a program is read as what several controls read alike."""
+
+import io
+from dataclasses import replace
+
+import pytest
+
+from gcodejerk import Machine, find_machine, process
+from gcodejerk.errors import ProgramError
+from gcodejerk.nc import Start, find_dialect, read_program
+from gcodejerk.nc.dialects.at_start import codes_at_start
+from gcodejerk.reasons import CERTAIN
+
+COMMON = ("rs274", "iso-mill", "any-mill")
+TYPICAL = {
+    "LinuxCNC": "G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G91.1 G94 G97 G98",
+    "grbl": "G0 G17 G21 G54 G90 G94 M5 M9",
+    "Mach": "G0 G15 G17 G21 G40 G49 G50 G54 G64 G69 G80 G90 G91.1 G94 G97 G98",
+    "Fanuc": "G0 G17 G21 G40 G49 G80 G90 G94 G97 G98",
+}
+PROGRAM = b"G0 X1. Y2.\nG1 Z-1. F100.\nG0 Z5.\nG0 X30. Y4.\nG1 Z-1.\nG0 Z5.\nM30\n"
+
+
+def at_start(startup):
+    """A control that starts so, at a known place."""
+    place = dict.fromkeys("XYZ", 0.0)
+    return Start(positions=place, startup=startup, spindle="mill", decimal_point="calculator")
+
+
+@pytest.mark.parametrize("control", TYPICAL)
+@pytest.mark.parametrize("dialect", COMMON)
+def test_what_controls_usually_start_with_is_taken(dialect, control):
+    start = at_start(TYPICAL[control])
+    program = read_program(io.BytesIO(PROGRAM), dialect=dialect, start=start)
+    assert (program.rapids.reason == CERTAIN).all()
+    assert len(program.rapids) == 4
+
+
+@pytest.mark.parametrize("control", TYPICAL)
+@pytest.mark.parametrize("dialect", COMMON)
+def test_both_readings_take_it_alike(dialect, control):
+    machine = Machine.load(find_machine("vmc"))
+    machine = replace(machine, program=replace(machine.program, startup=TYPICAL[control]))
+    result = process(b"G0 X0. Y0. Z0.\n" + PROGRAM, machine, dialect=dialect, controller="csv")
+    proof = result.verification
+    assert proof.ok
+    assert proof.rewritten == proof.confirmed == 4
+
+
+def test_what_is_left_out_is_told():
+    start = at_start(TYPICAL["LinuxCNC"])
+    program = read_program(io.BytesIO(PROGRAM), dialect="any-mill", start=start)
+    assert any(
+        "of program.startup, G80 G91.1 G97 is not used" in finding.message
+        for finding in program.findings
+    )
+    program = read_program(io.BytesIO(PROGRAM), dialect="linuxcnc", start=start)
+    assert not any("program.startup" in finding.message for finding in program.findings)
+
+
+@pytest.mark.parametrize("codes", ["G95", "G90.1"])
+@pytest.mark.parametrize("dialect", ["rs274", "any-mill"])
+def test_what_would_hold_something_else_is_refused(dialect, codes):
+    with pytest.raises(ProgramError) as caught:
+        read_program(io.BytesIO(PROGRAM), dialect=dialect, start=at_start(f"G21 G90 {codes}"))
+    assert codes in str(caught.value)
+    assert "state the dialect" in caught.value.remedy
+
+
+@pytest.mark.parametrize("codes", ["G64", "G1"])
+def test_a_single_control_has_to_have_its_codes(codes):
+    with pytest.raises(ProgramError, match="grbl refuses"):
+        read_program(io.BytesIO(PROGRAM), dialect="grbl", start=at_start(f"G21 G90 {codes}"))
+
+
+def test_words_are_told_apart_by_what_they_say():
+    any_mill = find_dialect("any-mill")
+    assert codes_at_start("g080G21 G1.0G90", any_mill) == ("G21 G1.0 G90", "G080")
+    assert codes_at_start("G80 G21", find_dialect("haas")) == ("G80 G21", "")
