@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.errors import Place
+
 Number = float | NDArray[np.float64]
 
 
@@ -89,6 +91,8 @@ class Start:
     """H number -> length along Z [mm]."""
     startup: str = ""
     """Codes in force when a program starts, for example LinuxCNC's RS274NGC_STARTUP_CODE."""
+    startup_at: Place | None = field(default=None, compare=False)
+    """Where the machine file states them."""
     diameter: bool = False
     """X is a diameter where the program does not say whether it is."""
     decimal_point: str | None = None

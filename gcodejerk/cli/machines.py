@@ -30,7 +30,7 @@ def machine_check(
 ) -> None:
     """Validate a machine file; every problem with its line and column."""
     described = _piped() if machine == "-" else load_machine(machine)
-    described = replace(described, warnings=(*described.warnings, *_unknown_names(described)))
+    described = replace(described, warnings=(*described.warnings, *_refused_later(described)))
     axes = ", ".join(f"{axis.name} ({len(axis.modes)})" for axis in described.axes)
     structure = f", and {len(described.modes)} of the structure" if described.modes else ""
     if as_json:
@@ -53,19 +53,26 @@ def _piped() -> Machine:
     return Machine.loads(decode(sys.stdin.buffer.read(MOST_BYTES + 1), name), name)
 
 
-def _unknown_names(described: Machine) -> list[MachineError]:
-    """A controller or dialect that nothing installed has: no program can be processed with it."""
+def _refused_later(described: Machine) -> list[MachineError]:
+    """What no program can be processed with: names of what is not installed, a wrong start."""
     from gcodejerk.emit import controller_of
     from gcodejerk.errors import GcodejerkError, MachineError, Place
-    from gcodejerk.nc import dialect_of
+    from gcodejerk.nc import AUTO, check_start, dialect_of
 
-    found = []
-    for key, load in (("controller", controller_of), ("dialect", dialect_of)):
+    def start_of(described: Machine) -> None:
+        name = dialect_of(described)
+        if name != AUTO:
+            check_start(name, described.program_start())
+
+    found: list[MachineError] = []
+    for key, load in (("controller: ", controller_of), ("dialect: ", dialect_of), ("", start_of)):
         try:
             load(described)
         except GcodejerkError as error:
             place = error.place or Place(described.source)
-            found.append(MachineError(f"{key}: {error.problem}", error.remedy, place))
+            # A dialect that there is not has no codes to start with, either.
+            if all(one.place != place for one in found):
+                found.append(MachineError(f"{key}{error.problem}", error.remedy, place))
     return found
 
 

@@ -154,6 +154,7 @@ class Machine(Description):
             offsets=self.program.offsets,
             tool_lengths=self.program.tool_lengths,
             startup=self.program.startup,
+            startup_at=self.named_at.get("program.startup"),
             decimal_point=self.program.decimal_point,
             wraps={axis.name: axis.wrap for axis in self.axes if axis.wrap is not None},
             linear={a.name: not self.inch for a in self.axes if a.name in "ABC" and not a.rotary},

@@ -381,7 +381,8 @@ class Description:
     warnings: tuple[MachineError, ...] = field(default=(), compare=False, repr=False)
     """What the file says that is possible, but hardly meant; each with its place."""
     named_at: Mapping[str, Place] = field(default_factory=dict, compare=False, repr=False)
-    """Where the file names what need not be there: `controller` and `dialect`."""
+    """Where the file names what only a program shows to be wrong: `controller`, `dialect` and
+    `program.startup`."""
 
     @property
     def axis_names(self) -> tuple[str, ...]:

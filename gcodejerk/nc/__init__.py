@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gcodejerk.nc.dialects import AUTO, DIALECTS, dialect_of, find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.interpreter.initial import check_start
 from gcodejerk.nc.interpreter.rapids import Rapids
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.program import Program, parse_block, read_program, trace
@@ -24,6 +25,7 @@ __all__ = [
     "Rapids",
     "Start",
     "Word",
+    "check_start",
     "dialect_of",
     "find_dialect",
     "parse_block",

@@ -291,6 +291,19 @@ def test_machine_check_and_schema(run, folder):
     assert json.loads(run("machine", "schema").out)["type"] == "object"
 
 
+@pytest.mark.parametrize(
+    ("dialect", "warnings"), [("linuxcnc", 1), ("klipper", 1), ("mach", 1), ("auto", 0)]
+)
+def test_machine_check_runs_the_startup_codes(run, folder, dialect, warnings):
+    text = (ROOT / "machines" / "vmc.yaml").read_text()
+    text = text.replace("dialect: linuxcnc", f"dialect: {dialect}", 1)
+    (folder / "m.yaml").write_text(text + "program:\n  startup: G21 G90 G77.7\n")
+    done = run("machine", "check", "m.yaml")
+    assert done.code == 0
+    assert done.out.count("warning: program.startup: ") == warnings
+    assert ("m.yaml:85:12" in done.out) == (warnings > 0)
+
+
 def test_a_machine_file_beside_the_program_is_found(run, folder):
     (folder / "job").mkdir()
     (folder / "job" / "part.nc").write_bytes(PROGRAM)

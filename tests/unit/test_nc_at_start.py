@@ -51,7 +51,7 @@ def test_what_is_left_out_is_told():
     start = at_start(TYPICAL["LinuxCNC"])
     program = read_program(io.BytesIO(PROGRAM), dialect="any-mill", start=start)
     assert any(
-        "of program.startup, G80 G91.1 G97 is not used" in finding.message
+        "of program.startup, G80 G91.1 G97 is left out" in finding.message
         for finding in program.findings
     )
     program = read_program(io.BytesIO(PROGRAM), dialect="linuxcnc", start=start)
@@ -67,10 +67,29 @@ def test_what_would_hold_something_else_is_refused(dialect, codes):
     assert "state the dialect" in caught.value.remedy
 
 
-@pytest.mark.parametrize("codes", ["G64", "G1"])
-def test_a_single_control_has_to_have_its_codes(codes):
-    with pytest.raises(ProgramError, match="grbl refuses"):
-        read_program(io.BytesIO(PROGRAM), dialect="grbl", start=at_start(f"G21 G90 {codes}"))
+def test_a_refusal_names_the_place_in_the_machine_file():
+    text = find_machine("vmc").read_text() + "program:\n  startup: G21 G90 G95\n"
+    line = text.splitlines().index("  startup: G21 G90 G95") + 1
+    machine = Machine.loads(text, "mill.yaml")
+    with pytest.raises(ProgramError) as caught:
+        process(PROGRAM, machine, dialect="rs274")
+    assert str(caught.value).startswith(f"mill.yaml:{line}:12: program.startup: ")
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "grbl", "fanuc", "uccnc", "syntec"])
+def test_codes_that_no_such_control_has_are_refused(dialect):
+    with pytest.raises(ProgramError, match=f"{dialect} refuses 'G21 G90 G77.7'"):
+        read_program(io.BytesIO(PROGRAM), dialect=dialect, start=at_start("G21 G90 G77.7"))
+
+
+@pytest.mark.parametrize(
+    "dialect",
+    ["centroid", "uccnc", "edingcnc", "planetcnc", "masso", "mitsubishi", "mazatrol-eia", "syntec"],
+)
+def test_controls_that_are_read_in_part_start_as_they_do(dialect):
+    codes = "G0 G17 G21 G40 G49 G54 G80 G90 G94 G97"
+    program = read_program(io.BytesIO(PROGRAM), dialect=dialect, start=at_start(codes))
+    assert (program.rapids.reason == CERTAIN).sum() >= 2
 
 
 def test_words_are_told_apart_by_what_they_say():

@@ -306,7 +306,9 @@ def _machine(
             )
         ),
         named_at={
-            key: checker.place((key,)) for key in ("controller", "dialect") if checker.given((key,))
+            ".".join(path): checker.place(path)
+            for path in (("controller",), ("dialect",), ("program", "startup"))
+            if checker.given(path)
         },
     )
 

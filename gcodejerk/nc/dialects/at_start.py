@@ -18,26 +18,23 @@ from dataclasses import replace
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.refusals import Refusals
 
-# No rapid hangs on the spindle's speed (G97), nor on overrides that are let (M48); which motion G80
-# has ended need not be known. Centres of arcs that count from their start (G91.1) are the only ones
-# that Fanuc has.
+# No rapid hangs on the spindle's speed (G97), on macros that are called no more (G67), nor on
+# overrides that are let (M48); which motion G80 has ended need not be known. Centres of arcs that
+# count from their start (G91.1) are the only ones that Fanuc has.
+_ON_PC = frozenset(("G80", "G97", "M48"))
+_LIKE_FANUC = frozenset(("G67", "G91.1", "G97", "M48"))
 _LEFT_OUT = {
-    "rs274": frozenset(("G97", "G80")),
+    **dict.fromkeys(("rs274", "centroid", "uccnc", "edingcnc", "planetcnc", "masso"), _ON_PC),
+    **dict.fromkeys(("mitsubishi", "mazatrol-eia", "syntec"), _LIKE_FANUC),
     "iso-mill": frozenset(("G91.1",)),
-    "any-mill": frozenset(("G97", "G80", "G91.1", "M48")),
+    "any-mill": frozenset(("G80", "G91.1", "G97", "M48")),
 }
+"""By dialect: those of several controls, and those that are read as one of these."""
 _WORD = re.compile(r"([A-Za-z])([+-]?[0-9.]+)")
-
-
-def is_of_several(dialect: Dialect) -> bool:
-    """Whether a dialect is what several controls read alike."""
-    return dialect.name in _LEFT_OUT
 
 
 def dialect_at_start(dialect: Dialect) -> Dialect:
     """The dialect in which the codes are run."""
-    if not is_of_several(dialect):
-        return dialect
     return replace(dialect, refused=frozenset(), refuses=Refusals(), feed_needed=False)
 
 

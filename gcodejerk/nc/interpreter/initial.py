@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import Place, ProgramError
-from gcodejerk.nc.dialects.at_start import codes_at_start, dialect_at_start, is_of_several
+from gcodejerk.nc.dialects import find_dialect
+from gcodejerk.nc.dialects.at_start import codes_at_start, dialect_at_start
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.interpreter.execute import Executor
 from gcodejerk.nc.interpreter.frames import system_key
@@ -80,34 +81,52 @@ def _set_frames(state: State, dialect: Dialect, start: Start) -> None:
         state.g5x = list(state.offsets.get(state.system, state.g5x))
 
 
+def check_start(dialect: str | Dialect, start: Start) -> None:
+    """Look whether programs can start so.
+
+    Parameters
+    ----------
+    dialect : str or Dialect
+        How they are read.
+    start : Start
+        What the machine file says.
+
+    Raises
+    ------
+    ProgramError
+        The dialect refuses the codes in force, or there is no such dialect.
+    """
+    initial_state(find_dialect(dialect).set_up(start), start)
+
+
 def _run_startup(state: State, dialect: Dialect, start: Start) -> None:
     """Execute the codes that the machine file says are in force when a program starts."""
     taken, _ = codes_at_start(start.startup, dialect)
     block = parse_line(taken.encode("latin-1", "replace"), dialect)
     if block.problem is not None:
         raise ProgramError(
-            f"startup codes: {block.problem}",
+            f"program.startup: {block.problem}",
             "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
-            Place("startup", 1, block.column, start.startup),
+            _place(start),
         )
     executor = Executor(dialect_at_start(dialect), state, start)
     each = [Block(words=(word,)) for word in block.words]
     steps = [executor.run(line) for line in (each if dialect.one_command else [block])]
     if any(step.fault or step.unknown for step in steps):
-        remedy = "give codes that it has, and that may stand together"
-        if is_of_several(dialect):
-            remedy = (
-                "state the dialect of the control that starts so (--dialect, or dialect in the "
-                f"machine file): {dialect.name} is {dialect.title}"
-            )
         raise ProgramError(
-            f"startup codes: the dialect {dialect.name} refuses {taken!r}",
-            remedy,
-            Place("startup", 1, None, start.startup),
+            f"program.startup: the dialect {dialect.name} refuses {taken!r}",
+            "give codes that it has, and that may stand together; or state the dialect of the "
+            "control that starts so (--dialect, or dialect in the machine file)",
+            _place(start),
         )
     state.feed_unit = state.unit  # what holds at the start is the control's own unit
     if "tool length" in _groups_of(block, dialect):
         state.tool = [0.0] * len(AXES)
+
+
+def _place(start: Start) -> Place:
+    """Where the codes are stated."""
+    return start.startup_at or Place("program.startup", 1, None, start.startup)
 
 
 def _groups_of(block: Block, dialect: Dialect) -> set[str]:
