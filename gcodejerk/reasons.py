@@ -280,10 +280,11 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.NOT_PLAYED: Explanation(
         "LinuxCNC: several axes under `positioning: independent`, an acceleration above "
         "MAX_ACCELERATION/1.05, a look-ahead that is too short, or speeds that no blocks on its "
-        "servo periods give within 0.01 mm; motion controllers: ticks or counts too coarse",
+        "servo periods give within 0.01 mm; others: an axis that moves between two steps of its "
+        "`resolution`, and reaches none; motion controllers: ticks or counts too coarse",
         "LinuxCNC: say `positioning: linear`, raise MAX_ACCELERATION and the look-ahead and state "
-        "them in `controller_options`, or take `--controller linuxcnc-hal`; motion controllers: "
-        "finer ticks or counts",
+        "them in `controller_options`, or take `--controller linuxcnc-hal`; others: state the "
+        "finer `resolution` that the control has; motion controllers: finer ticks or counts",
     ),
     Reason.NOT_BETTER: Explanation(
         "the controller's own rapid shakes no more than anything that can be written, over the "

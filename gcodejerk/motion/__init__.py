@@ -17,7 +17,7 @@ from gcodejerk.motion.residual import (
     residual_displacement,
     symmetric_response,
 )
-from gcodejerk.motion.rounding import round_positions
+from gcodejerk.motion.rounding import has_step, round_positions
 from gcodejerk.motion.sampling import (
     GRID_TOLERANCE,
     Grid,
@@ -41,6 +41,7 @@ __all__ = [
     "design_four_segments",
     "four_segment_range",
     "grouped",
+    "has_step",
     "joined",
     "knots_response",
     "knots_steps",

@@ -23,6 +23,9 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.sampling import Counts, Grid
 
+WHOLE = 1e-6
+"""What is so near a whole step is one. [steps]"""
+
 
 def round_positions(
     positions: Array,
@@ -76,13 +79,12 @@ def round_positions(
     direction = np.where(positions[order, -1] >= positions[order, 0], 1.0, -1.0)
     scale = direction / step[order]
     x = (positions[order] - origin[order, np.newaxis]) * scale[:, np.newaxis]
-    tolerance = 1e-6
-    last = np.floor(x[:, -1] + tolerance)
-    previous = np.minimum(np.ceil(x[:, 0] - tolerance), last)
+    last = np.floor(x[:, -1] + WHOLE)
+    previous = np.minimum(np.ceil(x[:, 0] - WHOLE), last)
     # One row for each knot from here on.
     exact = np.ascontiguousarray(x.T)
-    below = np.floor(exact + tolerance)
-    above = np.minimum(np.ceil(exact - tolerance), last)
+    below = np.floor(exact + WHOLE)
+    above = np.minimum(np.ceil(exact - WHOLE), last)
     half = exact + 0.5
     out = np.rint(exact)
     blocks = grid.blocks[order]
@@ -124,6 +126,26 @@ def round_positions(
         out[knot, :m] = before
         ringing += (before - exact[knot, :m])[:, np.newaxis]
     return _in_order(out, direction, order)
+
+
+def has_step(start: Array, end: Array, step: Array) -> NDArray[np.bool_]:
+    """Whether moves have a whole step on their way, their ends among it; else none can be rounded.
+
+    Parameters
+    ----------
+    start, end : ndarray, shape (n,)
+        Counted from where the steps are. [mm]
+    step : ndarray, shape (n,)
+        [mm]
+
+    Examples
+    --------
+    >>> has_step(np.array([1.56, 1.56]), np.array([1.54, 1.5]), np.array([0.1, 0.1])).tolist()
+    [False, True]
+    """
+    low, high = np.minimum(start, end) / step, np.maximum(start, end) / step
+    has: NDArray[np.bool_] = np.ceil(low - WHOLE) <= np.floor(high + WHOLE)
+    return has
 
 
 def _most_steps(speed: Array, duration: Counts, grid: Grid) -> Array:

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gcodejerk.motion import Grid, Profiles, round_positions, sample_profiles
+from gcodejerk.motion import Grid, Profiles, has_step, round_positions, sample_profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.planning.aligned import aligned_batch
 from gcodejerk.planning.batch import Batch, NumberFormat, Sampler
@@ -174,6 +174,7 @@ class _Maker:
         whole: dict[int, NDArray[np.int64]] = {}
         velocity: dict[int, Array] = {}
         written: dict[int, Array] = {}
+        unplayable = np.zeros(len(self.moves), dtype=np.bool_)
         for axis in sampler.axes:
             # Where an axis stands still its position may be unknown, and nothing is written of it.
             moving, start = sampler.moving(axis), sampler.start(axis)
@@ -190,6 +191,7 @@ class _Maker:
             rounded = origin[:, np.newaxis] + whole[axis] * step[:, np.newaxis]
             end = start + np.where(moving, self.plans.displacement[self.moves, axis], 0.0)
             written[axis] = self._with_ends(rounded, start, end)
+            unplayable |= moving & ~has_step(start - origin, end - origin, step)
         times = block_times(self._moved(written), self.grid)
         residual, worst = self._left(written, times)
         return Batch(
@@ -207,7 +209,7 @@ class _Maker:
             conventional_residual=sampler.conventional_residual(),
             worst_in_band=worst,
             profiles=profiles,
-            unplayable=np.zeros(len(self.moves), dtype=np.bool_),
+            unplayable=unplayable,
             played=self._held(written, times) if self.play is Play.HELD else None,
         )
 

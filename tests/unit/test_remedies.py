@@ -66,6 +66,11 @@ def axis(**changed):
     return {"axes": AXES | {"X": AXES["X"] | changed}}
 
 
+def stepping(resolution):
+    """All axes, with another resolution of Y."""
+    return {"axes": AXES | {"Y": AXES["Y"] | {"resolution": resolution}}}
+
+
 def options(**entries):
     """The section of that name."""
     return {"controller_options": entries}
@@ -411,6 +416,10 @@ CASES = [
     Case(
         Reason.NOT_PLAYED, "linuxcnc-hal", LINUXCNC, KNOWN + AT,
         machine=options(max_acceleration={"X": 500}), then={"controller": "linuxcnc-hal"},
+    ),
+    Case(
+        Reason.NOT_PLAYED, "resolution", FANUC, KNOWN + "G0 Y3.004\nG0 X77. Y3.006\nM2\n",
+        machine=stepping(0.01), then=stepping(1e-3),
     ),
 ]  # fmt: skip
 

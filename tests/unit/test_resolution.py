@@ -6,10 +6,13 @@ from dataclasses import replace
 from decimal import Decimal
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from gcodejerk.errors import MachineError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import DIALECTS
+from gcodejerk.reasons import Reason
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import Kind, verify
 
@@ -190,3 +193,38 @@ def test_f_of_the_last_point_has_no_more_digits_either(dialect, stream):
         longer = [*lines[:at], lines[at] + b"0" * zeros, *lines[at + 1 :]]
         found = verify(data, b"\n".join(longer), machine, dialect=dialect, controller=dialect)
         assert {v.kind for v in found.violations if v.kind != Kind.STAMP} == kinds
+
+
+def coarse(dialect, resolution):
+    """A machine whose control keeps coarser steps than programs may be written in."""
+    axes = tuple(replace(axis, travel=None, resolution=resolution) for axis in VMC.axes)
+    program = replace(VMC.program, decimal_point="calculator", startup="G21 G90 G94 G17")
+    spindle = replace(VMC, axes=axes, controller=dialect, dialect=dialect, spindle="mill")
+    return replace(spindle, program=program)
+
+
+@pytest.mark.parametrize("dialect", ["grbl", "mach", "fanuc", "haas", "siemens"])
+def test_an_axis_that_moves_between_two_steps_is_left_alone(dialect):
+    units = "G71" if dialect == "siemens" else "G21"
+    text = f"{units} G90 G94\nG0 X30.839 Y15.756 F900\nG0 X62.839 Y15.754\nG0 X20.8 Y1.7\nM30\n"
+    machine = coarse(dialect, 0.01)
+    if dialect == "siemens":
+        machine = replace(machine, program=replace(machine.program, startup="G71 G90 G64 G17"))
+    result = process(text.encode(), machine)
+    reasons = [one.reason for one in result.rapids]
+    assert reasons[1:] == [Reason.NOT_PLAYED, None]
+    finer = replace(machine, axes=tuple(replace(a, resolution=1e-3) for a in machine.axes))
+    assert [one.reason for one in process(text.encode(), finer).rapids][1:] == [None, None]
+
+
+@given(
+    dialect=st.sampled_from(["grbl", "mach", "fanuc", "haas", "linuxcnc"]),
+    resolution=st.sampled_from([0.1, 0.02, 0.01, 0.005, 1e-3]),
+    places=st.lists(st.tuples(*[st.decimals(-40, 40, places=4)] * 2), min_size=3, max_size=6),
+    near=st.decimals("-0.03", "0.03", places=4),
+)
+def test_programs_may_be_written_finer_than_the_control_keeps(dialect, resolution, places, near):
+    # One axis moves hardly at all.
+    places = [*places, (places[-1][0] + 9, places[-1][1] + near)]
+    blocks = "".join(f"G0 X{x:.4f} Y{y:.4f}\n" for x, y in places)
+    process(f"G21 G90 G94 G17\n{blocks}M30\n".encode(), coarse(dialect, resolution))
