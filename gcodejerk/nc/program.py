@@ -227,8 +227,8 @@ def open_reader(
         reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
     if left_out := codes_at_start(start.startup, chosen)[1]:
         message = (
-            f"of program.startup, {left_out} is left out: the dialect {chosen.name} does not have "
-            "that, and no rapid hangs on it"
+            f"of program.startup, {left_out} is left out where programs are read as {chosen.name}: "
+            "no rapid hangs on that"
         )
         reader.runner.syntax_problems.append(Finding(None, message))
     if chosen.note:

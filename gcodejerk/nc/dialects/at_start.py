@@ -21,6 +21,7 @@ from gcodejerk.nc.dialects.refusals import Refusals
 # No rapid hangs on the spindle's speed (G97), on macros that are called no more (G67), nor on
 # overrides that are let (M48); which motion G80 has ended need not be known. Centres of arcs that
 # count from their start (G91.1) are the only ones that Fanuc has.
+# On PCs G80 may not stand beside G0.
 _ON_PC = frozenset(("G80", "G97", "M48"))
 _LIKE_FANUC = frozenset(("G67", "G91.1", "G97", "M48"))
 _LEFT_OUT = {
