@@ -6,6 +6,7 @@ members'.
 
 import io
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ STARTING = (
 """Further codes that a control may start with."""
 
 
+@cache
 def accepts(dialect, codes):
     """Whether a reading takes codes for those that its control starts with."""
     try:

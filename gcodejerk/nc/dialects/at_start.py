@@ -1,4 +1,4 @@
-"""The codes that a control starts with (`program.startup`), for a reading of several controls.
+"""The codes that a control starts with (`program.startup`), as readings of several take them.
 
 The machine file states what its own control starts with. A program that could be of several is read
 as what they read alike, and some of them lack a code that another starts with: G64 of LinuxCNC, G80

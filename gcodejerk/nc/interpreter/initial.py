@@ -7,7 +7,7 @@ The unit is no such mode: whether 1 is a millimetre or an inch, the program says
 from __future__ import annotations
 
 from gcodejerk.axes import AXES
-from gcodejerk.errors import Place, ProgramError
+from gcodejerk.errors import ProgramError
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.at_start import codes_at_start, dialect_at_start
 from gcodejerk.nc.dialects.dialect import Dialect
@@ -105,9 +105,9 @@ def _run_startup(state: State, dialect: Dialect, start: Start) -> None:
     block = parse_line(taken.encode("latin-1", "replace"), dialect)
     if block.problem is not None:
         raise ProgramError(
-            f"program.startup: {block.problem}",
+            f"program.startup: {block.problem} in {taken!r}",
             "give G and M codes, for example G17 G21 G40 G49 G54 G64 P0.01 G90",
-            _place(start),
+            start.startup_at,
         )
     executor = Executor(dialect_at_start(dialect), state, start)
     each = [Block(words=(word,)) for word in block.words]
@@ -117,16 +117,11 @@ def _run_startup(state: State, dialect: Dialect, start: Start) -> None:
             f"program.startup: the dialect {dialect.name} refuses {taken!r}",
             "give codes that it has, and that may stand together; or state the dialect of the "
             "control that starts so (--dialect, or dialect in the machine file)",
-            _place(start),
+            start.startup_at,
         )
     state.feed_unit = state.unit  # what holds at the start is the control's own unit
     if "tool length" in _groups_of(block, dialect):
         state.tool = [0.0] * len(AXES)
-
-
-def _place(start: Start) -> Place:
-    """Where the codes are stated."""
-    return start.startup_at or Place("program.startup", 1, None, start.startup)
 
 
 def _groups_of(block: Block, dialect: Dialect) -> set[str]:

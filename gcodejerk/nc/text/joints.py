@@ -110,7 +110,7 @@ def _comments(
     inside[at.take(opens)], inside[last] = 1, -1
     np.add.accumulate(inside, out=inside)  # comments do not overlap
     # A carriage return within a comment may end the line, so it is not passed over.
-    kind = np.where(inside.view(np.bool_) & (kind != CR), np.uint8(COMMENT), kind)
+    kind = np.where((inside != 0) & (kind != CR), np.uint8(COMMENT), kind)
     # The bracket that closes a comment is a blank; the end of a line stays what it is.
     kind[last[kind.take(last) == CLOSE]] = BLANK
     wrong = np.zeros(len(kind), dtype=np.bool_)
