@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping
 from decimal import Decimal
 
-from gcodejerk.nc.dialects.dialect import Arithmetic
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.interpreter.expressions import evaluate, variable_name
 from gcodejerk.nc.interpreter.variables import is_local
 from gcodejerk.nc.text.block import Line

@@ -82,6 +82,7 @@ ANY_MILL = replace(
     unknown_lasts=True,
     harmless=RS274.harmless & ISO_MILL.harmless,
     before_m=frozenset(),
+    left_at_start=RS274.left_at_start | ISO_MILL.left_at_start,
     writing=None,
 )
 

@@ -6,8 +6,9 @@ and G98 of Fanuc. This module owns how such a reading takes them.
 
 Rule 1: that there are controls which refuse a code says nothing against a control that starts with
 it. So none is refused for that (`dialect_at_start`).
-Rule 2: what the reading does not have is left out where nothing is then known that is not so. What
-would hold something else (G95, G90.1) is left to whoever runs the codes, and refused there.
+Rule 2: what the reading does not have is left out where nothing is then known that is not so
+(`Dialect.left_at_start`). What would hold something else (G95, G90.1) is left to whoever runs the
+codes, and refused there.
 """
 
 from __future__ import annotations
@@ -18,19 +19,6 @@ from dataclasses import replace
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.refusals import Refusals
 
-# No rapid hangs on the spindle's speed (G97), on macros that are called no more (G67), nor on
-# overrides that are let (M48); which motion G80 has ended need not be known. Centres of arcs that
-# count from their start (G91.1) are the only ones that Fanuc has.
-# On PCs G80 may not stand beside G0.
-_ON_PC = frozenset(("G80", "G97", "M48"))
-_LIKE_FANUC = frozenset(("G67", "G91.1", "G97", "M48"))
-_LEFT_OUT = {
-    **dict.fromkeys(("rs274", "centroid", "uccnc", "edingcnc", "planetcnc", "masso"), _ON_PC),
-    **dict.fromkeys(("mitsubishi", "mazatrol-eia", "syntec"), _LIKE_FANUC),
-    "iso-mill": frozenset(("G91.1",)),
-    "any-mill": frozenset(("G80", "G91.1", "G97", "M48")),
-}
-"""By dialect: those of several controls, and those that are read as one of these."""
 _WORD = re.compile(r"([A-Za-z])([+-]?[0-9.]+)")
 
 
@@ -60,10 +48,9 @@ def codes_at_start(startup: str, dialect: Dialect) -> tuple[str, str]:
     >>> codes_at_start("G21 G64 P0.01 G80 G90", find_dialect("any-mill"))
     ('G21 G64 P0.01 G90', 'G80')
     """
-    names = _LEFT_OUT.get(dialect.name)
-    if names is None:
+    if not dialect.left_at_start:
         return startup, ""
     words = [(letter.upper(), number) for letter, number in _WORD.findall(startup)]
-    left_out = [word for word in words if f"{word[0]}{float(word[1]):g}" in names]
+    left_out = [word for word in words if f"{word[0]}{float(word[1]):g}" in dialect.left_at_start]
     taken = [word for word in words if word not in left_out]
     return " ".join(map("".join, taken)), " ".join(map("".join, left_out))

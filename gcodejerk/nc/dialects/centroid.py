@@ -22,6 +22,7 @@ were read before:
 from __future__ import annotations
 
 from gcodejerk.nc.dialects.dialect import Dialect, Drilling, grouped
+from gcodejerk.nc.dialects.rs274 import RS274
 from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590)
@@ -108,6 +109,7 @@ CENTROID = Dialect(
     unknown_lasts=True,
     macro_change=True,
     apart=frozenset("Z"),
+    left_at_start=RS274.left_at_start,
     # Every M code may be a macro; which act behind the motion was not found.
     before_m=frozenset(),
     after_m=frozenset({0, 1, 2, 30}),

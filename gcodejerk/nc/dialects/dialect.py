@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from gcodejerk.axes import AXES
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.dialects.limits import Limit, Mode
 from gcodejerk.nc.dialects.refusals import Refusals
 from gcodejerk.nc.dialects.spelling import Text, Writing
@@ -133,56 +134,6 @@ class Drilling:
     """By their names: ``CYCLE81(RTP, RFP, SDIS, DP, DPR)``."""
     missing: Literal["error", "unknown"] = "error"
     """What follows where no R or depth was ever given: the block is refused, or nobody knows."""
-
-
-@dataclass(frozen=True, slots=True)
-class Arithmetic:
-    """How numbers are computed from variables."""
-
-    levels: tuple[tuple[str, ...], ...] = ()
-    """Operators, those that bind most first; within a level they apply from left to right."""
-    functions: frozenset[str] = frozenset()
-    brackets: Literal["[]", "()"] = "[]"
-    floor: bool = False
-    """FIX and FUP round down and up; otherwise towards zero and away from it."""
-    angles: bool = False
-    """ASIN and ATAN give what mathematics says; otherwise a parameter chooses among the angles."""
-    bits: bool = False
-    """AND, OR and XOR work on bits, and are left alone here; otherwise on true and false."""
-    together: bool = False
-    """All numbers of a line are read before any variable of it is set."""
-    exact: bool = False
-    """A computed position is taken as it is; otherwise it is rounded to the least increment."""
-    careful: bool = False
-    """What the last digits of a function decide is not known."""
-    local: int = 0
-    """Variables up to this number belong to the program alone: no tool change sets them."""
-    system: int = 0
-    """From this number on variables belong to the control."""
-    offsets: int = 0
-    """From this number on a variable may hold data that rename where the axes stand; 0: none."""
-    timers: frozenset[int] = frozenset()
-    """Those of them that hold no such thing."""
-    overrides: str = ""
-    """That which switches overrides and feed hold off, by anything but 0."""
-    at_selection: bool = False
-    """What such a variable holds takes effect where a work system is selected, not before."""
-    compared: Literal["near", "digits", "relative"] = "near"
-    """Numbers are equal within LinuxCNC's tolerance; in some eight digits, where what is nearly
-    equal is not certain; within a relative 1e-12."""
-    chained: bool = True
-    """A comparison of what a comparison gave is computed; it is left alone otherwise."""
-    vacant: bool = False
-    """A variable may be vacant, which equals no number: ``#0``, or what G65 was not given."""
-    parameters: str = ""
-    """Letters of the arguments of a macro, #1 first; a blank for one that has no letter."""
-    feed: frozenset[str] = frozenset()
-    """What reads the F in force: variables (``4109``, ``<_feed>``), any of the control's where
-    they begin with ``$``, or a function (``FN 18``)."""
-    own_line: str = ""
-    """Variable that holds the number of the line it is read in."""
-    q_parameters: bool = False
-    """Variables are Heidenhain's: Q1, QL1, QR1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,6 +257,9 @@ class Dialect:
     """The control also drives beams, which are dark in G0 and on in G1."""
     beam_codes: frozenset[int] = frozenset()
     """M codes that hardly any mill uses on these controls, and every laser does."""
+    left_at_start: frozenset[str] = frozenset()
+    """Codes ("G80") that some of its controls start with and others do not have, and on which no
+    rapid hangs: see `gcodejerk.nc.dialects.at_start`."""
     same_after_stop: bool = False
     """Nobody can move an axis while M0 or M1 waits, or the control takes that back."""
     path_has_to_be_stated: bool = False

@@ -33,11 +33,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.dialects.dialect import (
     COMPENSATION,
     LEFT_OVER,
     OVERRIDES,
-    Arithmetic,
     Dialect,
     Drilling,
     Effect,

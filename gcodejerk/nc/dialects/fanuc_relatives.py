@@ -25,7 +25,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, Effect, grouped
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling, Effect, code_names, grouped
 from gcodejerk.nc.dialects.fanuc import CYCLES, SYSTEMS
 from gcodejerk.nc.dialects.iso_mill import ISO_MILL
 
@@ -95,6 +96,8 @@ def _read_in_part(
         arithmetic=Arithmetic(system=1, offsets=1, feed=ISO_MILL.arithmetic.feed),
         harmless=(ISO_MILL.harmless & _OWN) | set(inches),
         stops_after_rapid=False,
+        # a macro that is called no more, the spindle's speed, overrides that are let
+        left_at_start=ISO_MILL.left_at_start | code_names("G67", "G97", "M48"),
         note=f"the codes of {title} were not verified: it is read as what Fanuc and Haas mills "
         "read alike, unverified, and nothing is rewritten behind a code that is not among that",
     )

@@ -13,7 +13,8 @@ a label; D09 to D12 jump to one. What a G91 behind axis words means for those wa
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import CYCLE_CALL, MACHINE_WORDS, Arithmetic, Dialect, grouped
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
+from gcodejerk.nc.dialects.dialect import CYCLE_CALL, MACHINE_WORDS, Dialect, grouped
 from gcodejerk.nc.dialects.spelling import Text
 
 _CYCLES = (

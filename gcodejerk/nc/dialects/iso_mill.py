@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from gcodejerk.nc.dialects.dialect import code_names
 from gcodejerk.nc.dialects.fanuc import FANUC
 from gcodejerk.nc.dialects.haas import HAAS
 
@@ -48,5 +49,7 @@ ISO_MILL = replace(
     shift_may_end=True,
     tool_frame=FANUC.tool_frame | {"E"},
     tool_cancelled_by_return="all",
+    # centres of arcs that count from their start are the only ones that Fanuc has
+    left_at_start=code_names("G91.1"),
     harmless=FANUC.harmless & HAAS.harmless,
 )

@@ -7,7 +7,8 @@ Sources: its manual ("G-code overview" with the modal groups and the order of ex
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import PLANES, Arithmetic, Dialect, Drilling, code_names, grouped
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
+from gcodejerk.nc.dialects.dialect import PLANES, Dialect, Drilling, code_names, grouped
 from gcodejerk.nc.dialects.spelling import Text, Writing
 
 SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)

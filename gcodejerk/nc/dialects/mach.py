@@ -8,7 +8,8 @@ detail was not verified, so nothing is taken as known behind them.
 
 from __future__ import annotations
 
-from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect, Drilling, grouped
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
+from gcodejerk.nc.dialects.dialect import Dialect, Drilling, grouped
 from gcodejerk.nc.dialects.linuxcnc import FUNCTIONS
 from gcodejerk.nc.dialects.spelling import Text, Writing
 

@@ -101,6 +101,9 @@ RS274 = Dialect(
     feed_before_units=True,
     arcs_refused=True,
     feed_needed=True,
+    # which motion G80 has ended need not be known, and the spindle's speed and overrides that are
+    # let no rapid hangs on; on PCs G80 may not stand beside G0
+    left_at_start=code_names("G80", "G97", "M48"),
     limits=GRBL.limits,
     dark_rapids=True,
     # Centroid's control has programs like these, and moves Z apart; nothing may tell it from them.

@@ -32,10 +32,10 @@ the same place has other coordinates.
 from __future__ import annotations
 
 from gcodejerk.nc.dialects import limits
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.dialects.dialect import (
     ANOTHER_LANGUAGE,
     LEFT_OVER,
-    Arithmetic,
     Dialect,
     Drilling,
     Effect,

@@ -15,7 +15,7 @@ import re
 from collections.abc import Mapping
 from functools import lru_cache
 
-from gcodejerk.nc.dialects.dialect import Arithmetic
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.interpreter.grammar import Formula, NamedReader, NotComputableError, Reader
 from gcodejerk.nc.interpreter.operations import NAN, VACANT
 

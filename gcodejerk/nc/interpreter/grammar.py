@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from gcodejerk.nc.dialects.dialect import Arithmetic
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.interpreter.operations import (
     COMPARISONS,
     NAN,

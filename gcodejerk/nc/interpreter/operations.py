@@ -10,7 +10,7 @@ import math
 import operator as operators
 from collections.abc import Callable
 
-from gcodejerk.nc.dialects.dialect import Arithmetic
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
 
 NAN = math.nan
 VACANT = math.inf

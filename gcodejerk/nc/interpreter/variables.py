@@ -12,7 +12,8 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 
-from gcodejerk.nc.dialects.dialect import LINEAR, Arithmetic
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
+from gcodejerk.nc.dialects.dialect import LINEAR
 from gcodejerk.nc.interpreter.expressions import REMEMBERED, evaluate, variable_name
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.text.block import Block, Name, Word

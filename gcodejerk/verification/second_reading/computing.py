@@ -13,7 +13,8 @@ import re
 from collections.abc import Mapping
 from functools import cache
 
-from gcodejerk.nc.dialects.dialect import Arithmetic, Dialect
+from gcodejerk.nc.dialects.arithmetic import Arithmetic
+from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.verification.second_reading.operating import (
     VACANT,
     angle_of,
