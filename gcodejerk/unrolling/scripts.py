@@ -33,6 +33,8 @@ ROOM = 16
 _STEPS = 10
 """Lines that may run, for each that may be written."""
 NOT_KNOWN = "how it goes on depends on what is not known"
+NOT_HERE = "what it calls is neither in this file nor in --subprograms"
+OPEN_END = "the main program has no end in front of the next one"
 NOT_FOLLOWED = "it jumps, loops or calls in a way that is not followed (docs/flow.md)"
 _LABEL = re.compile(rb"[A-Za-z_][A-Za-z_][A-Za-z0-9_]*[ \t]*:(?!=)[ \t]*")
 _REMARK = re.compile(rb"\([^()]*\)?")
@@ -56,6 +58,10 @@ class ExactFollower(Follower):
         """First lines of the subprograms that have run."""
         self.reached: set[int] = set()
         """Lines of flow that have run."""
+        self.stay: dict[int, LeftAloneError] = {}
+        """Calls among them that stay: what they call is not here."""
+        self.open_end = False
+        """The main program runs beyond its last line."""
         self._seen: set[float] = set()
         """N that stand already."""
 
@@ -79,9 +85,10 @@ class ExactFollower(Follower):
         runner.executor.jumps_known = True
         runner.left = self._leave
         try:
-            self._run(unit, unit.first, unit.last, runner.state.copy())
+            ways = self._run(unit, unit.first, unit.last, runner.state.copy())
         except NotFollowedError:
             raise LeftAloneError(NOT_FOLLOWED, self._at) from None
+        self.open_end = ways.through is not None
         return unit
 
     def _same(self, before: State, behind: State) -> bool:
@@ -145,6 +152,8 @@ class ExactFollower(Follower):
 
     def _block(self, unit: Unit, at: int, line: Line, state: State, ways: Ways) -> None:
         block, dialect = line.block, self.runner.dialect
+        if at in self.script.ops:
+            self.stay[at] = LeftAloneError(NOT_HERE, self._at)
         if block.problem is not None:
             raise LeftAloneError("a line is not understood", self._at)
         codes = {round((w.value or 0.0) * 10) for w in block.words if w.letter == "G"}
@@ -232,14 +241,11 @@ class ScriptUnroller(FollowingReader):
         super().__init__(name, dialect, start, _no_calls, elsewhere)
         self.most, self.comments = most, comments
         self.left: list[tuple[int, LeftAloneError]] = []
-        self.structures = 0
+        self.structures = self._calls_left = 0
+        self.straight = True
+        """Nothing stays that leads to what is here."""
         self.jumped = False
         self._piece: Piece | None = None
-
-    @property
-    def straight(self) -> bool:
-        """Whether nothing stays that leads elsewhere."""
-        return not self.left
 
     def pieces(self) -> list[Piece]:
         """What is to be replaced; behind the file's end."""
@@ -247,7 +253,7 @@ class ScriptUnroller(FollowingReader):
 
     def written(self, pieces: list[Piece]) -> int:
         """How many loops, branches, jumps and calls these pieces stand for."""
-        return self.structures if pieces else 0
+        return self.structures - self._calls_left if pieces else 0
 
     def finish(self) -> None:
         """Write everything out."""
@@ -257,13 +263,22 @@ class ScriptUnroller(FollowingReader):
             self.structures = sum(_decides(op) for op in script.ops.values())
             exact = ExactFollower(self.runner, script, self.most)
             if self.structures:
-                self._piece = self._made(script, exact.write(), exact)
+                unit = exact.write()
                 self.structures = sum(_decides(script.ops[at]) for at in exact.reached)
+                self._calls_left = len(exact.stay)
+                if self.structures > self._calls_left:
+                    self._piece = self._made(script, unit, exact)
+                self.left += [(error.line, error) for error in exact.stay.values()]
         except NotFollowedError:
-            self.left.append((1, LeftAloneError(NOT_FOLLOWED, 1)))
+            self._stays(LeftAloneError(NOT_FOLLOWED, 1))
         except LeftAloneError as error:
-            self.left.append((error.line, error))
+            self._stays(error)
         self._finish_log()
+
+    def _stays(self, error: LeftAloneError) -> None:
+        """Leave the program as it is."""
+        self.straight = False
+        self.left.append((error.line, error))
 
     def _made(self, script: Script, unit: Unit, exact: ExactFollower) -> Piece | None:
         """What stands in the place of the program behind its first blocks."""
@@ -273,24 +288,32 @@ class ScriptUnroller(FollowingReader):
             head = line.block.percent or line.block.o_word is not None
             if at not in script.ops and head:
                 continue
-            same = at not in script.ops and done < len(exact.trace)
+            plain = at not in script.ops or at in exact.stay
+            same = plain and done < len(exact.trace)
             if not (same and exact.trace[done].text is line.text):
                 break
             done += 1
         else:
             return None
-        kept = exact.lost or any(
-            each.first >= unit.last
-            and each.first not in exact.called
-            and script.lines[each.first].number < ELSEWHERE
-            for each in script.units
-        )
-        end = unit.last if kept else len(script.lines)
+        end = unit.last if self._keeps(script, unit, exact) else len(script.lines)
         last = [each for each in script.lines[at:end] if each.number < ELSEWHERE][-1]
         writing = self.dialect.writing
         marks = (b"(", b")") if writing is None else writing.comment
         note = [Written(named(line.text, marks), line)] if self.comments else []
         return Piece(line, last, note + exact.trace[done:])
+
+    @staticmethod
+    def _keeps(script: Script, unit: Unit, exact: ExactFollower) -> bool:
+        """Whether what stands behind the main program stays: something there may be called yet."""
+        behind = [
+            each.first
+            for each in script.units
+            if each.first >= unit.last and script.lines[each.first].number < ELSEWHERE
+        ]
+        kept = exact.lost or not exact.called.issuperset(behind)
+        if kept and behind and exact.open_end:
+            raise LeftAloneError(OPEN_END, script.lines[unit.last - 1].number)
+        return kept
 
 
 def _decides(op: Op) -> bool:

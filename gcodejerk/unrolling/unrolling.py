@@ -122,12 +122,14 @@ def unroll(
         if not reader.jumped:
             break
     pieces = reader.pieces()
-    left = reader.left
+    left, whole = reader.left, reader.straight
     place = _place([data, *(start.subprograms[file] for file in reader.used)])
     if len(data) > MOST_BYTES:
-        pieces, left = [], [(1, LeftAloneError(f"more than {MOST_BYTES // 10**6} MB", 1))]
+        pieces, whole = [], False
+        left = [(1, LeftAloneError(f"more than {MOST_BYTES // 10**6} MB", 1))]
     elif chosen.text.o_word == "flow" and place:
-        pieces, left = [], [(1, LeftAloneError(f"the program reads #{place}", 1))]
+        pieces, whole = [], False
+        left = [(1, LeftAloneError(f"the program reads #{place}", 1))]
     again = target if pieces else None
     source.seek(begin)
     lines = put_together(source, again, pieces, program.newline)
@@ -142,7 +144,7 @@ def unroll(
         reader.structures,
         reader.written(pieces),
         sum(len(piece.lines) for piece in pieces),
-        not left and reader.straight,
+        whole,
         _findings(left),
         lines,
         reader.used if pieces else (),

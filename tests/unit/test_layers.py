@@ -234,7 +234,9 @@ def test_the_picture_forbids_what_it_is_there_to_forbid(room, importer, imported
 @pytest.mark.parametrize("name", SECOND_READER)
 def test_the_second_reader_shares_nothing_with_the_first_but_the_tables(name):
     own = {f"gcodejerk.verification.second_reading.{other}" for other in SECOND_READER}
-    tables = {f"gcodejerk.nc.dialects.{part}" for part in ("dialect", "gcodes", "limits")}
+    tables = {
+        f"gcodejerk.nc.dialects.{part}" for part in ("arithmetic", "dialect", "gcodes", "limits")
+    }
     may = own | tables | {"gcodejerk.axes", "gcodejerk.units"}
     modules = {
         found

@@ -95,6 +95,7 @@ MACRO_STAYS = {
     "not known to its last digit": "G65 P2000 A1.\nM30\nO2000\nG1 X[#1/3]\nM99\n",
     "a macro calls a program that is not here": "G65 P2000 A1.\nM30\nO2000\nG0 X#1\nM98 P7\nM99\n",
     "may skip a line of a macro": "G65 P2000 A1.\nM30\nO2000\n/G0 X#1\nM99\n",
+    "no end in front of the next one": "IF [1 EQ 2] GOTO 9\nN9 G0 X1.\nO2000\nM8\nM99\n",
 }
 
 
@@ -116,6 +117,25 @@ def test_a_program_of_macro_b_runs_from_top_to_bottom():
         "N7 G0 Z1.", "#2=4", "N9 M30", "%",
     ]  # fmt: skip
     assert found.whole
+
+
+def test_a_call_of_what_is_not_here_stays_and_is_not_counted():
+    lines, found = out(
+        f"O1\n{HEAD}M98 P7\nM98 P2000\nN5 M98 P7\nM30\nO2000\nG0 X2.\nM99\n", "fanuc"
+    )
+    assert lines[2:6] == ["M98 P7", "G0 X2.", "N5 M98 P7", "M30"]
+    assert (found.structures, found.written) == (3, 1)
+    assert [finding.line for finding in found.findings] == [3, 5]
+    assert all("neither in this file nor in --sub" in each.message for each in found.findings)
+    assert found.whole
+
+
+def test_a_program_that_only_calls_what_is_not_here_stays_as_it_is():
+    program = f"O1\n{HEAD}M98 P7\nG0 X1.\nM30\nO2000\nG0 X2.\nM99\n".encode()
+    result = process(program, VMC, unroll=True, dialect="haas", controller="haas")
+    assert result.output == program
+    assert (result.unrolling.structures, result.unrolling.written) == (1, 0)
+    assert any("neither in this file nor in --subprograms" in note for note in result.notes)
 
 
 def test_subprograms_of_siemens_give_their_modes_back_or_not():
@@ -237,13 +257,13 @@ def test_who_leaves_loops_as_they_are_is_told_what_writes_them_out(front):
 
 
 def test_a_file_may_have_lines_of_both_ends():
-    program = b"G21 G90\nM98 P1\n%\r\n(1001)\r\n"
+    program = b"G21 G90\nIF [1 EQ 1] GOTO 2\nN2 M98 P1\n%\r\n(1001)\r\n"
     result = process(program, VMC, unroll=True, dialect="fanuc-lathe-b", controller="fanuc")
-    assert result.output.endswith(b"\nM98 P1\n%\r\n(1001)\r\n")
+    assert result.output.endswith(b"\nN2 M98 P1\n%\r\n(1001)\r\n")
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r", b""])
 def test_the_last_line_of_the_file_keeps_its_end(end):
-    program = b"M98 P1\nX152.156" + end
+    program = b"IF [1 EQ 1] GOTO 2\nN2 X152.156" + end
     result = process(program, VMC, unroll=True, dialect="fanuc-lathe-a", controller="fanuc")
-    assert result.output.endswith(b"\nX152.156" + end.replace(b"\r\n", b"\n"))
+    assert result.output.endswith(b"\nN2 X152.156" + end.replace(b"\r\n", b"\n"))
