@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcodejerk import ProgramError
+from gcodejerk import Machine, ProgramError, find_machine, process
 from gcodejerk.axes import AXES
 from gcodejerk.nc import DIALECTS, Dialect, Start, find_dialect, parse_block, read_program
 from gcodejerk.nc import trace as follow
@@ -16,6 +16,7 @@ from gcodejerk.reasons import CERTAIN, REASONS
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.second_reading.agreement import confirm
 
+VMC = Machine.load(find_machine("vmc"))
 KNOWN = Start(positions={"X": 0.0, "Y": 0.0, "Z": 0.0}, startup="G17 G21 G90 G94")
 SIEMENS = Start(positions=KNOWN.positions, startup="G17 G71 G90 G94 G64")
 PRINTER = Start(positions=KNOWN.positions, startup="G90 G21")
@@ -157,6 +158,23 @@ def test_a_whole_number_in_inches_is_a_ten_thousandth():
 
 def test_zero_needs_no_decimal_point():
     assert reasons(b"G0 X5.\nX0\n", "fanuc") == [None, None]
+
+
+@pytest.mark.parametrize("zero", ["F0", "F0.", "F000", "F.0"])
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "syntec"])
+def test_an_f_of_zero_has_a_point_or_none_however_it_is_read(dialect, zero):
+    program = (
+        "G90 G94 G17\nG21\nG1 Z-2.85 F80\nG0 Z11.15\nZ21.15\n"
+        f"{zero}\n\nZ11.15\nZ2.15\nG1 Z-2.85 F80.\nG0 Z11.15\nX6.\nX7.\nX8.\nX9.\nM30\n"
+    ).encode()
+    quick, careful = (
+        read_program(io.BytesIO(program), dialect=dialect, fast=fast).rapids
+        for fast in (True, False)
+    )
+    assert quick.feed_whole.tolist() == careful.feed_whole.tolist()
+    assert quick.feed_whole[quick.feed == 0.0].tolist() == ["." not in zero] * 2
+    result = process(program, VMC, dialect=dialect, controller="csv")
+    assert result.verification.confirmed == result.verification.rewritten >= 4
 
 
 def test_only_codes_that_a_dialect_states_are_assumed_at_the_start():

@@ -183,7 +183,7 @@ def run_plain(
         target=target,
         words=named.take(rapid),
         feed=NAN if dialect.feed_lost else feed,
-        # A whole number that matters would have made its line odd.
+        # F without a decimal point would have made its line odd.
         feed_whole=feeds.behind == 0 if state.feed_whole else False,
         reason=reasons(state, said, start, target, dialect),
         fed=np.isin(rapid, fed, assume_unique=True),

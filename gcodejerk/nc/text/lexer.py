@@ -196,7 +196,10 @@ def _many_digits(joints: Joints, width: Places, most: int) -> Flags:
 
 
 def _whole(joints: Joints) -> Flags:
-    """Which words hold a number whose meaning hangs on a decimal point that it lacks."""
+    """Which words hold a number whose meaning hangs on a decimal point that it lacks.
+
+    And F0, which is restored as it was written.
+    """
     kind = joints.kind
     pointed = _next(kind == DOT)
     pointed |= _next(kind == SIGN) & _next(pointed)
@@ -204,7 +207,7 @@ def _whole(joints: Joints) -> Flags:
     word = word[~np.isin(kind.take(word), np.frombuffer(b"GNS", dtype=np.uint8))]
     value = parse_numbers(joints.text, *joints.numbers(word))
     bad = np.zeros(len(kind), dtype=np.bool_)
-    bad[word[value != 0.0]] = True
+    bad[word[(value != 0.0) | (kind.take(word) == ord("F"))]] = True
     return bad
 
 
