@@ -117,6 +117,26 @@ def test_a_jump_may_lead_back_to_lines_in_front_of_it(dialect):
     assert reasons(program % b"(GOTO 10, for ever)", dialect) == [None, None]
 
 
+@pytest.mark.parametrize("dialect", ["uccnc", "edingcnc", "planetcnc", "masso"])
+@pytest.mark.parametrize(
+    ("comment", "acts"),
+    [("(expr, a=5)", True), ("( Cut_2 ,)", False), ("(_do ,1)", True), ("(print, a, b)", False),
+     ("(1, 2)", False), ("; (expr, 1)", False)],
+)  # fmt: skip
+def test_runs_of_plain_lines_see_comments_that_may_be_commands(dialect, comment, acts):
+    lines = b"".join(b"G1 X%d.\nG0 Z%d.\n" % (k, k) for k in range(1, 60))
+    data = b"G21 G90 G94 G17 G40\nG0 X1. Z90.\nG1 X2. F90.\nG0 Z80.\n" + lines
+    data += comment.encode() + b"\nG0 Z70.\n" + lines
+    one, other = (
+        read_program(io.BytesIO(data), dialect=dialect, start=START, fast=fast)
+        for fast in (True, False)
+    )
+    assert one.rapids.reason.tolist() == other.rapids.reason.tolist()
+    assert [str(f) for f in one.findings] == [str(f) for f in other.findings]
+    behind = one.rapids.reason[one.rapids.line > 123]
+    assert bool((behind == CERTAIN).any()) is not acts
+
+
 def test_a_comment_of_planetcnc_may_be_a_command():
     assert reasons(b"(print, G0 X5)\nG0 X9\n", "planetcnc") == [None]
     assert reasons(b"(expr, a=5)\nG0 X9\n", "planetcnc") == [NOT_UNDERSTOOD]

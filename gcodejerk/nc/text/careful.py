@@ -22,6 +22,7 @@ from gcodejerk.nc.text.cursor import (
     SyntaxProblem,
     shown,
 )
+from gcodejerk.nc.text.joints import LIVE
 from gcodejerk.nc.text.q_parameters import Called, iso_statement
 from gcodejerk.nc.text.spelled import check_word, keyword_pattern
 
@@ -39,7 +40,6 @@ _TO_COMMENT = re.compile(rb"[^;]*")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*(?:;.*)?")
 _KEYWORD = re.compile(rb"[A-Za-z]*")
 _ACTIVE = re.compile(rb"[ \t]*py[ \t]*,", re.IGNORECASE)
-_LIVE = re.compile(rb"\([ \t]*(?!(?:msg|print|debug)[ \t]*,)[a-z_]+[ \t]*,", re.IGNORECASE)
 _BLOCK = re.compile(
     rb"[ \t]*(?:[A-Z][ \t]*[-+]?[0-9.]+[ \t]*)+(?:[;(].*)?|.*[#=\[].*", re.IGNORECASE
 )
@@ -88,7 +88,7 @@ class CarefulLine(Cursor):
             self.at = len(text)
         if self.rules.python and _ACTIVE.match(text, begin + 1):
             raise SyntaxProblem("comment runs Python", begin)
-        if self.rules.live_comments and _LIVE.match(text, begin):
+        if self.rules.live_comments and LIVE.match(text, begin):
             raise SyntaxProblem("comment may be a command", begin)
         self.comments.append((begin, self.at))
 

@@ -21,9 +21,12 @@ BLANK, END, CR, OPEN, CLOSE, SEMICOLON, STAR, OTHER = range(SIGN + 1, SIGN + 9)
 LETTERS = 64
 """Classes from here on are letters and equal their upper-case code."""
 
-_ACTIVE = re.compile(rb"[(;][ \t]*py", re.IGNORECASE)
+LIVE = re.compile(rb"\([ \t]*(?!(?:msg|print|debug)[ \t]*,)[a-z_]+[ \t]*,", re.IGNORECASE)
+"""A comment that `Text.live_comments` is about."""
+_PYTHON = re.compile(rb"[(;][ \t]*py", re.IGNORECASE)
 _REMARKS = tuple(bytes([kind]) for kind in (OPEN, CLOSE, SEMICOLON))
-_MAY_BE_ACTIVE = np.array([byte in b"pP \t" for byte in range(256)])
+_MAY_BE_LIVE = np.array([bytes([byte]).isalpha() or byte in b"_ \t" for byte in range(256)])
+_MAY_BE_PYTHON = np.array([byte in b"pP \t" for byte in range(256)])
 """Whether such a byte behind its opening may begin one."""
 
 
@@ -85,11 +88,11 @@ def find_joints(
     joint += begin
     if not any(mark in classes for mark in _REMARKS):
         return joint, kind, np.zeros(len(joint), dtype=np.bool_)
-    return joint, *_comments(text, joint, kind)
+    return joint, *_comments(text, joint, kind, live=rules.live_comments)
 
 
 def _comments(
-    text: bytes, joint: NDArray[np.int64], kind: NDArray[np.uint8]
+    text: bytes, joint: NDArray[np.int64], kind: NDArray[np.uint8], *, live: bool
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """The classes with `COMMENT` throughout plain comments; what opens or closes any other."""
     at = _marks(kind)
@@ -98,12 +101,13 @@ def _comments(
     is_open, is_semicolon = what == OPEN, what == SEMICOLON
     bad = is_open & (following != CLOSE)
     bad |= (what == CLOSE) & (previous != OPEN)
-    # A comment may run Python: (py,...)
+    # A comment may run Python: (py,...); or anything, where there are live ones: (expr,...)
+    active, may_be = (LIVE, _MAY_BE_LIVE) if live else (_PYTHON, _MAY_BE_PYTHON)
     opens = np.flatnonzero(is_open | is_semicolon)
     source = np.frombuffer(text, dtype=np.uint8)
     behind = source.take(joint.take(at.take(opens)) + 1)
-    for index in opens[_MAY_BE_ACTIVE.take(behind)].tolist():
-        bad[index] = bad[index] or _ACTIVE.match(text, int(joint[at[index]])) is not None
+    for index in opens[may_be.take(behind)].tolist():
+        bad[index] = bad[index] or active.match(text, int(joint[at[index]])) is not None
     opens = opens[~bad.take(opens)]
     last = at.take(opens + 1)
     inside = np.zeros(len(kind), dtype=np.int8)
