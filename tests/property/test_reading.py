@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
-from gcodejerk.nc import CERTAIN, Start, parse_block, read_program, trace
+from gcodejerk.nc import CERTAIN, DIALECTS, Start, parse_block, read_program, trace
 from gcodejerk.nc.dialects.dialect import LINEAR
 from gcodejerk.nc.text.numbers import AROUND, LONGEST, parse_numbers
 from gcodejerk.testing.programs import differences, programs
@@ -127,6 +127,31 @@ def test_quick_and_careful_reading_agree_of_programs_by_variables(dialect, sure,
     end = data.draw(st.sampled_from(["\n", "\r\n"]))
     start = Start(decimal_point=data.draw(st.sampled_from([None, "calculator"])))
     assert differences(f"{end.join(lines)}{end}".encode(), start, dialect) == []
+
+
+PLAIN = [
+    *("G0 X1. Y2.", "G0 Z5.", "X3.5", "Y-2.", "Z-.5", "X1. Y1. Z1.", "G1 X2. F90.", "G1 Y3.", ""),
+    *("G0X1.Y2.", "G1Z-1.", "G2 X3. Y1. I1. J0.", "G3 X0. Y0. R5.", "(rest)", "N7 G0 X4."),
+]
+ODD = [
+    *("(expr, a=5)", "(_do ,1)", "(print, 1)", "X5. (expr, 1)", "F0", "F0.", "G1 F0", "F80", "C5."),
+    *("X1. X2.", "G1 X2.Z3. Z4.", "U1.", "A-0", "G91", "G90", "G20", "M98 P1", "GOTO 5", "/X1."),
+    *("E5.", "S5", "$1=2", "T1", "D1", "H1", "x1.", "X 1.5", "X1 .5", "G01", "G1.0", "X1E2"),
+    *("L X+5 FMAX", "5 L X+5", "*5", "N1X1.", "M220 S50", "M117 hello", "//x", "G17", "R2", "S"),
+]
+"""What some controls take for a command, a word of their own, or a mistake."""
+
+
+@settings(QUICK, max_examples=150)
+@given(st.sampled_from(sorted(DIALECTS)), st.data())
+def test_quick_and_careful_reading_agree_in_every_dialect(dialect, data):
+    run = st.lists(st.sampled_from(PLAIN), min_size=8, max_size=40)
+    odd = st.lists(st.sampled_from(ODD), max_size=2)
+    parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
+    lines = ["G21 G90 G94 G17 G40", "G0 X0. Y0. Z0.", "G1 X1. F100."]
+    lines += [line for run, odd in parts for line in (*run, *odd)]
+    start = Start(decimal_point=data.draw(st.sampled_from([None, "calculator"])))
+    assert differences("\n".join([*lines, ""]).encode(), start, dialect) == []
 
 
 @QUICK

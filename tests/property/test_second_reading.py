@@ -21,6 +21,8 @@ from gcodejerk.testing.cycles import cycle_programs
 from gcodejerk.testing.programs import programs
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.second_reading.agreement import confirm
+from gcodejerk.verification.second_reading.ahead import Ahead
+from gcodejerk.verification.second_reading.tracking import Tracker
 
 WRITTEN = sorted(name for name, dialect in DIALECTS.items() if dialect.writing is not None)
 CALM = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
@@ -64,6 +66,46 @@ def test_the_second_reading_agrees_with_the_first(dialect, data, known):
     program, start = data.draw(programs(dialect)), start_of(dialect, known)
     violations, _ = judge(program, dialect, start, read(program, dialect, start))
     assert not violations
+
+
+LINES = [
+    *(
+        "G0 X1. Y2.",
+        "G0 Z5.",
+        "X3.5",
+        "Y-2.",
+        "Z-.5",
+        "X1. Y1. Z1.",
+        "G1 X2. F90.",
+        "G1 Y3.",
+        "X4.",
+    ),
+    *("G2 X3. Y1. I1. J0.", "G3 X0. Y0. R5.", "X5. (so)", "N7 X4.", "G1 X9.", "Y8. F70."),
+]
+ODD = [
+    *("X1. X2.", "G1 X2. Z3. Z4.", "X6. (expr, a=5)", "X6. (print, a)", "X6. (py,a)", "F0", "G91"),
+    *("G90", "G20", "M98 P1", "U1.", "E5.", "T1", "D1", "x1.", "G41", "G40", "X1E2", "Y9. Y", "@"),
+]
+
+
+@settings(CALM, max_examples=150)
+@given(st.sampled_from(sorted({*WRITTEN, "planetcnc"})), st.booleans(), st.booleans(), st.data())
+def test_what_is_taken_at_once_is_confirmed_no_sooner_than_line_by_line(dialect, fed, known, data):
+    run = st.lists(st.sampled_from(LINES), min_size=4, max_size=20)
+    odd = st.lists(st.sampled_from(ODD), max_size=2)
+    parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
+    lines = ["G21 G90 G94 G17 G40", "G0 X0. Y0. Z0.", *["G1 X1. F100."] * fed]
+    lines += [line for run, odd in parts for line in (*run, *odd)]
+    program, start = "\n".join([*lines, ""]).encode(), start_of(dialect, known)
+    rapids = read(program, dialect, start)
+    violations, confirmed = judge(program, dialect, start, rapids)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Ahead, "take", lambda *_: None)
+        patch.setattr(Tracker, "take_run", lambda *_: None)
+        slowly, sure = judge(program, dialect, start, rapids)
+    assert not violations
+    assert not slowly
+    assert confirmed <= sure
 
 
 def test_where_the_last_digit_decides_about_a_whole_turn_the_axis_is_unknown():

@@ -237,12 +237,14 @@ def _from_above(
                 following = bisect_left(lines, number, following)
                 line = lines[following] if following < len(lines) else math.inf
                 continue
+            motion = tracker.g.get("motion")
             run = tracker.take_run(text, data, at)
             if run is not None:
+                seen = Observation(against=None if motion is None else "it moves with feed")
                 tracker.run(run[0])
                 number, at = number + run[0].lines, run[1]
                 while line < number:
-                    yield following, Observation(against="it moves with feed")
+                    yield following, seen
                     following += 1
                     line = lines[following] if following < len(lines) else math.inf
                 continue

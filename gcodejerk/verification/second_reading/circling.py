@@ -25,6 +25,8 @@ _COMMENT = re.compile(rb"\([^()]*\)")
 _CODE = re.compile(rb"G[ \t]*0?([123])(?![0-9.])")
 _WORDS = re.compile(rb"([GIJKRXYZ])[ \t]*([-+]?[0-9.]+)")
 
+_NUMERIC = b"0123456789.+- \t\r"
+
 NO_FEED = re.compile(rb"F[ \t]*[-+]?0*[.]?0*(?![0-9.])")
 """F0."""
 
@@ -36,6 +38,14 @@ def misses(way: complex, centre: complex, radius: float | None) -> bool:
     here, there = abs(centre), abs(way - centre)
     near = abs(here - there) <= 0.0048
     return not (near or abs(here - there) <= min(0.49, 0.00098 * here))
+
+
+def _doubled(run: bytes) -> bool:
+    """Whether any line has two words of one letter, comments left out."""
+    run = _COMMENT.sub(b"", run) if b"(" in run else run
+    # the letters of hundreds of lines, of which most have the same
+    letters = set(run.translate(None, _NUMERIC).split(b"\n"))
+    return any(len(set(line)) < len(line) for line in letters)
 
 
 class Circling(Drilling):
@@ -75,6 +85,8 @@ class Circling(Drilling):
     def _doubts_run(self, data: bytes, begin: int, end: int) -> bool:
         """Whether any line of a run of feed moves may be refused."""
         rules = self.dialect
+        if _doubled(data[begin:end]):
+            return True
         if (rules.feed_needed or rules.feed_of_moves) and NO_FEED.search(data, begin, end):
             return True
         return rules.arcs_refused and self._strays(data[begin:end])
@@ -85,6 +97,9 @@ class Circling(Drilling):
             return None
         stated = not (self.feeding or self.g.get("motion") is None)
         found = text.take_run(data, at, stated)
+        if found is not None and _doubled(data[at : found[1]]):
+            text.tried = at, found[1]
+            return None
         first = -1 if found is None else data.find(b"F", at, found[1])
         if first >= 0:
             lines = data[at : data.rfind(b"\n", at, first) + 1]

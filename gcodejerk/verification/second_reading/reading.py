@@ -179,7 +179,8 @@ class Text:
         told = sorted({20, 30} & dialect.arcs - dialect.redrawn)
         arcs = b"".join(b"%d" % (code // 10) for code in told)
         code = rb"G" + (rb"0?" if rules.padded else rb"") + rb"[1" + arcs + rb"](?![0-9.])[ \t]*"
-        comment = rb"(?:\((?![ \t]*[pP][yY])[^()\r\n]*\)[ \t]*)?"
+        acts = rb"[A-Za-z_]+[ \t]*," if rules.live_comments else rb"[pP][yY]"
+        comment = rb"(?:\((?![ \t]*" + acts + rb")[^()\r\n]*\)[ \t]*)?"
         comment = b"" if rules.parentheses in ("code", "lone comment") else comment
         rest = word + rb"+" + feed + comment + rb"\r?\n"
         free = code if not dialect.modal_motion else rb"(?:" + code + rb")?"
