@@ -21,7 +21,7 @@ from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.interpreter.beams import darkness
 from gcodejerk.nc.interpreter.computed import Computed, Form, form_of
 from gcodejerk.nc.interpreter.left_on import LeftOn
-from gcodejerk.nc.interpreter.modal import GROUP_FIELDS, MODES, State
+from gcodejerk.nc.interpreter.modal import FIELDS, GROUP_FIELDS, MODES, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog, Rapids
 from gcodejerk.nc.interpreter.runner import Finding, Runner
 from gcodejerk.nc.interpreter.runs import can_run, run_plain
@@ -115,14 +115,15 @@ class Reader:
     def forget_start(self, groups: frozenset[str] | None, left: LeftOn) -> None:
         """Forget what the last line may leave to the first one, where the program repeats."""
         state = self.state
-        kept = {name: getattr(state, name) for name in MODES}
+        kept = [field for field in FIELDS if field.name in MODES or field.together in MODES]
+        values = [getattr(state, field.name) for field in kept]
         state.forget()
         if groups is not None:
             stated = {GROUP_FIELDS.get(group, group.replace(" ", "_")) for group in groups}
             stated |= {"unit"} if "units" in groups else set()
-            for name, value in kept.items():
-                if name not in stated:
-                    state.put(name, value)
+            for field, value in zip(kept, values, strict=True):
+                if stated.isdisjoint((field.name, field.together)):
+                    state.put(field.name, value)
         left.enter(state)
 
     def read_line(self, text: bytes, begin: int, number: int, terminator: int) -> None:

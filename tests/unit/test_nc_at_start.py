@@ -1,6 +1,7 @@
 """Codes that a control starts with, where a program is read as what several controls read alike."""
 
 import io
+import math
 from dataclasses import replace
 
 import pytest
@@ -45,6 +46,18 @@ def test_both_readings_take_it_alike(dialect, control):
     proof = result.verification
     assert proof.ok
     assert proof.rewritten == proof.confirmed == 4
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "mach", "syntec", "iso-mill", "auto"])
+@pytest.mark.parametrize(("stated", "tolerance"), [(b"", 0.01), (b"G64\n", math.nan)])
+def test_a_program_that_begins_again_keeps_the_tolerance_of_g64(dialect, stated, tolerance):
+    machine = Machine.load(find_machine("vmc"))
+    startup = "G17 G21 G40 G49 G54 G64 P0.01 G80 G90 G94"
+    machine = replace(machine, program=replace(machine.program, startup=startup))
+    program = b"%%\nO1234\n%sG0 X1. Y1. Z5.\nG1 Z1. F90.\nG0 Z6.\nX10.\nM99\n%%\n" % stated
+    result = process(program, machine, dialect=dialect, controller="csv")
+    assert result.verification.rewritten == result.verification.confirmed == 2
+    assert result.program.rapids.path_p[-2:] == pytest.approx([tolerance] * 2, nan_ok=True)
 
 
 def test_what_is_left_out_is_told():
