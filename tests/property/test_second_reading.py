@@ -142,6 +142,30 @@ def test_outputs_may_fire_a_beam_only_where_there_is_one(spindle, certain):
     assert np.count_nonzero(rapids.reason == CERTAIN) == certain
 
 
+ODD_LINES = ["M3 S#1", "M3 S100 {1+2}", 'M3 S100 "fast"', "M03 S=500 (I)", "X4. M220 S50", "M3 S("]
+
+
+@pytest.mark.parametrize("odd", ODD_LINES)
+@pytest.mark.parametrize("dialect", ["rs274", "grbl", "mach", "uccnc", "centroid"])
+def test_a_line_that_is_not_understood_makes_no_laser_of_a_mill(dialect, odd):
+    head = "G21 G90 G94 G17 G40 G49\nS500 M3\nG0 X0. Y0. Z5.\nG1 Z1. F90.\nG0 Z5.\n"
+    program, start = f"{head}{odd}\nG0 X5.\nM30\n".encode(), start_of(dialect)
+    rapids = read(program, dialect, start)
+    violations, confirmed = judge(program, dialect, start, rapids)
+    assert not violations
+    assert confirmed >= 1
+
+
+@pytest.mark.parametrize("habit", ["M3 I", "M3I S100", "G1 X2. S200 F90."])
+def test_what_only_a_laser_does_is_seen_a_second_time(habit):
+    program = f"G21 G90 G94 G17 G40 G49\nS500 M3\nG0 X1. Y1. Z5.\nG1 X2. F90.\n{habit}\nM30\n"
+    start = start_of("grbl")
+    rapids = read(program.encode(), "grbl", start)
+    assert rapids.reason.tolist() != [CERTAIN]
+    violations, _ = judge(program.encode(), "grbl", start, rapids, [0])
+    assert any("a beam may be on" in str(violation) for violation in violations)
+
+
 @CALM
 @given(cycle_programs())
 def test_the_second_reading_agrees_behind_drilling_cycles(data):

@@ -155,7 +155,9 @@ class Codes(Known):
 
     def beam(self, block: Sorted, burnt: bool) -> bool | None:
         """Whether G1 would burn where G0 does not; None where that is not known."""
+        # what an M code that nobody knows makes of its block is no feed move with S
         feeds = block.axes and self.g.get("motion") != self.dialect.rapid
+        feeds = feeds and not any(self.is_unknown("M", m) for m in block.m)
         on = burnt or self.spindle != 5
         self.habits = (
             self.habits

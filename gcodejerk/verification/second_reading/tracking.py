@@ -22,7 +22,7 @@ from gcodejerk.verification.second_reading.known import NEAR, Observation
 from gcodejerk.verification.second_reading.limiting import too_fast
 from gcodejerk.verification.second_reading.reading import NAN, Line
 from gcodejerk.verification.second_reading.sorting import Sorted
-from gcodejerk.verification.second_reading.unread import may_begin
+from gcodejerk.verification.second_reading.unread import may_begin, says_bare_i
 
 _FRAMES: frozenset[Effect] = frozenset(
     {
@@ -176,9 +176,8 @@ class Tracker(Circling):
 
     def _lost(self, line: Line) -> Observation:
         """A line that is not understood."""
-        # M3 I: a letter without a number is no word
         fires = any(letter == "M" and number in (3, 4) for letter, number, _ in line.words)
-        self.habits = self.habits or (fires and not line.understood)
+        self.habits = self.habits or (fires and says_bare_i(line.unread))
         self.forget()
         frames, bars = may_begin(line.unread, line.effects, self.dialect)
         self.frames |= dict.fromkeys(frames)

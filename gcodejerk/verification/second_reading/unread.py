@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 
+_BARE_I = re.compile(rb"[^(;]*(?<![A-Z])I[ \t]*(?:[A-Z(;]|$)")
 _CODES = re.compile(rb"([GM])[ \t]*([0-9]+(?:\.[0-9]+)?)", re.IGNORECASE)
 _LARGEST = 1e6
 """More than any code's number."""
@@ -77,3 +78,8 @@ def may_begin(
     bars |= {"synchronized action": True} if "watch" in found else {}
     bars |= {"limit of anything": True} if "limit" in found else {}
     return frames, bars
+
+
+def says_bare_i(text: bytes) -> bool:
+    """Whether an I without a number stands in a line: ``M3 I`` makes S a laser's power (Marlin)."""
+    return _BARE_I.match(text) is not None
