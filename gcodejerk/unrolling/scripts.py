@@ -33,6 +33,7 @@ ROOM = 16
 _STEPS = 10
 """Lines that may run, for each that may be written."""
 NOT_KNOWN = "how it goes on depends on what is not known"
+NOT_TAKEN = "what it calls does not take such arguments, or repeats"
 NOT_HERE = "what it calls is neither in this file nor in --subprograms"
 OPEN_END = "the main program has no end in front of the next one"
 NOT_FOLLOWED = "it jumps, loops or calls in a way that is not followed (docs/flow.md)"
@@ -59,7 +60,7 @@ class ExactFollower(Follower):
         self.reached: set[int] = set()
         """Lines of flow that have run."""
         self.stay: dict[int, LeftAloneError] = {}
-        """Calls among them that stay: what they call is not here."""
+        """Calls among them that stay: what they call is not here, or not called as it asks for."""
         self.open_end = False
         """The main program runs beyond its last line."""
         self._seen: set[float] = set()
@@ -152,8 +153,9 @@ class ExactFollower(Follower):
 
     def _block(self, unit: Unit, at: int, line: Line, state: State, ways: Ways) -> None:
         block, dialect = line.block, self.runner.dialect
-        if at in self.script.ops:
-            self.stay[at] = LeftAloneError(NOT_HERE, self._at)
+        if (op := self.script.ops.get(at)) is not None:
+            here = self.script.called(op.name) is not None
+            self.stay[at] = LeftAloneError(NOT_TAKEN if here else NOT_HERE, self._at)
         if block.problem is not None:
             raise LeftAloneError("a line is not understood", self._at)
         codes = {round((w.value or 0.0) * 10) for w in block.words if w.letter == "G"}
@@ -269,6 +271,7 @@ class ScriptUnroller(FollowingReader):
                 if self.structures > self._calls_left:
                     self._piece = self._made(script, unit, exact)
                 self.left += [(error.line, error) for error in exact.stay.values()]
+                self.straight = all(error.reason == NOT_HERE for _, error in self.left)
         except NotFollowedError:
             self._stays(LeftAloneError(NOT_FOLLOWED, 1))
         except LeftAloneError as error:

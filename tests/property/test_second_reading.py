@@ -69,17 +69,7 @@ def test_the_second_reading_agrees_with_the_first(dialect, data, known):
 
 
 LINES = [
-    *(
-        "G0 X1. Y2.",
-        "G0 Z5.",
-        "X3.5",
-        "Y-2.",
-        "Z-.5",
-        "X1. Y1. Z1.",
-        "G1 X2. F90.",
-        "G1 Y3.",
-        "X4.",
-    ),
+    *("G0 X1. Y2.", "G0 Z5.", "X3.5", "Y-2.", "Z-.5", "X1. Y1. Z1.", "G1 X2. F90.", "G1 Y3."),
     *("G2 X3. Y1. I1. J0.", "G3 X0. Y0. R5.", "X5. (so)", "N7 X4.", "G1 X9.", "Y8. F70."),
 ]
 ODD = [

@@ -143,6 +143,9 @@ def test_subprograms_of_siemens_give_their_modes_back_or_not():
     sub = "%_N_SUB_SPF\nPROC SUB(REAL DEEP)\nG91 G0 X=DEEP\nM17\n"
     lines, _ = out(f"{head}SUB(4)\nM30\n{sub}", "siemens")
     assert lines == [*head.split("\n")[:-1], "G91 G0 X=4", "M30"]
+    lines, found = out(f"{head}SUB(4)\nSUB(4,5)\nM30\n{sub}", "siemens")
+    assert "does not take such arguments" in found.findings[0].message
+    assert (found.structures, found.written, found.whole) == (2, 1, False)
     saves = sub.replace("DEEP)", "DEEP) SAVE")
     assert "gives back modes" in left(f"{head}SUB(4)\nM30\n{saves}", "siemens")
     two = f"{head}M30\n%_N_C_MPF\nIF 1==1\nG0 X1\nENDIF\nM30\n"

@@ -240,11 +240,11 @@ def _from_above(
             motion = tracker.g.get("motion")
             run = tracker.take_run(text, data, at)
             if run is not None:
-                seen = Observation(against=None if motion is None else "it moves with feed")
+                against = None if motion is None else "it moves with feed"
                 tracker.run(run[0])
                 number, at = number + run[0].lines, run[1]
                 while line < number:
-                    yield following, seen
+                    yield following, Observation(against)
                     following += 1
                     line = lines[following] if following < len(lines) else math.inf
                 continue
