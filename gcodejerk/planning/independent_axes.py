@@ -7,6 +7,7 @@ the path differs a little from the one that the control itself takes. This modul
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -19,7 +20,14 @@ from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.plans import Plans
 
 WINDOW = 24
-"""The control's path is searched this many points before and after the same moment."""
+"""So many pieces of the control's path are looked at on both sides of the place as far on its way.
+"""
+MARKS = 64
+"""At most so many places of the control's path are tried for the nearest."""
+LEAST = 1e-9
+"""Less is what rounding leaves. [mm]"""
+AT_ONCE = 64
+"""Points of a path that are looked at together."""
 
 
 def arrivals(plans: Plans, move: int) -> dict[str, tuple[float, float]]:
@@ -56,9 +64,9 @@ def path_deviation(batch: Batch) -> Array:
     Returns
     -------
     ndarray, shape (b,)
-        Largest distance, over the points written, from the control's own path; an upper bound,
-        since only the part of that path is searched that is near in time. 0 where not more than
-        one linear axis moves. [mm]
+        Largest distance, over the points written, from the control's own path, whatever the
+        moment that it is there; an upper bound, since of that path only what is likely to be the
+        nearest is looked at. 0 where not more than one linear axis moves. [mm]
     """
     moves, start = batch.moves, batch.number_format.start
     return deviation_of(batch.plans, moves, batch.grid, batch.exact, start)
@@ -68,14 +76,16 @@ def deviation_of(
     plans: Plans, moves: NDArray[np.int64], grid: Grid, exact: Mapping[int, Array], begin: Array
 ) -> Array:
     """The same of moves whose positions are known at the knots of a grid; starts (b, 9) [mm]."""
+    out = np.zeros(len(moves))
+    linear = [a for a in exact if not _rotary(plans, a)]
+    several = np.flatnonzero((plans.displacement[moves][:, linear] != 0.0).sum(axis=1) > 1)
+    if plans.machine.positioning == "linear" or not len(several):
+        return out
+    moves, begin = moves[several], begin[several]
     rows = np.concatenate([np.array(plans.profiles_of(int(move))) for move in moves])
     row_of = np.searchsorted(moves, plans.move[rows])
-    linear = [a for a in exact if not _rotary(plans, a)]
-    out = np.zeros(len(moves))
-    if plans.machine.positioning == "linear" or len(linear) < 2:
-        return out
     unit, _ = sample_profiles(
-        plans.conventional.take(rows), grid.knots[row_of], plans.machine.interval
+        plans.conventional.take(rows), grid.knots[several[row_of]], plans.machine.interval
     )
     planned, own = (np.zeros((len(moves), unit.shape[1], len(linear))) for _ in range(2))
     for column, axis in enumerate(linear):
@@ -83,9 +93,10 @@ def deviation_of(
         used = share != 0.0
         np.add.at(own[..., column], row_of[used], unit[used] * share[used, np.newaxis])
         start = np.where(plans.displacement[moves, axis] != 0.0, begin[:, axis], 0.0)
-        planned[..., column] = exact[axis] - start[:, np.newaxis]
-    result: Array = _distances(planned, own).max(axis=1, initial=0.0)
-    return result
+        planned[..., column] = exact[axis][several] - start[:, np.newaxis]
+    worst = np.array([_farthest(*pair) for pair in zip(planned, own, strict=True)])
+    out[several] = np.where(worst < LEAST, 0.0, worst)
+    return out
 
 
 def dogleg_notes(plans: Plans, deviation: Array) -> list[str]:
@@ -116,17 +127,40 @@ def _rotary(plans: Plans, axis: int) -> bool:
     return plans.machine.axis(AXES[axis]).rotary
 
 
-def _distances(points: Array, path: Array) -> NDArray[np.float64]:
-    """Distance of each point from the pieces of a path near the same place, (b, k, d) -> (b, k)."""
-    count = points.shape[1]
-    least: NDArray[np.float64] = np.linalg.norm(points - path, axis=2)
-    for shift in range(-min(WINDOW, count - 1), min(WINDOW, count - 1)):
-        here = np.clip(np.arange(count) + shift, 0, count - 1)
-        begin, end = path[:, here], path[:, np.minimum(here + 1, count - 1)]
-        along = end - begin
-        square = np.maximum((along**2).sum(axis=2), 1e-300)
-        at = np.clip(((points - begin) * along).sum(axis=2) / square, 0.0, 1.0)
-        least = np.minimum(
-            least, np.linalg.norm(begin + at[..., np.newaxis] * along - points, axis=2)
-        )
-    return least
+def _farthest(points: Array, path: Array) -> float:
+    """Largest distance of points from the path through others, shapes (k, d) and (m, d).
+
+    A piece of the path is looked for near two of its places: the one that is as far on its way,
+    for each coordinate goes one way, and the nearest of some. The distance from these is a bound,
+    so that few points have to be looked at.
+    """
+    stride = max(1, math.isqrt(len(path) // 2), len(path) // MARKS)
+    ways, passed = (np.abs(places).sum(axis=1) for places in (points, path))
+    as_far = np.minimum(np.searchsorted(passed, ways), len(path) - 1)
+    columns = zip(points.T, path[::stride].T, strict=True)
+    squares = sum((own[:, np.newaxis] - some) ** 2 for own, some in columns)
+    nearest = stride * squares.argmin(axis=1)
+    bound = np.sqrt(np.minimum(squares.min(axis=1), ((points - path[as_far]) ** 2).sum(axis=1)))
+    farthest_first = np.argsort(-bound)
+    worst = 0.0
+    for begin in range(0, len(points), AT_ONCE):
+        these = farthest_first[begin : begin + AT_ONCE]
+        if bound[these[0]] <= worst:
+            break
+        around = [
+            place[these, np.newaxis] + np.arange(-reach, reach)
+            for place, reach in ((as_far, WINDOW), (nearest, stride))
+        ]
+        first = np.clip(np.concatenate(around, axis=1), 0, len(path) - 2)
+        worst = max(worst, float(_distances(points[these], path, first).max()))
+    return worst
+
+
+def _distances(points: Array, path: Array, first: NDArray[np.int64]) -> Array:
+    """Distance of each point from the nearest of its pieces, which begin at places of a path."""
+    begin = path[first]
+    along, off = path[first + 1] - begin, points[:, np.newaxis] - begin
+    square = np.maximum((along**2).sum(axis=2), np.finfo(float).tiny)
+    share = np.clip((off * along).sum(axis=2) / square, 0.0, 1.0)
+    distances: Array = np.linalg.norm(off - share[..., np.newaxis] * along, axis=2).min(axis=1)
+    return distances

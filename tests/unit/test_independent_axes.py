@@ -58,6 +58,42 @@ def test_the_deviation_bounds_the_distance_from_the_path_of_an_integrated_dogleg
     assert bound <= 1.1 * true + 0.02
 
 
+FASTER = Machine.loads(
+    TEXT.format(positioning="independent")
+    .replace("  Y:", "    limit: {velocity: 600, acceleration: 6000, jerk: 3.0e+6}\n  Y:")
+    .replace("velocity: 500", "velocity: 100")
+)
+"""Its limits let the planned profile run far ahead of today's, and behind it."""
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_deviation_is_that_of_paths_and_not_of_moments(seed):
+    random = np.random.default_rng(seed)
+    x, y = random.uniform(50.0, 300.0), random.uniform(50.0, 400.0)
+    plan = plan_move({"X": x, "Y": y}, FASTER)
+    t = np.linspace(0.0, plan.time + 0.05, 20_001)
+    own = np.stack(
+        [control_path(x, 100, 3000, 60000, t), control_path(y, 300, 4000, 100000, t)], axis=1
+    )
+    points = np.stack([plan.positions["X"], plan.positions["Y"]], axis=1)
+    true = max(np.linalg.norm(own - point, axis=1).min() for point in points)
+    (bound,) = path_deviation(plan.batch)
+    # The integral's own error: of half a metre a few tenths.
+    assert bound == pytest.approx(true, rel=0.05, abs=0.1)
+
+
+def test_what_one_axis_does_leaves_no_path_whatever_stands_beside_it():
+    blocks = b"G0 X118.861\nX0\nX200. Y60.\nY0\nX31.7 Y9.3\nX300.\n"
+    program = b"G21 G90 F10\n" + blocks + b"M2\n"
+    result = process(program, FASTER, controller="mach", dialect="linuxcnc")
+    assert result.planned == 5  # the first begins anywhere
+    moving = (result.program.rapids.start != result.program.rapids.target)[:, :2].sum(axis=1)
+    assert (result.deviation[moving == 1] == 0.0).all()
+    alone = [path_deviation(plan_move({"X": 200.0, "Y": 60.0}, FASTER).batch)[0]]
+    alone += [path_deviation(plan_move({"X": -168.3, "Y": 9.3}, FASTER).batch)[0]]
+    assert result.deviation[moving == 2] == pytest.approx(alone, rel=1e-3, abs=1e-3)
+
+
 def test_axes_arrive_when_their_own_profiles_end():
     plan = plan_move({"X": 200.0, "Y": 60.0}, DOGLEG)
     times = arrivals(plan.plans, 0)
