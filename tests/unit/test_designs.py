@@ -12,6 +12,7 @@ from gcodejerk.machine import Machine, find_machine
 from gcodejerk.motion import mode_poles, profiles_response
 from gcodejerk.motion.search.optimal import least_residual
 from gcodejerk.motion.search.unit_move import Move
+from gcodejerk.planning import designs
 from gcodejerk.planning.bounds import bounds, known_limits, least_residuals
 from gcodejerk.planning.move import plan_move
 from gcodejerk.planning.plan import PROFILES, plan_moves
@@ -159,6 +160,27 @@ def test_every_profile_can_be_planned_and_reported(profile):
     assert sum(s["duration"] for s in record["segments"]) == pytest.approx(plan.time, abs=1e-9)
     left = max(entry["displacement"] for entry in record["residual"])
     assert 0.0 <= record["limit"] <= left
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_move_is_designed_otherwise_because_of_what_stands_beside_it(seed, monkeypatch):
+    machine = machine_of(
+        (
+            "resolution: 1.0e-4",
+            "rapid: {velocity: 600, acceleration: 5000, jerk: 300000}",
+            "modes: [{frequency: 105, damping: 0.02, participation: 0.5}]",
+        )
+    )
+    displacement = moves(*({"Z": length} for length in np.geomspace(0.05, 300.0, 400)))
+    designs._remembered.cache_clear()
+    together = plan_moves(displacement, machine)
+    random = np.random.default_rng(seed)
+    order = random.permutation(len(displacement))[:100]
+    monkeypatch.setattr(designs, "AT_ONCE", int(random.integers(1, 9)))
+    designs._remembered.cache_clear()
+    others = plan_moves(displacement[order], machine)
+    np.testing.assert_array_equal(others.worst_in_band, together.worst_in_band[order])
+    np.testing.assert_array_equal(others.planned, together.planned[order])
 
 
 @pytest.mark.parametrize("profile", ["zv", "shortest"])

@@ -113,3 +113,22 @@ def test_a_bound_gives_up_what_is_beyond_it_and_changes_nothing_else(n, gives_up
     assert (found[below] == free[below]).all()
     assert np.isinf(found[~below & (bound > 0.0)]).mean() >= gives_up
     assert np.isinf(found[:, ::11]).all()
+
+
+@pytest.mark.parametrize("group", [np.arange(9), np.array([0, 0, 0, 1, 2, 2, 3, 3, 3])])
+def test_what_a_candidate_leaves_depends_on_none_beside_it(group):
+    random = np.random.default_rng(16)
+    n, k = 400, 50  # more than are evaluated at once for all poles
+    T1, Ta, T2 = (random.uniform(0.002, 0.02, (n, k)) for _ in range(3))
+    total = np.full(n, 0.2)
+    poles = mode_poles(random.uniform(20.0, 200.0, 9), random.uniform(0.0, 0.05, 9))
+    objective = Objective(poles, random.uniform(0.1, 1.0, (n, 9)), group)
+    bound = np.full((n, k), np.median(symmetric_worst(T1, Ta, T2, total, objective)))
+    bound[:, ::11] = -1.0
+    together = symmetric_worst(T1, Ta, T2, total, objective, bound)
+    for row in range(0, n, 37):
+        own = slice(row, row + 1)
+        alone = symmetric_worst(
+            T1[own], Ta[own], T2[own], total[own], objective.take(own), bound[own]
+        )
+        assert (alone[0] == together[row]).all()

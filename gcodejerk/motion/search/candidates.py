@@ -53,9 +53,9 @@ def symmetric_worst(
     objective : Objective
         Of the n moves.
     bound : ndarray, shape (n, k), optional
-        What leaves more may be said to leave anything: it is given up as soon as some of the modes
-        show that, and is infinite. What leaves less is as without a bound, to the last bit; below
-        zero everything is infinite. [mm]
+        What leaves more is infinite: it is given up as soon as some of the modes show that. What
+        leaves less is as without a bound, to the last bit; below zero everything is infinite. Where
+        poles share a group, nothing is given up. [mm]
 
     Returns
     -------
@@ -173,7 +173,9 @@ def cascade_worst(widths: tuple[Array, ...], objective: Objective) -> Single:
 class _Worst:
     """The largest of the groups of poles, of which a block at a time is evaluated.
 
-    With a bound, candidates beyond it are given up on the way.
+    With a bound, candidates beyond it are given up on the way, or at the end.
+
+    Rule: what comes of a candidate depends on none that is evaluated beside it.
     """
 
     def __init__(self, objective: Objective, n: int, k: int, bound: Array | None = None) -> None:
@@ -229,23 +231,18 @@ class _Worst:
         """
         weight = self.weights[:, block].T.astype(np.float32) / scale
         square = square * self.spread(weight * weight)
-        starts = self.starts[block].copy()
-        continued, starts[0] = not starts[0], True
-        together = square
-        if not starts.all():
-            together = np.add.reduceat(square, np.flatnonzero(starts), axis=0)
-        if continued:
-            together[0] += self.carried
-        self.carried = together[-1]
-        # A sum that goes on in the next block is no larger than the whole, so it may be compared.
-        for each in together:
-            np.maximum(self.worst, each, out=self.worst)
+        for begins, own in zip(self.starts[block].tolist(), square, strict=True):
+            if not begins:
+                own += self.carried
+            self.carried = own
+            # A sum that goes on is no larger than the whole, so it may be compared.
+            np.maximum(self.worst, own, out=self.worst)
 
     def displacement(self) -> Single:
         """The worst of each candidate, infinite where it was given up [mm]."""
         left = np.sqrt(self.worst)
         if self.bound is not None:
-            left[self.bound < 0.0] = np.inf
+            left[self.worst > self.bound] = np.inf
         if self.index is None:
             return left.reshape(self.shape)
         out = np.full(self.shape[0] * self.shape[1], np.inf, dtype=np.float32)
