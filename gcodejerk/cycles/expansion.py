@@ -39,6 +39,7 @@ from gcodejerk.cycles.series import (
 )
 from gcodejerk.cycles.walk import Place, Verdict, Walker
 from gcodejerk.errors import EmitError, ProgramError
+from gcodejerk.errors import Place as FilePlace
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G61, G61_1, G64
@@ -133,7 +134,9 @@ def expand(
         known = ", ".join(sorted([*DRILLING, "siemens"]))
         raise ProgramError(
             f"the cycles of dialect '{chosen.name}' cannot be written out",
-            f"leave --expand-cycles out; it knows the cycles of: {known}",
+            "leave --expand-cycles out, or state the dialect of the program's own control "
+            f"(--dialect); known are the cycles of: {known}",
+            FilePlace(name),
         )
     begin = source.tell()
     expander = CallExpander if called else _Expander

@@ -166,18 +166,53 @@ def read_program(
     return program
 
 
+def told_dialect(
+    file: BinaryIO, name: str, dialect: str | Dialect, start: Start
+) -> tuple[Dialect, str]:
+    """Which dialect a program is read in, and how its text tells.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        Seekable where the text has to tell (``auto``); left where it stands.
+    name : str
+        For messages.
+    dialect : str or Dialect
+        As `read_program` takes it.
+    start : Start
+        What is known of the machine.
+
+    Returns
+    -------
+    dialect : Dialect
+    why : str
+        Empty where the text did not have to tell.
+
+    Raises
+    ------
+    ProgramError
+        There is no such dialect, or the text does not tell.
+    """
+    if dialect != AUTO:
+        return find_dialect(dialect), ""
+    begin = file.tell()
+    head = next(read_chunks(file, name)).data.removeprefix(BYTE_ORDER_MARK)
+    file.seek(begin)
+    return detect_dialect(head, name, lathe=start.diameter, control=start.control)
+
+
+def read_as(dialect: Dialect, why: str) -> Finding:
+    """Says how the text told its dialect."""
+    return Finding(None, f"read as {dialect.name}: {why}")
+
+
 def open_reader(
     file: BinaryIO, name: str, dialect: str | Dialect, start: Start
 ) -> tuple[Reader, BinaryIO]:
     """Make the reader of a file, and what it has to be read from: a copy if it cannot go back."""
-    why = ""
     if dialect == AUTO:
         file = seekable(file)
-        begin = file.tell()
-        head = next(read_chunks(file, name)).data.removeprefix(BYTE_ORDER_MARK)
-        dialect, why = detect_dialect(head, name, lathe=start.diameter, control=start.control)
-        file.seek(begin)
-    chosen = find_dialect(dialect)
+    chosen, why = told_dialect(file, name, dialect, start)
     if start.diameter and chosen.lathe == "no":
         raise ProgramError(
             f"the machine's X is a diameter, so it is a lathe, and the dialect {chosen.name} is "
@@ -224,7 +259,7 @@ def open_reader(
         )
         reader.runner.syntax_problems.append(Finding(None, message))
     if why:
-        reader.runner.syntax_problems.append(Finding(None, f"read as {chosen.name}: {why}"))
+        reader.runner.syntax_problems.append(read_as(chosen, why))
     if left_out := codes_at_start(start.startup, chosen)[1]:
         message = (
             f"of program.startup, {left_out} is left out where programs are read as {chosen.name}: "

@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 from gcodejerk.cycles.expansion import Expansion, expand
 from gcodejerk.errors import EmitError
 from gcodejerk.machine import Machine
-from gcodejerk.nc import Program, Rapids, dialect_of
+from gcodejerk.nc import Dialect, Program, Rapids, dialect_of
 from gcodejerk.nc.interpreter.runner import Finding
 from gcodejerk.nc.line_map import Chain, Lines
+from gcodejerk.nc.program import read_as, told_dialect
 from gcodejerk.start import Start
 from gcodejerk.storage import made
 from gcodejerk.unrolling.unrolling import Unrolling, unroll
@@ -74,6 +75,10 @@ class WrittenOut:
     unrolling: Unrolling | None
     expansion: Expansion | None
     """None: not asked for."""
+    dialect: Dialect
+    """In which the program is read."""
+    why: str
+    """How its text told that dialect; empty where it did not have to."""
 
     @property
     def map(self) -> Lines:
@@ -116,7 +121,8 @@ class WrittenOut:
         if self.unrolling is not None:
             line_of = self.unrolling.map.line_of
             later = tuple(replace(f, line=line_of(f.line)) for f in later)
-        return (*first, *later)
+        told = (read_as(self.dialect, self.why),) if self.why else ()
+        return (*told, *first, *later)
 
 
 @contextlib.contextmanager
@@ -164,8 +170,10 @@ def written_out(
     EmitError
         There are subprograms in other files, whose cycles would stay.
     """
-    names, language = (name, f"the output for {name}"), dialect_of(machine, dialect)
-    chosen = Chosen(name, language, machine.program_start(), comments)
+    names, start = (name, f"the output for {name}"), machine.program_start()
+    source.seek(0)
+    language, why = told_dialect(source, name, dialect_of(machine, dialect), start)
+    chosen = Chosen(name, language, start, comments)
     with contextlib.ExitStack() as files:
         used, unrolling, expansion = source, None, None
         source.seek(0)
@@ -176,7 +184,7 @@ def written_out(
             unrolling = unroll(used, between, **chosen.options())
             if unrolling.written and prove is not None:
                 try:
-                    prove(_proven(check_unrolling, used, between, machine, names, dialect, most))
+                    prove(_proven(check_unrolling, used, between, chosen, names, most))
                 except NotFollowedError:
                     unrolling = unrolling.undone(_why_unproven(source))
             used = between if unrolling.written else used
@@ -188,11 +196,11 @@ def written_out(
             )
             expansion = expand(used, after, **chosen.options())
             if expansion.written and prove is not None:
-                found = _proven(check_expansion, used, after, machine, names, dialect, most)
+                found = _proven(check_expansion, used, after, chosen, names, most)
                 prove(lines_in_original(found, None if unrolling is None else unrolling.map))
             used = after if expansion.written else used
         used.seek(0)
-        yield used, WrittenOut(unrolling, expansion)
+        yield used, WrittenOut(unrolling, expansion, language, why)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +208,7 @@ class Chosen:
     """How a program is read and written."""
 
     name: str
-    dialect: str
+    dialect: Dialect
     start: Start
     comments: bool
 
@@ -245,9 +253,8 @@ def _proven(
     check: Callable[..., Verification],
     original: BinaryIO,
     other: BinaryIO,
-    machine: Machine,
+    chosen: Chosen,
     names: tuple[str, str],
-    dialect: str | None,
     most: int,
 ) -> Verification:
     """Compare two files; both are left at their beginning."""
@@ -256,8 +263,8 @@ def _proven(
     found = check(
         original,
         other,
-        dialect=dialect or machine.dialect,
-        start=machine.program_start(),
+        dialect=chosen.dialect,
+        start=chosen.start,
         names=names,
         most=most,
     )
@@ -317,8 +324,8 @@ def verify_written(
         prove=lambda found: first.extend(found.violations), most=most,
     ) as (between, written):  # fmt: skip
         found = verify_files(
-            between, processed, machine, names=names, dialect=dialect, most=most, beside=beside,
-            progress=progress,
+            between, processed, machine, names=names, dialect=written.dialect, most=most,
+            beside=beside, progress=progress,
         )  # fmt: skip
     later = (_in_original(violation, written.map) for violation in found.violations)
     violations = (*first, *later)[:most]

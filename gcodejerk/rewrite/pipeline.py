@@ -213,7 +213,7 @@ def process_file(
         )
     with written_out(
         source,
-        machine,
+        replace(machine, controller=emitter.name),
         front,
         name=name,
         dialect=settings.dialect,
@@ -240,7 +240,7 @@ def _process(
 ) -> Result:
     """Process a program; the source is that with its flow and cycles written out, if they are."""
     lines = None if written is None else written.map
-    program = _read(source, machine, settings, name, emitter, report, lines)
+    program = _read(source, machine, settings, name, emitter, report, written)
     check_dialect(machine, program)
     plans = _plan(source, program, machine, settings, emitter, report, spread)
     peaks = np.zeros((3, len(plans)))
@@ -336,7 +336,7 @@ def _read(
     name: str,
     emitter: Controller,
     report: Progress,
-    lines: Lines | None,
+    written: WrittenOut | None,
 ) -> Program:
     """The program, refused where it is none, or one that was processed before."""
     source.seek(0, io.SEEK_END)
@@ -347,7 +347,7 @@ def _read(
     program = read_program(
         source,
         name=name,
-        dialect=dialect_of(machine, settings.dialect),
+        dialect=dialect_of(machine, settings.dialect) if written is None else written.dialect,
         start=emitter.start(machine),
         progress=lambda done: report("reading", done, size),
         neighbours=replace(machine, controller=emitter.name).neighbours_matter,
@@ -357,7 +357,7 @@ def _read(
         raise ProcessedError(
             "this program has been processed by gcodejerk before",
             "process the original, or add --force to process its remaining rapids",
-            Place(name, program.stamp if lines is None else lines.line_of(program.stamp)),
+            Place(name, program.stamp if written is None else written.map.line_of(program.stamp)),
         )
     return program.written_for(emitter.name)
 

@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gcodejerk.errors import EmitError, ProgramError
+from gcodejerk.errors import EmitError, Place, ProgramError
 from gcodejerk.nc.dialects import find_dialect
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.flow.elsewhere import find_elsewhere
@@ -184,7 +184,9 @@ def _reader(
         return ScriptUnroller(name, dialect, start, elsewhere, most, comments)
     raise ProgramError(
         f"loops and calls of dialect '{dialect.name}' cannot be written out",
-        "leave --unroll out; it knows those of LinuxCNC, Siemens, and of Fanuc, Haas and their kin",
+        "leave --unroll out, or state the dialect of the program's own control (--dialect); known "
+        "are those of LinuxCNC, Siemens, and of Fanuc, Haas and their kin",
+        Place(name),
     )
 
 

@@ -16,7 +16,7 @@ from gcodejerk.errors import EmitError, ProgramError, VerifyError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.report.difference import difference
 from gcodejerk.report.records import dump
-from gcodejerk.rewrite.expanded import verify_expanded
+from gcodejerk.rewrite.expanded import Front, verify_expanded, verify_written
 from gcodejerk.rewrite.pipeline import Settings, process, process_file
 from gcodejerk.verification import Kind
 
@@ -220,3 +220,51 @@ def test_both_may_be_asked_for_where_one_has_nothing_to_do(loop, drilled):
         one = process(text, VMC, **{name: True for name, needed in asked.items() if needed})
         assert both.output.split(b"\n", 2)[2] == one.output.split(b"\n", 2)[2]
         assert [rapid.line for rapid in both.rapids] == [rapid.line for rapid in one.rapids]
+
+
+CYCLES_OF_HAAS = (
+    b"%\nO1234 (PLATE)\nG187 P1\nG21 G90 G94 G17 G40 G49 G80 G54\nG0 X0. Y0.\nG43 H1 Z20.\n"
+    b"M3 S900\nG98 G81 X1. Y2. Z-3. R2. F100.\nX30.\nG80\nG0 X5. Y5.\nX40.\nM30\n%\n"
+)
+LOOP_OF_LINUXCNC = (
+    b"G21 G90 G94 G17 G40 G49 G64\nG0 X0 Y0 Z5\nG98 G81 X1 Y2 Z-3 R2 F100\nG80\n#1=1\n"
+    b"o1 repeat [3]\nG0 X[#1]\n#1=[#1*8]\no1 endrepeat\nM2\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("program", "dialect", "controller", "front"),
+    [
+        (CYCLES_OF_HAAS, "haas", "haas", Front(cycles=True)),
+        (LOOP_OF_LINUXCNC, "linuxcnc", "linuxcnc", Front(unroll=True)),
+        (LOOP_OF_LINUXCNC, "linuxcnc", "linuxcnc", Front(cycles=True, unroll=True)),
+    ],
+)
+def test_a_program_tells_its_dialect_before_blocks_are_written_out(
+    program, dialect, controller, front
+):
+    machine = replace(VMC, controller=controller, dialect="auto")
+    options = {"expand_cycles": front.cycles, "unroll": front.unroll}
+    told = process(program, machine, **options)
+    stated = process(program, replace(machine, dialect=dialect), **options)
+    assert told.planned > 0
+    # The stamp names the machine file, which is another.
+    lines, others = (r.output.split(b"\n") for r in (told, stated))
+    differ = [a for a, b in zip(lines, others, strict=True) if a != b]
+    assert all(b"gcodejerk" in line for line in differ)
+    assert told.program.dialect == dialect
+    assert any(note.startswith(f"read as {dialect}: ") for note in told.notes)
+    found, written = verify_written(
+        io.BytesIO(program), io.BytesIO(told.output), machine, front, dialect="auto"
+    )
+    assert found.ok
+    assert written.written > 0
+
+
+def test_what_several_dialects_read_alike_is_not_written_out():
+    machine = replace(VMC, dialect="rs274")
+    program = b"G21 G90 G94\nG0 X0 Y0\nG0 X5 Y5\nG1 Z-1 F100\nM2\n"
+    for options in ({"expand_cycles": True}, {"unroll": True}):
+        with pytest.raises(ProgramError, match=r"<program>.*cannot be written out") as caught:
+            process(program, machine, **options)
+        assert "--dialect" in caught.value.remedy
