@@ -103,6 +103,7 @@ class _Scan:
         text = replace(program.language.text, numbered=True)
         self.dialect: Dialect = replace(program.language, text=text)
         self.firmware = self.dialect.one_command
+        self.waits = PAUSES if emitter.program_commands else STOPS
         self.own = re.compile(emitter.program_sets.encode(), re.IGNORECASE)
         self.harmless = {one.number.upper() for one in machine.controller_parameters}
         self.stops: list[Stop] = []
@@ -164,7 +165,7 @@ class _Scan:
         self._refuse_flow(block, number)
         if None in m or CALLS.intersection(int(v) for v in m if v is not None):
             self._refuse(number, "an M code is computed, calls another program or goes back")
-        return bool(STOPS.intersection(m)), bool(ENDS.intersection(m))
+        return bool(self.waits.intersection(m)), bool(ENDS.intersection(m))
 
     def _refuse_flow(self, block: Block, number: int) -> None:
         """Refuse jumps, loops, branches and calls; and programs in inches where that counts."""

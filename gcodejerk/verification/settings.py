@@ -324,16 +324,17 @@ def _code(line: bytes, dialect: Dialect) -> bytes:
 
 def _stops(code: bytes, dialect: Dialect, several: bool) -> tuple[bool, bool]:
     """Whether a line stops a program, and whether it ends it."""
+    ends = not dialect.one_command and bool({int(n) for n in _M.findall(code)} & {2, 30})
     if dialect.one_command or several:
         first = _FIRST.match(code)
         if several and not (first and first[1] == b"M" and int(first[2]) in _SAYS):
             numbers = re.findall(rb"M\s*0*([0-9]+)(?![0-9.])", code)
-            return not {int(number) for number in numbers}.isdisjoint(_WAITS), False
+            return not {int(number) for number in numbers}.isdisjoint(_WAITS), ends
         if first is None:
-            return re.match(rb"(?:N[0-9]+\s*)?PAUSE(?![A-Z0-9_])", code) is not None, False
-        return first[1] == b"M" and int(first[2]) in _WAITS, False
+            return re.match(rb"(?:N[0-9]+\s*)?PAUSE(?![A-Z0-9_])", code) is not None, ends
+        return first[1] == b"M" and int(first[2]) in _WAITS, ends
     codes = {int(number) for number in _M.findall(code)}
-    return bool(codes & {0, 1}), bool(codes & {2, 30})
+    return bool(codes & {0, 1}), ends
 
 
 def _old(key: Key, control: Control, machine: Machine) -> str | None:
