@@ -78,7 +78,8 @@ class Moves:
         leading = whole[np.arange(len(whole)), (whole != 0).argmax(axis=1)]
         signed = whole * np.where(leading < 0, -1, 1)[:, np.newaxis]
         length = path_length(signed * step, machine)
-        used = length >= machine.design.minimum_length * (1.0 - 1e-9)
+        used = (whole != 0).any(axis=1)
+        used &= length >= machine.design.minimum_length * (1.0 - 1e-9)
         if not used.any():
             raise PlanError(
                 "there is no rapid whose way is known: nothing to tune for",

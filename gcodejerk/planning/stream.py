@@ -190,7 +190,7 @@ class _Maker:
             )  # fmt: skip
             rounded = origin[:, np.newaxis] + whole[axis] * step[:, np.newaxis]
             end = start + np.where(moving, self.plans.displacement[self.moves, axis], 0.0)
-            written[axis] = self._with_ends(rounded, start, end)
+            written[axis] = self._with_ends(rounded, start, end, self.no_length[:, axis])
             unplayable |= moving & ~has_step(start - origin, end - origin, step)
         times = block_times(self._moved(written), self.grid)
         residual, worst = self._left(written, times)
@@ -219,11 +219,15 @@ class _Maker:
         """Where a control that holds F is, at the knots."""
         return self.grid, {a: played_positions(q, times, self.grid) for a, q in written.items()}
 
-    def _with_ends(self, positions: Array, start: Array, end: Array) -> Array:
-        """Positions between exact ends."""
+    def _with_ends(self, positions: Array, start: Array, end: Array, no_length: Array) -> Array:
+        """Positions between exact ends, from which those that are as good as there do not differ.
+
+        A sum of steps may differ from the same number in its last bit: that is no motion.
+        """
         knots, counts = self.grid.knots, self.grid.counts[:, np.newaxis]
-        inner = np.where(knots < counts, positions, end[:, np.newaxis])
-        return np.where(knots > 0, inner, start[:, np.newaxis])
+        start, end, no_length = (x[:, np.newaxis] for x in (start, end, no_length))
+        left = np.where((knots > 0) & (np.abs(positions - start) > no_length), positions, start)
+        return np.where((knots < counts) & (np.abs(left - end) > no_length), left, end)
 
     def _highest(self, profiles: Profiles, axis: int) -> Array:
         """The highest speed of an axis on each move, shape (b,) [mm/s]."""

@@ -102,9 +102,7 @@ def test_some_firmwares_run_every_command_of_a_line(name, line):
 @pytest.mark.parametrize("end", [b"", b"M2\n", b"M5 M30\n(more)\n"])
 def test_programs_in_dialects_of_mills_are_set_and_proven(name, dialect, end):
     moves = b"G0 X3 Z0 F30000\nG1 X12 F600\nM0\nG0 X60 F30000\nG1 X61 F600\nG0 X10 Z2 F30000\n"
-    made = process(
-        b"G21\nG90\n" + moves + end, MACHINES[name], form="parameters", dialect=dialect
-    )
+    made = process(b"G21\nG90\n" + moves + end, MACHINES[name], form="parameters", dialect=dialect)
     assert made.verification.ok
     assert made.settings.places == 4
     if end:

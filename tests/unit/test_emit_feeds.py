@@ -320,3 +320,28 @@ def test_a_creeping_axis_beside_a_coarser_one_keeps_its_time():
         here, slowest = there, min(slowest, row["F"])
     assert slowest < 0.005, "nothing creeps"
     assert time == pytest.approx(result.rapids[1].time, rel=1e-4)
+
+
+def test_the_last_bit_of_a_sum_of_steps_is_no_way():
+    """Beside a coarse V that ends off its step, X and Z have arrived but for rounding."""
+    axis = (
+        "{resolution: %s, rapid: {velocity: 300, acceleration: 2000, jerk: 5.0e+4},"
+        " modes: [{frequency: 22, damping: 0.02}]}"
+    )
+    machine = Machine.loads(
+        "interval: 0.002\npositioning: independent\nspindle: mill\naxes:\n"
+        f"  X: {axis % '1.0e-4'}\n  Z: {axis % '1.0e-4'}\n  V: {axis % '0.01'}\n"
+    )
+    random = np.random.default_rng(8)
+    ends = np.column_stack(
+        [random.uniform(-50.0, 50.0, (30, 2)), random.uniform(90.0, 110.0, 30)]
+    ).tolist()
+    moves = [f"G0 X{x:.4f} Z{z:.3f} V{v * k % 200:.3f}" for k, (x, z, v) in enumerate(ends)]
+    program = "\n".join(["G21 G90 G94 G17 G40 G64", "G1 X0. Z0. V0. F500.", *moves, "M30", ""])
+    for name in ("haas", "grbl", "mach"):
+        made = process(program.encode(), machine, controller=name, dialect="mach")
+        assert made.planned > 20
+        assert made.verification.ok
+        feeds = [float(f) for f in re.findall(rb" F(\S+)", made.output)]
+        assert min(feeds) > 0.0
+        assert all(len(f) < 16 for f in re.findall(rb" F(\S+)", made.output))

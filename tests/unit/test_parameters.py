@@ -391,3 +391,11 @@ def test_axes_give_each_other_time():
     assert found.chosen.total <= found.today.total * (1 + 1e-6)
     assert found.chosen.value <= max(alone) * (1 + 1e-6)
     assert not found.proven
+
+
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+def test_a_rapid_that_goes_nowhere_is_no_move_however_short_moves_may_be(positioning):
+    machine = machine_of(positioning, "0.1, minimum_length: 0")
+    moves = moves_of(machine, [[0.0, 0.0], [12.5, 0.0], [0.0, 1e-9]])
+    assert len(moves) == 1
+    assert tune(two_averages(machine), moves, machine, curve=False).gains
