@@ -4,6 +4,7 @@ import io
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from gcodejerk.emit.points.base import decimal
 from gcodejerk.emit.points.fanuc15 import records
 from gcodejerk.errors import EmitError, MachineError
 from gcodejerk.planning.records import advancing
+from gcodejerk.verification.physics.oscillators import Oscillators
+from gcodejerk.verification.physics.own_rapids import left_by_rapids, rapid_limits
 from gcodejerk.verification.rows.files import rows_format
 
 AXIS = "{rapid: {velocity: 500, acceleration: 5000, jerk: 150000}, limit: {jerk: 150000}, modes: [{frequency: 27, damping: 0.02}]}"  # noqa: E501
@@ -305,3 +308,99 @@ def test_programs_of_a_fanuc_are_read_by_the_remote_buffer_s_controller():
     described = machine("fanuc15")
     assert described.dialect == "fanuc"
     assert replace(described, name="x (y)").name == "x (y)"
+
+
+LAWS = {
+    "quintic": "planner: quintic",
+    "two-stage": "planner: two-stage, changeover: 100, upper_acceleration: 1000",
+    "time-constants": "planner: time-constants, first_average: 0.1, second_average: 0.03",
+    "four-ramp": (
+        "planner: four-ramp, rise: 0.01, fall: 0.03, braking_rise: 0.03, braking_fall: 0.01"
+    ),
+    "average": "filter: {type: average, time: 0.032}",
+    "zvd": "filter: {type: zvd, frequency: 25, damping: 0.05}",
+}
+
+
+def of_law(law, positioning, more=""):
+    """A machine whose own rapids follow a law; Z has no mode and keeps its own profile."""
+    axes = {
+        "X": "modes: [{frequency: 17, damping: 0.02}, {frequency: 44, damping: 0.01}]",
+        "Y": "modes: [{frequency: 9, damping: 0.01}]",
+        "Z": "modes: []",
+    }
+    rapid = "rapid: {velocity: 300, acceleration: 1500, jerk: 60000, %s}" % LAWS[law]  # noqa: UP031
+    limit = "limit: {velocity: 1200, acceleration: 6000, jerk: 1.0e+6}"
+    text = f"interval: 0.001\ncontroller: json\npositioning: {positioning}\n{more}axes:\n"
+    return Machine.loads(
+        text + "".join(f"  {a}: {{{rapid}, {limit}, {modes}}}\n" for a, modes in axes.items())
+    )
+
+
+QUIET = """
+interval: 0.001
+controller: json
+positioning: independent
+spindle: mill
+design: {band: 0.3, tolerance: 0.0001}
+axes:
+  X:
+    rapid: {velocity: 900, acceleration: 200, LAW}
+    limit: {velocity: 1200, acceleration: 6000, jerk: 1.0e+6}
+    modes: [{frequency: 89.42, damping: 0.03}]
+  Y: {rapid: {velocity: 900, acceleration: 200, LAW}, modes: []}
+  Z:
+    rapid: {velocity: 900, acceleration: 200, LAW}
+    modes:
+    - {frequency: 75.48, damping: 0.1, participation: 0.3}
+    - {frequency: 14.27, damping: 0.03, participation: 2}
+"""
+WAYS = (
+    b"G21 G90 G94 G17 G40 G49 G80 G54\nG1 X0. Y0. Z0. F100.\nG0 X80. Y-5. Z3.\nG0 Y60.\n"
+    b"G0 X4.03 Y-25. Z-9.26\nG0 X200. Z5.\nG0 Y300. Z-60.\nG0 X0. Y0. Z-57.7\nM2\n"
+)
+
+
+@pytest.mark.parametrize("profile", ["condition3", "symmetric", "cascade", "shortest"])
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+@pytest.mark.parametrize("law", LAWS)
+def test_rows_are_proven_whatever_the_controls_own_rapids_follow(law, positioning, profile):
+    made = process(WAYS, of_law(law, positioning), profile=profile)
+    assert made.verification.ok
+    assert made.planned > (0 if law in ("zvd", "average") else 3)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_rows_are_held_to_what_the_controls_own_rapids_leave(law):
+    """Two ways that share no code: what planning says of today's rapids, and the proof."""
+    machine = of_law(law, "independent")
+    made = process(WAYS, machine, profile="conventional")
+    rapids, rows = made.program.rapids, np.flatnonzero(made.plans.planned)
+    displacement = np.nan_to_num(rapids.target - rapids.start)[rows]
+    paths = SimpleNamespace(
+        displacement=displacement, speed=rapids.speed[rows], lone=np.zeros(len(rows), dtype=bool)
+    )
+    left = left_by_rapids(displacement, machine, rapid_limits(paths, machine))
+    modes = Oscillators.of(machine)
+    assert modes.largest(np.abs(left(modes))) == pytest.approx(
+        made.conventional_residual[rows].max(axis=1), rel=2e-3, abs=1e-7
+    )
+
+
+@pytest.mark.parametrize("law", [LAWS["two-stage"], f"jerk: 2.0e+6, {LAWS['quintic']}"])
+def test_a_law_that_leaves_more_than_limits_tell_is_todays_rapid(law):
+    text = QUIET.replace("LAW", law)
+    program = WAYS.replace(b"G0 X200. Z5.", b"G91 G0 X-548.877 Y96.324 Z-90.\nG90")
+    for profile in ("condition3", "cascade"):
+        made = process(program, Machine.loads(text), profile=profile)
+        assert made.verification.ok
+
+
+def test_an_axis_with_a_small_part_in_a_way_may_be_rounded_as_others_are():
+    machine = of_law("average", "linear", "path: {rapid: {velocity: 100, acceleration: 3000}}\n")
+    coarse = [replace(axis, resolution=1e-3) for axis in machine.axes]
+    machine = replace(machine, axes=tuple(coarse))
+    program = WAYS.replace(b"X80. Y-5. Z3.", b"X1. Y2. Z-50.").replace(b"X200. Z5.", b"X283.8 Z.58")
+    made = process(program, machine, profile="symmetric")
+    assert made.verification.ok
+    assert made.planned > 0

@@ -22,10 +22,19 @@ from gcodejerk.verification.physics.laws import is_mirrored
 from gcodejerk.verification.physics.points import TINY, Array, Paths
 
 Rows = NDArray[np.bool_]
-SYMMETRIC = ("conventional", "condition3", "cascade")
+SYMMETRIC = ("conventional", "condition3", "symmetric", "cascade")
 """Profiles whose profiles are their own mirror image."""
 MIDDLE = (0.5, 1.5)
 """Share of half the time in which the mean moment of any other profile lies."""
+
+
+def middle(machine: Machine) -> tuple[float, float]:
+    """Where the mean moment of an axis's motion may lie, in halves of its own time."""
+    # An axis that would not gain keeps the control's own profile, whatever the others get.
+    mirrored = machine.design.profile in SYMMETRIC and is_mirrored(machine)
+    low, high = (1.0, 1.0) if mirrored else MIDDLE
+    # The shortest profile may take far less than the control's own rapid.
+    return (0.0 if machine.design.profile == "shortest" else low), high
 
 
 def check_axes(
@@ -52,11 +61,7 @@ def check_axes(
     owner = paths.owner
     h = np.diff(t, prepend=t[:1])
     h[paths.begin] = 0.0
-    # An axis that would not gain keeps the control's own profile, whatever the others get.
-    mirrored = machine.design.profile in SYMMETRIC and is_mirrored(machine)
-    low, high = (1.0, 1.0) if mirrored else MIDDLE
-    if machine.design.profile == "shortest":
-        low = 0.0  # it may take far less than the control's own rapid
+    low, high = middle(machine)
     out = []
     for a in np.flatnonzero((paths.displacement != 0.0).any(axis=0)).tolist():
         D = np.abs(paths.displacement[:, a])

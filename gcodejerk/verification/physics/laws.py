@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, LAWS, Filter, Machine
 from gcodejerk.verification.physics.conventional import box_widths
+from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import Array, Index
 from gcodejerk.verification.physics.shapers import Complex, impulses_of, lasts, passes
 
@@ -169,7 +170,7 @@ class OwnRapids:
     """
 
     def __init__(self, displacement: Array, machine: Machine, limits: Array) -> None:
-        self.machine, self.limits = machine, limits
+        self.machine, self.limits, self.displacement = machine, limits, displacement
         self.size = np.abs(displacement)
         self.moving = self.size > 0.0
         self.linear = machine.positioning == "linear"
@@ -195,6 +196,19 @@ class OwnRapids:
     def response(self, axis: int, pole: complex) -> Complex:
         """What modes get of unit moves of an axis, at the axis's own arrival."""
         return self.base(axis).response(pole) * passes(self.filters.get(axis), pole)
+
+    def left(self, modes: Oscillators) -> NDArray[np.complex128]:
+        """Vibration when the last axis has arrived, shape (moves, m) [mm]."""
+        ends = self.totals()
+        out = np.zeros((len(ends), len(modes.poles)), dtype=np.complex128)
+        rest = ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
+        for m, pole in enumerate(modes.poles):
+            for a in np.flatnonzero(self.moving.any(axis=0)).tolist():
+                amount = modes.participation[m, a] * self.displacement[:, a]
+                if amount.any():
+                    left = np.exp(pole * rest[:, a]) / pole.imag
+                    out[:, m] += amount * left * self.response(a, complex(pole))
+        return out
 
     def position(self, axis: int, t: Array, owner: Index) -> Array:
         """Positions [-] of an axis at moments since the start."""

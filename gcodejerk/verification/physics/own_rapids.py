@@ -6,11 +6,14 @@ machine file allows is refused elsewhere.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, FREE, LINUXCNC, LONE_SHARE, Machine
-from gcodejerk.verification.physics.conventional import rapid_time
+from gcodejerk.verification.physics.conventional import Boxes, rapid_time
 from gcodejerk.verification.physics.laws import OwnRapids, has_law
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.points import LINEAR, Array, Index, Paths
@@ -55,14 +58,8 @@ def limits_of(displacement: Array, machine: Machine) -> Array:
     An axis without a jerk limit stands any jerk; from one interval to the next its acceleration can
     then go from one limit to the other.
     """
-    out = np.full((3, len(AXES)), np.inf)
-    for axis in machine.axes:
-        limit = axis.limit
-        jerk = (
-            limit.jerk if np.isfinite(limit.jerk) else 2.0 * limit.acceleration / machine.interval
-        )
-        out[:, AXES.index(axis.name)] = limit.velocity, limit.acceleration, jerk
-    each: Array = np.repeat(out[:, np.newaxis, :], len(displacement), axis=1)
+    own = _of_axes(machine)
+    each: Array = np.repeat(own[:, np.newaxis, :], len(displacement), axis=1)
     if machine.path != FREE:
         most, way = machine.path.limit, path_way(displacement, machine)
         slides = np.array([a in machine.axis_names and not machine.axis(a).rotary for a in AXES])
@@ -72,6 +69,27 @@ def limits_of(displacement: Array, machine: Machine) -> Array:
         each[0] = np.minimum(each[0], part * most.velocity)
         each[1] = np.minimum(each[1], part * most.acceleration)
     return each
+
+
+def whole_limits(machine: Machine) -> Array:
+    """The same whatever the way, shape (3, 9): an axis may do alone what the path may."""
+    own = _of_axes(machine)
+    if machine.path != FREE:
+        most = machine.path.limit
+        own[:2] = np.minimum(own[:2].T, (most.velocity, most.acceleration)).T
+    return own
+
+
+def _of_axes(machine: Machine) -> Array:
+    """Limits of each axis, shape (3, 9)."""
+    out = np.full((3, len(AXES)), np.inf)
+    for axis in machine.axes:
+        limit = axis.limit
+        jerk = (
+            limit.jerk if np.isfinite(limit.jerk) else 2.0 * limit.acceleration / machine.interval
+        )
+        out[:, AXES.index(axis.name)] = limit.velocity, limit.acceleration, jerk
+    return out
 
 
 def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
@@ -121,6 +139,32 @@ def own_times(paths: Paths, machine: Machine) -> tuple[Array, Array]:
     else:
         longest = np.floor(each * (1.0 + machine.design.max_extension) / dt + ON_GRID)
     return usual * dt, np.maximum(usual, longest) * dt
+
+
+def left_by_rapids(
+    displacement: Array, machine: Machine, limits: Array
+) -> Callable[[Oscillators], NDArray[np.complex128]]:
+    """What the controller's own rapids leave of modes, exactly.
+
+    Parameters
+    ----------
+    displacement : ndarray, shape (moves, 9)
+        [mm] or [deg]
+    machine : Machine
+        Its planner, its filters, and whether its axes move together.
+    limits : ndarray, shape (3, moves, 9)
+        Of `rapid_limits`.
+
+    Returns
+    -------
+    callable
+        Oscillators -> complex vibration, shape (moves, m). [mm]
+    """
+    if has_law(machine):
+        return OwnRapids(displacement, machine, limits).left
+    if machine.positioning == "linear":
+        limits = np.repeat(limits.min(axis=2)[:, :, np.newaxis], len(AXES), axis=2)
+    return Boxes.of(displacement, limits, bell=machine.planner == BELL).response
 
 
 def _own_limits(displacement: Array, machine: Machine) -> Array:

@@ -25,16 +25,16 @@ then neither the distance of the points excuses anything, nor how few there are 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import BELL, Machine
-from gcodejerk.verification.physics.conventional import Boxes, rapid_position
+from gcodejerk.verification.physics.conventional import rapid_position
 from gcodejerk.verification.physics.laws import OwnRapids, has_law
 from gcodejerk.verification.physics.oscillators import Oscillators
+from gcodejerk.verification.physics.own_rapids import left_by_rapids
 from gcodejerk.verification.physics.points import Array, Index, Paths
 
 RELATIVE = 0.02
@@ -125,6 +125,7 @@ class _Streams:
         if machine.positioning == "linear":
             limits = np.repeat(limits.min(axis=2)[:, :, np.newaxis], len(AXES), axis=2)
         self.limits = limits
+        self.own = left_by_rapids(paths.displacement, machine, limits)
         self.begins = np.zeros(len(self.t), dtype=np.bool_)
         self.begins[paths.begin] = True
 
@@ -168,31 +169,6 @@ class _Streams:
             parts = [modes.participation[m, a] * steps[a] for a in self.axes]
             driven = np.sum(parts, axis=0) * np.exp(pole * clock)[self.left]
             out[:, m] = np.add.reduceat(driven, self.paths.begin) / pole.imag
-        return out
-
-    def own(self, modes: Oscillators) -> NDArray[np.complex128]:
-        """Vibration left by the controller's own rapid, shape (streams, m) [mm]."""
-        if self.laws is not None:
-            return self._by_law(modes, self.laws)
-        return self._boxes.response(modes)
-
-    @cached_property
-    def _boxes(self) -> Boxes:
-        """The controller's own rapids: the band asks for them again and again."""
-        bell = self.machine.planner == BELL
-        return Boxes.of(self.paths.displacement, self.limits, bell=bell)
-
-    def _by_law(self, modes: Oscillators, laws: OwnRapids) -> NDArray[np.complex128]:
-        """The same of a control with a law or a filter of its own."""
-        displacement, ends = self.paths.displacement, laws.totals()
-        out = np.zeros((len(self.count), len(modes.poles)), dtype=np.complex128)
-        rest = ends.max(axis=1, initial=0.0)[:, np.newaxis] - ends
-        for m, pole in enumerate(modes.poles):
-            for a in self.axes:
-                amount = modes.participation[m, a] * displacement[:, a]
-                if amount.any():
-                    left = np.exp(pole * rest[:, a]) / pole.imag
-                    out[:, m] += amount * left * laws.response(a, complex(pole))
         return out
 
     def own_positions(self) -> Array:

@@ -9,24 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cached_property
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.machine import BELL, Machine
+from gcodejerk.machine import Machine
 from gcodejerk.nc import CERTAIN, Rapids
 from gcodejerk.verification.findings import Findings, Kind
-from gcodejerk.verification.physics.conventional import Boxes
 from gcodejerk.verification.physics.dynamics import check_dynamics
+from gcodejerk.verification.physics.independent import middle
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.own_rapids import (
     conventional_counts,
+    left_by_rapids,
     limits_of,
     own_times,
     rapid_limits,
+    whole_limits,
 )
 from gcodejerk.verification.physics.points import (
     STANDSTILL,
@@ -57,7 +58,6 @@ RELATIVE, SHORTEST = 0.02, 1.1
 """Share by which rows may leave more than today's rapid; times the tolerance, of `shortest`."""
 BAND_POINTS, BAND_STEP = 9, 0.25
 """Frequencies that a band is judged at, at least; their distance times half the duration [rad]."""
-MIRRORED = ("conventional", "condition3", "symmetric", "cascade")
 UNJUDGED = "conventional"
 """A profile that is written whether or not it leaves less than today's rapid, which it is."""
 
@@ -264,7 +264,7 @@ class _Judge:
         mean = 0.5 * T * (pieces.p0 + pieces.p1) + T**2 * (pieces.v0 - pieces.v1) / 12.0
         area = np.add.reduceat((T * end - mean) / np.where(end != 0.0, end, 1.0) * self.of_piece,
                                pieces.first[:-1], axis=0)  # fmt: skip
-        low, high = (1.0, 1.0) if self.machine.design.profile in MIRRORED else (0.5, 1.5)
+        low, high = middle(self.machine)
         error = interval + MORE_TICKS * tick + (step / size[pieces.first[:-1]]) * longest
         wrong = (area < 0.5 * low * usual - error) | (area > 0.5 * high * longest + error)
         self._complain(
@@ -284,8 +284,12 @@ class _Judge:
             np.abs(pieces.jerk()),
         )
         kinds = (Kind.VELOCITY, Kind.ACCELERATION, Kind.JERK)
-        for value, limit, blur, kind in zip(values, limits, pieces.blur(), kinds, strict=True):
-            excuse = blur if kind is Kind.JERK else np.minimum(blur, MOST_BLUR * limit)
+        # An axis that has a small part in a way has no small steps for it.
+        most = MOST_BLUR * whole_limits(self.machine)
+        for value, limit, blur, kind, excused in zip(
+            values, limits, pieces.blur(), kinds, most, strict=True
+        ):
+            excuse = blur if kind is Kind.JERK else np.minimum(blur, excused)
             bad = self.of_piece & (value > limit * (1.0 + WITHIN) + excuse)
             for a in np.flatnonzero(bad.any(axis=0)).tolist():
                 problem = f"{AXES[a]} passes its limit of {limit[bad[:, a], a][0]:g} mm, s"
@@ -347,10 +351,12 @@ class _Judge:
         if self.machine.design.profile == UNJUDGED:
             return
         left, allowed = np.zeros(len(nominal)), np.zeros(len(nominal))
+        limits = rapid_limits(self.paths, self.machine)
+        own = left_by_rapids(self.paths.displacement, self.machine, limits)
         for factor in self._band(modes):
             around = modes.at(float(factor))
             left = np.maximum(left, around.largest(self.pieces.response(around)))
-            allowed = np.maximum(allowed, around.largest(np.abs(self._own.response(around))))
+            allowed = np.maximum(allowed, around.largest(np.abs(own(around))))
         allowed *= 1.0 + RELATIVE
         if self.machine.design.profile == "shortest":
             allowed = np.maximum(allowed, SHORTEST * self.machine.design.tolerance)
@@ -368,15 +374,6 @@ class _Judge:
         phase = band * longest * float(np.abs(modes.poles).max(initial=0.0))
         half = max(BAND_POINTS // 2, int(np.ceil(phase / BAND_STEP)))
         return np.linspace(1.0 - band, 1.0 + band, 2 * half + 1) if band else np.ones(1)
-
-    @cached_property
-    def _own(self) -> Boxes:
-        """The controller's own rapids."""
-        limits = rapid_limits(self.paths, self.machine)
-        if self.machine.positioning == "linear":
-            limits = np.repeat(limits.min(axis=2)[:, :, np.newaxis], len(AXES), axis=2)
-        bell = self.machine.planner == BELL
-        return Boxes.of(self.paths.displacement, limits, bell=bell)
 
 
 def _ends(index: Index, moves: list[Move], rapids: Rapids, machine: Machine) -> Paths:
