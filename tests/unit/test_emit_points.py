@@ -404,3 +404,13 @@ def test_an_axis_with_a_small_part_in_a_way_may_be_rounded_as_others_are():
     made = process(program, machine, profile="symmetric")
     assert made.verification.ok
     assert made.planned > 0
+
+
+def test_a_way_counts_what_slides_whatever_its_letter_says():
+    """B slides here: a short X beside it makes no short rapid."""
+    sliding = AXIS.replace("{rapid", "{type: linear, rapid")
+    text = f"{EXAMPLE}  B: {sliding}\ndesign: {{minimum_length: 2}}\n"
+    program = MOVE.replace(b"X0. F100.\nG0 X300.", b"X0. B0. F100.\nG0 X.68 B148.9\nG0 X1.3 B150.")
+    made = process(program, machine("json", text=text))
+    assert made.verification.ok
+    assert made.planned == 1

@@ -310,7 +310,7 @@ def check_rapids(paths: Paths, rapids: Rapids, machine: Machine, found: Findings
     """Length and travel: whether these rapids may be replaced at all."""
     D = paths.displacement
     rotary = np.array(
-        [a in "ABC" or (a in machine.axis_names and machine.axis(a).rotary) for a in AXES]
+        [machine.axis(a).rotary if a in machine.axis_names else a in "ABC" for a in AXES]
     )
     linear = np.sqrt((D[:, ~rotary] ** 2).sum(axis=1))
     length = np.where(linear > STANDSTILL, linear, np.sqrt((D[:, rotary] ** 2).sum(axis=1)))
