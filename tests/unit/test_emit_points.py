@@ -406,6 +406,19 @@ def test_an_axis_with_a_small_part_in_a_way_may_be_rounded_as_others_are():
     assert made.planned > 0
 
 
+def test_whole_ticks_may_take_what_the_machine_file_allows_the_shortest_profile_too():
+    """Galil's ticks are 1/1024 s and common to all rows: some 3 % more than whole intervals."""
+    text = (
+        "interval: 0.002\npositioning: independent\naxes:\n  X: {resolution: 1.0e-4, rapid: "
+        "{velocity: 100, acceleration: 200}, modes: [{frequency: 117.4, damping: 0}, "
+        "{frequency: 110.8, damping: 0.03, participation: 2}]}\n"
+    )
+    program = b"G21 G90 G94 G17 G40 G49\nG1 X0. F100.\nG0 X-62.67\nG0 X-188.014\nG0 X9.\nM2\n"
+    made = process(program, machine("galil", text=text), profile="shortest")
+    assert made.verification.ok
+    assert made.planned == 3
+
+
 def test_a_way_counts_what_slides_whatever_its_letter_says():
     """B slides here: a short X beside it makes no short rapid."""
     sliding = AXIS.replace("{rapid", "{type: linear, rapid")

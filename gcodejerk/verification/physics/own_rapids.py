@@ -103,7 +103,7 @@ def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
     longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
     if machine.design.profile == "shortest":
-        longest = _longest(total, displacement, machine)
+        longest = np.maximum(longest, _longest(total, displacement, machine))
     most = np.maximum(usual, longest)
     return usual.astype(np.int64), most.astype(np.int64)
 
@@ -133,11 +133,11 @@ def own_times(paths: Paths, machine: Machine) -> tuple[Array, Array]:
     else:
         each = _axis_times(limits, displacement, machine.planner == BELL)
     usual = np.ceil(each / dt - ON_GRID)
+    longest = np.floor(each * (1.0 + machine.design.max_extension) / dt + ON_GRID)
     if machine.design.profile == "shortest":
         alone = _axis_times(_own_limits(displacement, machine), displacement)
-        longest = np.ceil((np.maximum(each, alone) + 2.0 * _periods(machine)) / dt)
-    else:
-        longest = np.floor(each * (1.0 + machine.design.max_extension) / dt + ON_GRID)
+        settled = np.ceil((np.maximum(each, alone) + 2.0 * _periods(machine)) / dt)
+        longest = np.maximum(longest, settled)
     return usual * dt, np.maximum(usual, longest) * dt
 
 
