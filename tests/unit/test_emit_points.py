@@ -361,13 +361,21 @@ WAYS = (
 )
 
 
-@pytest.mark.parametrize("profile", ["condition3", "symmetric", "cascade", "shortest"])
+@pytest.mark.parametrize("profile", ["condition3", "symmetric", "cascade"])
 @pytest.mark.parametrize("positioning", ["linear", "independent"])
 @pytest.mark.parametrize("law", LAWS)
 def test_rows_are_proven_whatever_the_controls_own_rapids_follow(law, positioning, profile):
     made = process(WAYS, of_law(law, positioning), profile=profile)
     assert made.verification.ok
     assert made.planned > (0 if law in ("zvd", "average") else 3)
+
+
+@pytest.mark.parametrize("law", ["time-constants", "zvd"])
+def test_rows_of_axes_that_move_in_far_less_than_their_own_time_are_proven(law):
+    program = b"\n".join([*WAYS.split(b"\n")[:3], b"G0 Y60.", b"M2", b""])
+    made = process(program, of_law(law, "independent"), profile="shortest")
+    assert made.verification.ok
+    assert made.planned > 0
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -427,3 +435,20 @@ def test_a_way_counts_what_slides_whatever_its_letter_says():
     made = process(program, machine("json", text=text))
     assert made.verification.ok
     assert made.planned == 1
+
+
+def test_records_that_a_stream_cannot_begin_or_end_with_are_no_missing_time():
+    """Coarse increments: the axis stands for some records while the motion begins and ends."""
+    law = f"rapid: {{velocity: 600, acceleration: 500, jerk: 2.0e+4, {LAWS['time-constants']}}}"
+    text = (
+        "interval: 0.001\npositioning: independent\nspindle: mill\naxes:\n"
+        f"  X: {{{law}, modes: [{{frequency: 24.65, damping: 0.01, participation: 2}}]}}\n"
+    )
+    program = MOVE.replace(b"G0 X300.", b"G0 X.92\nG0 X6.3\nG0 X5.\nG0 X90.")
+    options = OPTIONS["fanuc15"].replace("1000", "400")
+    coarse = machine("fanuc15", options, text)
+    made = process(program, coarse)
+    assert made.verification.ok
+    assert made.planned == 2
+    late = made.output.replace(b"G05\n", b"G05\n" + 3 * records(np.array([[1]]), "general"), 1)
+    assert not verify(program, late, coarse).ok

@@ -44,6 +44,9 @@ from gcodejerk.verification.rows.motion import Pieces
 from gcodejerk.verification.rows.moves import Move, Steps
 from gcodejerk.verification.rows.readers import CYCLIC
 
+ENDS_AT_ZEROS = "fanuc15"
+"""Whose records of zeros end a stream: it has none where the motion begins and ends slowly. There
+its axes stand still, as long on either side."""
 BATCH = 500
 """Moves that are judged at a time."""
 WITHIN = 1e-8
@@ -171,7 +174,11 @@ def _judge_points(
     """Judge points that are an interval apart like those of a stream."""
     moves = [move for _, move in batch]
     ends = _ends(np.array([i for i, _ in batch], dtype=np.int64), moves, rapids, machine)
-    size = np.array([len(move.t) for move in moves], dtype=np.int64)
+    own = np.array([len(move.t) for move in moves], dtype=np.int64)
+    missing = np.zeros(len(own), dtype=np.int64)
+    if file.name == ENDS_AT_ZEROS:
+        missing = np.maximum(conventional_counts(ends, machine)[0] + 1 - own, 0)
+    size, lead = own + missing, missing // 2
     end = np.cumsum(size)
     step = file.steps.position
     start = np.rint(ends.start / step) * step
@@ -179,7 +186,9 @@ def _judge_points(
     position = np.repeat(start, size, axis=0)
     for k, move in enumerate(moves):
         named[k, list(move.axes)] = True
-        position[end[k] - size[k] : end[k], list(move.axes)] = move.position
+        first, axes = end[k] - size[k] + lead[k], list(move.axes)
+        position[first : first + own[k], axes] = move.position
+        position[first + own[k] : end[k], axes] = move.position[-1]
     moved = np.rint((ends.start + ends.displacement) / step) * step - start
     paths = replace(
         ends,
