@@ -450,5 +450,5 @@ def test_records_that_a_stream_cannot_begin_or_end_with_are_no_missing_time():
     made = process(program, coarse)
     assert made.verification.ok
     assert made.planned == 2
-    late = made.output.replace(b"G05\n", b"G05\n" + 3 * records(np.array([[1]]), "general"), 1)
-    assert not verify(program, late, coarse).ok
+    farther = made.output.replace(b"G05\n", b"G05\n" + 3 * records(np.array([[1]]), "general"), 1)
+    assert not verify(program, farther, coarse).ok

@@ -115,7 +115,7 @@ class _Streams:
         self, paths: Paths, machine: Machine, moment: Index, limits: Array, straight: bool
     ) -> None:
         self.paths, self.machine, self.straight = paths, machine, straight
-        self.laws = OwnRapids(paths.displacement, machine, limits) if has_law(machine) else None
+        self.own = left_by_rapids(paths.displacement, machine, limits)
         self.owner = paths.owner
         self.left = (moment[paths.end - 1][self.owner] - moment).astype(np.int64)
         """Until arrival, row by row. [intervals]"""
@@ -125,7 +125,6 @@ class _Streams:
         if machine.positioning == "linear":
             limits = np.repeat(limits.min(axis=2)[:, :, np.newaxis], len(AXES), axis=2)
         self.limits = limits
-        self.own = left_by_rapids(paths.displacement, machine, limits)
         self.begins = np.zeros(len(self.t), dtype=np.bool_)
         self.begins[paths.begin] = True
 
@@ -175,11 +174,14 @@ class _Streams:
         """Positions of the controller's own rapid at the moments of the points."""
         out = np.array(self.paths.position)
         t = self.t - self.t[self.paths.begin][self.owner]
+        laws = None
+        if has_law(self.machine):
+            laws = OwnRapids(self.paths.displacement, self.machine, self.limits)
         for a in self.axes:
             D = self.paths.displacement[:, a]
             V, A, J = (np.where(D != 0.0, limit[:, a], 1.0) for limit in self.limits)
-            if self.laws is not None:
-                share = self.laws.position(a, t, self.owner)
+            if laws is not None:
+                share = laws.position(a, t, self.owner)
                 out[:, a] = self.paths.start[self.owner, a] + share * D[self.owner]
                 continue
             bell = self.machine.planner == BELL

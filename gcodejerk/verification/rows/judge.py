@@ -293,7 +293,7 @@ class _Judge:
             np.abs(pieces.jerk()),
         )
         kinds = (Kind.VELOCITY, Kind.ACCELERATION, Kind.JERK)
-        # An axis that has a small part in a way has no small steps for it.
+        # The steps of an axis are no smaller where its part in a way that the path bounds is small.
         most = MOST_BLUR * whole_limits(self.machine)
         for value, limit, blur, kind, excused in zip(
             values, limits, pieces.blur(), kinds, most, strict=True
