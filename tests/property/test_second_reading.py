@@ -122,6 +122,18 @@ def test_a_rotary_axis_that_counts_turns_does_so_in_a_run_of_feed_moves(wrap):
     assert confirmed == (2 if wrap == "none" else 1)
 
 
+@pytest.mark.parametrize("wrap", ["none", "shortest", "sign"])
+def test_a_rotary_word_that_nobody_can_read_leaves_its_axis_unknown(wrap):
+    """Whether grbl takes degrees where G20 is in force, builds decide."""
+    data = b"G21 G90\nG0 X1 A4\nG20\nG0 A0.39 X0.5\nG21\nG0 X9\nG0 A8\nG0 A9\nM2\n"
+    start = replace(start_of("grbl"), wraps={"A": wrap})
+    rapids = read(data, "grbl", start)
+    violations, _ = judge(data, "grbl", start, rapids)
+    assert not violations
+    assert np.isnan(rapids.target[rapids.line == 4, AXES.index("A")]).all()
+    assert rapids.reason[rapids.line == 6] == CERTAIN
+
+
 @pytest.mark.parametrize(("spindle", "certain"), [(None, 1), ("mill", 1), ("laser", 0)])
 def test_outputs_may_fire_a_beam_only_where_there_is_one(spindle, certain):
     """M106 is a fan, unless the machine file says that the machine burns."""

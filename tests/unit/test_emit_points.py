@@ -16,6 +16,7 @@ from gcodejerk.emit.points.base import decimal
 from gcodejerk.emit.points.fanuc15 import records
 from gcodejerk.errors import EmitError, MachineError
 from gcodejerk.planning.records import advancing
+from gcodejerk.verification.findings import Kind
 from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.own_rapids import left_by_rapids, rapid_limits
 from gcodejerk.verification.rows.files import rows_format
@@ -452,3 +453,33 @@ def test_records_that_a_stream_cannot_begin_or_end_with_are_no_missing_time():
     assert made.planned == 2
     farther = made.output.replace(b"G05\n", b"G05\n" + 3 * records(np.array([[1]]), "general"), 1)
     assert not verify(program, farther, coarse).ok
+
+
+def test_axes_of_which_one_begins_at_once_and_another_ends_slowly_are_no_later_than_they_are():
+    """Whose records are missing cannot be read: half of them in front made X seem late."""
+    slow = "planner: time-constants, first_average: 0.42, second_average: 0.4"
+    text = (
+        "interval: 0.002\npositioning: independent\nspindle: mill\naxes:\n"
+        "  X: {rapid: {velocity: 8, acceleration: 4000, planner: time-constants, "
+        "first_average: 0.002, second_average: 0.003}}\n"
+        f"  U: {{type: linear, rapid: {{velocity: 95, acceleration: 250, {slow}}}, "
+        "modes: [{frequency: 12, damping: 0.02, participation: 1}]}\n"
+    )
+    options = (
+        "{counts_per_unit: {X: 12000, U: 4000}, axis_names: {X: '1', U: '2'}, "
+        "fanuc_distance: general}"
+    )
+    both = machine("fanuc15", options, text)
+    program = b"G21 G90 G94 G64\nG0 X0 U0\nG0 X1. U5.\nM2\n"
+    made = process(program, both)
+    assert made.verification.ok
+    assert made.planned == 1
+    begin, end = made.output.index(b"G05\n") + len(b"G05\n"), made.output.index(bytes(5) + b"(SUM")
+    stream = np.frombuffer(made.output[begin:end], dtype=np.uint8).reshape(-1, 5)
+    steps = np.ascontiguousarray(stream[:, :-1]).view(">i2").astype(np.int64)
+    late = steps.copy()
+    late[[20, 150], 0] += [-100, 100]
+    for changed, kind in ((late, Kind.TIME), (np.array([[1, 1], [-1, -1]]), Kind.END)):
+        output = made.output[:begin] + records(changed, "general") + made.output[end:]
+        found = verify(program, output, both)
+        assert {violation.kind for violation in found.violations} >= {Kind.STAMP, kind}

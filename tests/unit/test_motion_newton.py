@@ -121,6 +121,17 @@ def test_a_mode_that_is_all_but_still_breaks_no_step(tiny):
     np.testing.assert_allclose(steps, proposed_steps(left, slope, objective, nothing_fixed), 1e-3)
 
 
+def test_a_move_of_two_intervals_without_a_limit_of_jerk_has_one_combination():
+    """All its times are the same, so that a part of no length stands against no limit."""
+    times, total = np.full((1, 5), INTERVAL), np.array([2.0 * INTERVAL])
+    objective = drawn_objective(np.random.default_rng(3), 1, 0.02, False)
+    limits = (4.0 / total, 20.0 / total**2, np.array([np.inf]))
+    T1, Ta, T2 = best_combinations(times, total, limits, objective, INTERVAL)
+    assert (T1 == INTERVAL).all()
+    assert not Ta.any()
+    assert not T2.any()
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.03])
 @pytest.mark.parametrize("spectrum", [False, True], ids=["band", "spectrum"])
 def test_combinations_are_the_best_of_all_profiles_with_these_times(damping, spectrum):

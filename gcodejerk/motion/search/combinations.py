@@ -126,7 +126,8 @@ class _Combinations:
         sums = (t2 + t3) * HALF
         # One over the acceleration is the difference of the two.
         self.length = sums - (t2 * t2 + t3 * (t2 + t3)) * THIRD, (HALF - t1 * THIRD) * t1
-        with np.errstate(divide="ignore", over="ignore"):
+        # A part of no length is impossible, whatever comes of it where nothing limits the jerk.
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             shortest = FEWER / np.minimum(a, j * T2)
             self.shortest = shortest, FEWER / (j * t1)
         shortest[impossible] = np.inf

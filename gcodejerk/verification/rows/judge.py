@@ -45,8 +45,7 @@ from gcodejerk.verification.rows.moves import Move, Steps
 from gcodejerk.verification.rows.readers import CYCLIC
 
 ENDS_AT_ZEROS = "fanuc15"
-"""Whose records of zeros end a stream: it has none where the motion begins and ends slowly. There
-its axes stand still, as long on either side."""
+"""Whose records of zeros end a stream: it has none where the motion begins and ends slowly."""
 BATCH = 500
 """Moves that are judged at a time."""
 WITHIN = 1e-8
@@ -175,10 +174,11 @@ def _judge_points(
     moves = [move for _, move in batch]
     ends = _ends(np.array([i for i, _ in batch], dtype=np.int64), moves, rapids, machine)
     own = np.array([len(move.t) for move in moves], dtype=np.int64)
-    missing = np.zeros(len(own), dtype=np.int64)
+    missing = lead = np.zeros(len(own), dtype=np.int64)
     if file.name == ENDS_AT_ZEROS:
         missing = np.maximum(conventional_counts(ends, machine)[0] + 1 - own, 0)
-    size, lead = own + missing, missing // 2
+        lead = _still_at_first(moves, ends, machine, missing)
+    size = own + missing
     end = np.cumsum(size)
     step = file.steps.position
     start = np.rint(ends.start / step) * step
@@ -205,6 +205,28 @@ def _judge_points(
     check_line(paths, machine, found)
     if (paths.displacement != 0.0).any(axis=1).all():
         check_dynamics(paths, machine, 1, found)
+
+
+def _still_at_first(moves: list[Move], ends: Paths, machine: Machine, missing: Index) -> Index:
+    """How many of the records that are missing stood in front of each motion, shape (moves,).
+
+    The axes moved at the mean moments of their own rapids, which are half of their times.
+    """
+    if machine.positioning == "linear":
+        return missing // 2
+    usual, _ = own_times(ends, machine)
+    early = np.zeros(len(moves))
+    for k, move in enumerate(moves):
+        way = move.position[-1] - move.position[0]
+        goes = way != 0.0
+        if not goes.any():
+            continue
+        left = (move.position[-1] - move.position)[:, goes] / way[goes]
+        # The trapezoids of all intervals add up to the mean moment.
+        mean = left.sum(axis=0) - 0.5
+        own = 0.5 * usual[k, np.array(move.axes)[goes]] / machine.interval
+        early[k] = np.mean(own - mean)
+    return np.clip(np.rint(early).astype(np.int64), 0, missing)
 
 
 class _Judge:

@@ -322,7 +322,7 @@ class Known:
             return NAN
         if wrap not in ("shortest", "sign") or (here != here and wrap == "shortest"):
             return angle
-        if here != here or (wrap == "sign" and not -360.0 < angle < 360.0):
+        if here != here or angle != angle or (wrap == "sign" and not -360.0 < angle < 360.0):
             return NAN
         turns = math.floor((here - angle) / 360.0)
         ends = [angle + 360.0 * (turns + n) for n in (-1, 0, 1, 2)]
