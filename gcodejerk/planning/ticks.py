@@ -8,7 +8,9 @@ two factors for the two conditions that the velocity ends at 0 and the position 
 
 .. math:: \alpha P_0 + \beta N_0 = 0, \qquad \alpha P_1 + \beta N_1 = 1 ,
 
-with the areas P_0, N_0 of the positive and the negative part and their moments about the end.
+with the areas P_0, N_0 of the positive and the negative part and their moments about the end. A
+motion that stands still on its way (short ones behind an input shaper) has such factors for each of
+its strokes, with the stroke's share of the way for 1: or it would creep where it has to stand.
 Phases of constant acceleration and of constant velocity stay that, symmetric profiles symmetric,
 steps of a trapezoid steps.
 
@@ -38,6 +40,8 @@ WITHIN = 1e-9
 """By what share a limit may be passed: the rounding of float64."""
 CHOICES = 4
 """Boundaries that are tried both rounded down and rounded up: two to the power of it."""
+SMALL = 1e-9
+"""What the rounding of float64 may leave of a 0, beside the greatest velocity or acceleration."""
 TRIES = 40
 """Durations that are tried for a profile."""
 
@@ -164,20 +168,45 @@ class _Shape:
     """Acceleration at the segments' begins."""
     end: Array
     """And at their ends."""
+    stroke: NDArray[np.int64]
+    """Which stroke a segment belongs to, from one standstill to the next; rests to that before."""
+    share: Array
+    """Of the way, of each stroke, shape (n, most strokes of any); 0 where there are fewer."""
 
     @classmethod
     def of(cls, profiles: Profiles, k: int) -> _Shape:
         """Read them."""
-        columns = (profiles.duration, profiles.acceleration, profiles.end_acceleration)
-        duration, begin, end = (column.reshape(-1, k) for column in columns)
+        columns = (
+            profiles.duration, profiles.acceleration, profiles.end_acceleration,
+            profiles.velocity, profiles.position,
+        )  # fmt: skip
+        duration, begin, end, velocity, position = (column.reshape(-1, k) for column in columns)
         # What the designs' own rounding left of a zero has to have no sign.
-        small = 1e-9 * np.maximum(np.abs(begin), np.abs(end)).max(axis=1, initial=0.0)
+        small = SMALL * np.maximum(np.abs(begin), np.abs(end)).max(axis=1, initial=0.0)
         begin, end = (np.where(np.abs(a) > small[:, np.newaxis], a, 0.0) for a in (begin, end))
-        return cls(duration, begin, end)
+        still = np.abs(velocity) <= SMALL * np.abs(velocity).max(axis=1, keepdims=True, initial=0.0)
+        starts = still & ((begin != 0.0) | (end != 0.0))
+        # A stroke has moved before the next one starts, segments of no duration or not.
+        moving = np.where(starts, np.cumsum(~still, axis=1), 0)
+        before = np.maximum.accumulate(np.insert(moving, 0, 0, axis=1)[:, :-1], axis=1)
+        stroke = np.cumsum(moving > before, axis=1).astype(np.int64)
+        moved = np.diff(position, axis=1, append=1.0)
+        return cls(duration, begin, end, stroke, _shares(stroke, moved))
 
     def take(self, index: NDArray[np.intp]) -> _Shape:
         """Some of the profiles."""
-        return _Shape(self.duration[index], self.begin[index], self.end[index])
+        return _Shape(
+            self.duration[index], self.begin[index], self.end[index], self.stroke[index],
+            self.share[index],
+        )  # fmt: skip
+
+    def without_nothing(self) -> _Shape:
+        """One profile without its segments of no duration."""
+        keep = self.duration[0] > 0.0
+        return _Shape(
+            self.duration[:, keep], self.begin[:, keep], self.end[:, keep], self.stroke[:, keep],
+            self.share,
+        )  # fmt: skip
 
     def mirrored(self) -> NDArray[np.bool_]:
         """Which are odd about their middle."""
@@ -193,30 +222,52 @@ class _Shape:
         both = self.duration[:, half - 1] + self.duration[:, half]
         duration = np.delete(self.duration, half, axis=1)
         duration[:, half - 1] = both
+        # There is no standstill any more where two strokes met.
+        closed = self.stroke[:, half] != self.stroke[:, half - 1]
+        stroke = np.where(closed[:, np.newaxis], 0, np.delete(self.stroke, half, axis=1))
+        share = np.where(closed[:, np.newaxis], np.eye(1, self.share.shape[1]), self.share)
         return _Shape(
-            duration, np.delete(self.begin, half, axis=1), np.delete(self.end, half - 1, axis=1)
-        )
+            duration, np.delete(self.begin, half, axis=1), np.delete(self.end, half - 1, axis=1),
+            stroke, share,
+        )  # fmt: skip
 
     def solved(self, ticks: Ticks, tick: float) -> tuple[Profiles, NDArray[np.bool_]]:
         """Scaled for these durations; and whether it accelerates first and then brakes."""
         d: Array = np.asarray(ticks * tick, dtype=np.float64)
-        after = np.cumsum(d[:, ::-1], axis=1)[:, ::-1] - d
-        both = []
-        for part in (np.maximum, np.minimum):
-            a, b = part(self.begin, 0.0), part(self.end, 0.0)
-            area = (0.5 * d * (a + b)).sum(axis=1)
-            moment = (0.5 * d * (a + b) * after + d * d * (2.0 * a + b) / 6.0).sum(axis=1)
-            both.append((area, moment))
-        (up_area, up_moment), (down_area, down_moment) = both
-        with np.errstate(divide="ignore", invalid="ignore"):
-            up = 1.0 / (up_moment - up_area * down_moment / down_area)
-            down = -up * up_area / down_area
-        good = np.isfinite(up) & np.isfinite(down) & (up > 0.0) & (down > 0.0)
-        up, down = (np.where(good, x, 1.0)[:, np.newaxis] for x in (up, down))
-        a, b = (np.where(x > 0.0, up * x, down * x) for x in (self.begin, self.end))
+        a, b = self.begin, self.end
+        good = np.ones(len(d), dtype=np.bool_)
+        for s in range(self.share.shape[1]):
+            own = self.stroke == s
+            up, down = _factors(np.where(own, d, 0.0), self.begin, self.end, self.share[:, s])
+            fit = np.isfinite(up) & np.isfinite(down) & (up > 0.0) & (down > 0.0)
+            good &= fit | ~own.any(axis=1)
+            up, down = (np.where(fit, x, 1.0)[:, np.newaxis] for x in (up, down))
+            a, b = (np.where(own, np.where(x > 0.0, up, down) * x, x) for x in (a, b))
         first = np.arange(len(d) + 1) * d.shape[1]
         jerk = (b - a) / d
         return Profiles.of(first, d.ravel(), a.ravel(), jerk.ravel()), good
+
+
+def _shares(stroke: NDArray[np.int64], moved: Array) -> Array:
+    """What each stroke moves of all, shape (n, strokes), from what each segment does."""
+    strokes = range(int(stroke.max(initial=0)) + 1)
+    sums = np.stack([np.where(stroke == s, moved, 0.0).sum(axis=1) for s in strokes], axis=1)
+    return np.asarray(sums / sums.sum(axis=1, keepdims=True))
+
+
+def _factors(d: Array, begin: Array, end: Array, share: Array) -> tuple[Array, Array]:
+    """What accelerating and braking are multiplied by, so that a stroke of such times is right."""
+    after = np.cumsum(d[:, ::-1], axis=1)[:, ::-1] - d
+    both = []
+    for part in (np.maximum, np.minimum):
+        a, b = part(begin, 0.0), part(end, 0.0)
+        area = (0.5 * d * (a + b)).sum(axis=1)
+        moment = (0.5 * d * (a + b) * after + d * d * (2.0 * a + b) / 6.0).sum(axis=1)
+        both.append((area, moment))
+    (up_area, up_moment), (down_area, down_moment) = both
+    with np.errstate(divide="ignore", invalid="ignore"):
+        up = share / (up_moment - up_area * down_moment / down_area)
+        return up, -up * up_area / down_area
 
 
 def _excess(profiles: Profiles, limits: tuple[Array, Array, Array]) -> Array:
@@ -315,11 +366,11 @@ def _by_sampling(task: TickTask, shape: _Shape) -> Profiles | None:
     A boundary between two ticks becomes one at each of them: the acceleration there is that of the
     profile, so that what changes is of second order in the tick.
     """
-    keep = shape.duration[0] > 0.0
-    begin, end = shape.begin[0][keep], shape.end[0][keep]
+    shape = shape.without_nothing()
+    begin, end = shape.begin[0], shape.end[0]
     if np.abs(begin[1:] - end[:-1]).max(initial=0.0) > 1e-6 * np.abs(begin).max(initial=0.0):
         return None  # a trapezoid: its steps can only be moved
-    at = np.concatenate([[0.0], np.cumsum(shape.duration[0][keep])])
+    at = np.concatenate([[0.0], np.cumsum(shape.duration[0])])
     a = np.concatenate([begin, end[-1:]])
     length = max(int(np.ceil(at[-1] / task.tick - ON_TICK)), 2)
     q = int(task.least[0])
@@ -331,14 +382,37 @@ def _by_sampling(task: TickTask, shape: _Shape) -> Profiles | None:
         grid = np.unique(np.rint(np.arange(cells + 1) * (length / cells)).astype(np.int64))
         place = np.interp(scaled, grid, np.arange(len(grid)))
         near = np.concatenate([np.floor(place + ON_TICK), np.ceil(place - ON_TICK)])
-        knots = grid[np.unique(near.astype(np.int64))]
+        cell = np.unique(near.astype(np.int64))
+        knots = grid[cell]
         value = np.interp(knots, scaled, a)
         value[np.abs(value) < 1e-12 * np.abs(value).max(initial=0.0)] = 0.0
         ticks = np.diff(knots)[np.newaxis, :]
-        sampled = _Shape(ticks * task.tick, value[np.newaxis, :-1], value[np.newaxis, 1:])
+        starts, share = _apart(shape, place)
+        sampled = _Shape(
+            ticks * task.tick, value[np.newaxis, :-1], value[np.newaxis, 1:],
+            np.searchsorted(starts[1:], cell[np.newaxis, :-1], side="right"), share[np.newaxis],
+        )  # fmt: skip
         made, good = sampled.solved(ticks, task.tick)
         excess = float(_excess(made, task.limits)[0]) if good[0] else 1.0
         if good[0] and excess <= 1.0 + WITHIN:
             return made
         length = max(length + 1, int(np.ceil(length * excess - ON_TICK)))
     return None
+
+
+def _apart(shape: _Shape, place: Array) -> tuple[NDArray[np.int64], Array]:
+    """Cells in which strokes of one profile begin, at whose ends it stands; and their shares.
+
+    A stroke that begins in the cell in which the one before ends is no stroke of its own.
+    """
+    accelerates = (shape.begin[0] != 0.0) | (shape.end[0] != 0.0)
+    starts, share, stood = [], [], -1
+    for s in range(int(shape.stroke[0, -1]) + 1):
+        own = np.flatnonzero(shape.stroke[0] == s)
+        begins = int(place[own[0]] + ON_TICK)
+        if begins >= stood:
+            starts.append(begins)
+            share.append(0.0)
+        share[-1] += float(shape.share[0, s])
+        stood = int(np.ceil(place[own[accelerates[own]][-1] + 1] - ON_TICK))
+    return np.array(starts, dtype=np.int64), np.array(share)

@@ -483,3 +483,35 @@ def test_axes_of_which_one_begins_at_once_and_another_ends_slowly_are_no_later_t
         output = made.output[:begin] + records(changed, "general") + made.output[end:]
         found = verify(program, output, both)
         assert {violation.kind for violation in found.violations} >= {Kind.STAMP, kind}
+
+
+@pytest.mark.parametrize(
+    ("controller", "planner", "shaper", "length"),
+    [
+        ("elmo", "planner: poly5", "mzv, frequency: 15", 0.3),
+        ("galil", "jerk: 3.0e+5", "zv, frequency: 15", 0.05),
+        ("galil", "planner: poly5", "klipper-ei, frequency: 20, damping: 0.1", 0.11),
+        ("pmac", "jerk: 3.0e+5", "zvd, frequency: 12, damping: 0.05", 0.3),
+    ],
+)
+def test_an_axis_that_a_shaper_lets_stand_on_its_way_stands_there(
+    controller, planner, shaper, length
+):
+    """A short way of an axis without modes, beside a long one: it crept back in between."""
+    rapid = "velocity: 300, acceleration: 4000, %s, filter: {type: %s}" % (planner, shaper)  # noqa: UP031
+    limit = "limit: {acceleration: 8000, jerk: 1.0e+7}"
+    text = (
+        f"interval: {'0.0009765625' if controller == 'galil' else '0.001'}\n"
+        "positioning: independent\nspindle: mill\naxes:\n"
+        f"  X: {{rapid: {{{rapid}}}, {limit}, modes: [{{frequency: 27, damping: 0.02}}]}}\n"
+        f"  Y: {{rapid: {{{rapid}}}, {limit}}}\n"
+    )
+    options = {
+        "elmo": "{counts_per_unit: {X: 10000, Y: 10000}}",
+        "galil": "{counts_per_unit: {X: 10000, Y: 10000}, axis_names: {X: A, Y: B}}",
+        "pmac": "{isx90: 1000, axis_names: {X: X, Y: Y}, confirmed: [pmac-colon]}",
+    }
+    program = b"G21 G90 G94\nG0 X0 Y0\nG0 X30 Y%g\nM2\n" % length
+    made = process(program, machine(controller, options[controller], text))
+    assert made.planned == 1
+    assert made.verification.ok

@@ -72,6 +72,36 @@ def test_drawn_profiles_end_exactly_at_rest_within_their_limits(seed, tick):
         assert (peak <= limit * (1 + 1e-8)).all()
 
 
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("tick", [1e-9, 20e-6, 1 / 1024, 1e-3])
+def test_what_stands_on_its_way_stands_there_in_ticks_too(seed, tick):
+    """Strokes like those of a short move behind an input shaper, of which the times are rounded."""
+    rng = np.random.default_rng(seed)
+    mirrored = seed % 4 == 0
+    strokes = 2 if mirrored else rng.integers(2, 5)
+    share = np.ones(strokes) if mirrored else rng.uniform(0.2, 1.0, strokes)
+    share /= share.sum()
+    t = np.full(2, 0.0113) if mirrored else rng.uniform(0.003, 0.02, strokes)
+    # The braking takes so many times as long as the accelerating.
+    slope = np.ones(2) if mirrored else rng.uniform(0.5, 2.0, strokes)
+    peak = share / (t * t * (1.0 + slope))
+    rest, none = rng.uniform(0.003, 0.03, strokes), np.zeros(strokes)
+    d = np.stack([t, t, slope * t, slope * t, rest], axis=1).ravel()[:-1]
+    a = np.stack([none, peak, none, -peak / slope, none], axis=1).ravel()[:-1]
+    up, down = peak / t, peak / (slope**2 * t)
+    j = np.stack([up, -up, -down, down, none], axis=1).ravel()[:-1]
+    profiles = Profiles.of(np.array([0, len(d)]), d, a, j)
+    limits = profiles.peak_velocity, profiles.peak_acceleration, profiles.peak_jerk
+    made, found = told(profiles, tuple(1.5 * limit for limit in limits), tick)
+    assert found.all()
+    rests = (made.acceleration == 0.0) & (made.jerk == 0.0) & (made.velocity < 1e-6)
+    rests[0] = False
+    assert rests.sum() >= strokes - 1
+    assert np.abs(made.velocity[rests]).max() < 1e-12 * made.peak_velocity[0]
+    stands = np.unique(made.position[rests].round(9))
+    assert stands == pytest.approx(np.cumsum(share)[:-1], abs=1e-9)
+
+
 def test_a_trapezoid_keeps_its_steps():
     first, d = np.array([0, 3]), np.array([0.1, 0.25, 0.1]) + 1e-4 / 3
     a = np.array([1.0, 0.0, -1.0]) / (d[0] * (d[0] + d[1]))
