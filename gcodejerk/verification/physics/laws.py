@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ def is_mirrored(machine: Machine) -> bool:
     return machine.planner not in ASYMMETRIC and filters <= {"average", "triangle"}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Ramp:
     """From rest to speeds, shape (n,) each: how long, how far, and the speed in between."""
 
@@ -56,6 +57,7 @@ class Ramp:
     speed: Callable[[Array], Array]
     """At moments of shape (n, k), from 0 to `time`. [1/s]"""
 
+    @cached_property
     def samples(self) -> Array:
         """Speeds at moments as far apart, shape (n, PARTS + 1)."""
         return self.speed(self.time[:, np.newaxis] * np.linspace(0.0, 1.0, PARTS + 1))
@@ -87,7 +89,7 @@ class Sampled:
         for ramp, sign in ((self.up, 1.0), (self.down, -1.0)):
             if not len(self.peak):
                 continue
-            gained = np.diff(ramp.samples(), axis=1)
+            gained = np.diff(ramp.samples, axis=1)
             at = ramp.time[:, np.newaxis] * middle
             left = self.total[:, np.newaxis] - at if sign > 0.0 else at
             x = 0.5 * pole * ramp.time / PARTS
@@ -107,7 +109,7 @@ class Sampled:
 
 def _way(ramp: Ramp, peak: Array, t: Array, owner: Index) -> Array:
     """Way [-] from rest at moments, through a ramp and on at its speed."""
-    speed = ramp.samples()
+    speed = ramp.samples
     h = np.maximum(ramp.time, 1e-12) / PARTS
     way = np.zeros_like(speed)
     way[:, 1:] = np.cumsum(0.5 * (speed[:, 1:] + speed[:, :-1]), axis=1) * h[:, np.newaxis]

@@ -90,7 +90,7 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
     suspects = np.flatnonzero(left > allowed)
     if not len(suspects):
         return none
-    band = streams.band(modes)
+    band = band_of(machine, modes, float(streams.t.max(initial=0.0)))
     rows = paths.rows_of(suspects)
     part, left, allowed = paths.take(suspects), left[suspects], allowed[suspects]
     streams = _Streams(part, machine, moment[rows], limits[:, suspects], straight)
@@ -106,6 +106,21 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
         allowed = np.maximum(allowed, (1.0 + RELATIVE) * near)
     bad = np.flatnonzero(left > allowed)
     return Excess(suspects[bad].astype(np.int64), left[bad], allowed[bad])
+
+
+def band_of(machine: Machine, modes: Oscillators, longest: float) -> Array:
+    """Frequencies of the band, relative to the modes' own, its ends first.
+
+    A null that a rapid has at the mode's own frequency is farthest from them. They stand so close
+    that what a motion of the longest time [s] leaves cannot rise and fall in between.
+    """
+    band = machine.design.band
+    if not band:
+        return np.ones(1)
+    phase = band * 0.5 * longest * float(np.abs(modes.poles).max(initial=0.0))
+    half = max(BAND_POINTS // 2, int(np.ceil(phase / BAND_STEP)))
+    factors = np.linspace(1.0 - band, 1.0 + band, 2 * half + 1)
+    return factors[np.argsort(-np.abs(factors - 1.0), kind="stable")]
 
 
 class _Streams:
@@ -139,18 +154,6 @@ class _Streams:
             return modes.largest(amplitude)
         shown = np.abs(modes.poles) * self.spacing[:, np.newaxis] < np.pi
         return modes.largest(np.where(shown, amplitude, 0.0))
-
-    def band(self, modes: Oscillators) -> Array:
-        """Frequencies of the band, relative to the modes' own, its ends first.
-
-        A null that a rapid has at the mode's own frequency is farthest from them.
-        """
-        band = self.machine.design.band
-        longest = 0.5 * float(self.t.max(initial=0.0))
-        phase = band * longest * float(np.abs(modes.poles).max(initial=0.0))
-        half = max(BAND_POINTS // 2, int(np.ceil(phase / BAND_STEP)))
-        factors = np.linspace(1.0 - band, 1.0 + band, 2 * half + 1)
-        return factors[np.argsort(-np.abs(factors - 1.0), kind="stable")]
 
     def lines(self, modes: Oscillators, position: Array) -> NDArray[np.complex128]:
         """Vibration left by straight lines through positions, shape (streams, m) [mm]."""
