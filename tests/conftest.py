@@ -136,6 +136,9 @@ REPEATS = {
     "property/test_control_settings.py": {
         "test_without_the_inserted_lines_a_program_is_what_it_was": 4,
     },
+    "property/test_every_control.py": {
+        "test_nothing_is_written_that_its_proof_refuses": 4,
+    },
     "property/test_families.py": {
         "test_a_stepped_simulation_leaves_as_much": 3,
     },

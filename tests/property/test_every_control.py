@@ -1,0 +1,132 @@
+"""Every controller, in every form, on drawn machines: nothing is written that its proof refuses.
+
+`process` reads its own output back with readers that share nothing with what wrote it. A refusal of
+a program or of a machine file is fine; one of our own output is a bug, whichever of the two is
+wrong. What the kinds of rapids, filters, axes and options that a machine file can name do together
+is nowhere listed: it is drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, Phase, event, given, note, settings
+from hypothesis import strategies as st
+
+from gcodejerk.emit import controllers, load_controller
+from gcodejerk.errors import GcodejerkError, VerifyError
+from gcodejerk.machine import PLANNERS
+from gcodejerk.machine.parts import ControllerOptions
+from gcodejerk.nc import DIALECTS
+from gcodejerk.rewrite.pipeline import process
+from gcodejerk.testing.machines import machines
+
+# A machine is a large thing to shrink: minutes for a smaller example that says no more.
+CALM = settings(
+    deadline=None,
+    max_examples=12,
+    phases=(Phase.explicit, Phase.reuse, Phase.generate),
+    suppress_health_check=list(HealthCheck),
+)
+FORMS = sorted((name, form.name) for name in controllers() for form in load_controller(name).forms)
+READ = ("linuxcnc", "grbl", "fanuc", "haas", "mach")
+"""Dialects of programs for a controller that has none of its own."""
+PERIODS = {"galil": [1 / 1024], "fanuc15": [0.001, 0.002, 0.004, 0.008]}
+STARTUPS = {
+    "klipper": ["G21 G90", "G90"],
+    "marlin": ["G21 G90", "G90"],
+    "siemens": ["G71 G90 G94 G17 G40", "G70 G90 G94 G17 G40"],
+}
+PROFILES = ("condition3", "symmetric", "cascade", "condition1", "condition2", "conventional")
+
+
+@st.composite
+def described(draw, controller, dialect):
+    """A machine with all that the controller has to know of it, and often what it need not."""
+    letters = draw(st.sampled_from(["XYZ", "XYZ", "XZ", "X", "XYZA", "XYZBU"]))
+    machine = draw(
+        machines(
+            axes=letters,
+            modes=(0, 2),
+            planner=draw(st.sampled_from([None, *PLANNERS])),
+            filtered=None,
+            interval=draw(st.sampled_from(PERIODS.get(controller, [0.0005, 0.001, 0.002, 0.004]))),
+        )
+    )
+    turning = dialect == "linuxcnc" and letters == "XZ" and draw(st.booleans())
+    axes = tuple(
+        replace(
+            axis,
+            travel=draw(st.sampled_from([None, None, axis.travel])),
+            diameter=turning and axis.name == "X",
+            wrap=draw(st.sampled_from([None, "none", "shortest"])) if axis.rotary else None,
+        )
+        for axis in machine.axes
+    )
+    lettered = controller in ("galil", "pmac")
+    options = ControllerOptions(
+        counts_per_unit={a: draw(st.sampled_from([1000.0, 4096.0, 12345.6])) for a in letters},
+        axis_names={a: "ABCDEFGH"[k] if lettered else str(k + 1) for k, a in enumerate(letters)},
+        isx90=draw(st.sampled_from([1.0, 1000.0])) if controller == "pmac" else None,
+        fanuc_distance=draw(st.sampled_from(["general", "special"])),
+        confirmed=("pmac-colon", "acs-pvspline"),
+        override_guard=controller == "linuxcnc" and draw(st.booleans()),
+        version=draw(st.sampled_from([None, "2.9"])) if controller == "linuxcnc" else None,
+    )
+    usual = ["G21 G90 G94 G17 G40 G49", "G20 G90 G94 G17 G40 G49"]
+    program = replace(
+        machine.program,
+        startup=draw(st.sampled_from(STARTUPS.get(dialect, usual))),
+        start=dict.fromkeys(letters, 0.0) if draw(st.booleans()) else {},
+        decimal_point="calculator",
+    )
+    return replace(
+        machine, axes=axes, program=program, controller_options=options, spindle="mill"
+    )  # fmt: skip
+
+
+@st.composite
+def moving(draw, machine, dialect):
+    """A program of rapids long and short, of a second at most, and what stands between them."""
+    letters = machine.axis_names
+    longest = {axis.name: axis.rapid.velocity for axis in machine.axes}
+    # Printers have no words for what is in force anyway, and their G0 has an F.
+    printer = dialect in ("marlin", "klipper")
+    lines = ["G90", "G1 F90000" if printer else "G94 G64" if dialect != "grbl" else "G94"]
+    lines += ["G0 " + " ".join(f"{letter}{k + 1}." for k, letter in enumerate(letters))]
+    between = ["G91", "G90", "M3 S1000", "G21", "G20", ""][: 2 if printer else 6]
+    for _ in range(draw(st.integers(3, 16))):
+        kind = draw(st.integers(0, 11))
+        named = draw(st.lists(st.sampled_from(letters), min_size=1, max_size=3, unique=True))
+        reach = draw(st.sampled_from([300.0, 20.0, 1.0, 0.1]))
+        places = draw(st.integers(1, 4))
+        share = [draw(st.integers(-999, 999)) / 999 for _ in named]
+        to = " ".join(
+            f"{a}{s * min(reach, longest[a]):.{places}f}" for a, s in zip(named, share, strict=True)
+        )
+        if kind < 8:
+            lines.append(f"G0 {to}")
+        elif kind < 9:
+            lines.append(f"G1 {to}" if printer else f"G1 {to} F500.")
+        else:
+            lines.append(draw(st.sampled_from(between)))
+    return "\n".join([*lines, *([] if printer else ["M30"]), ""]).encode()
+
+
+@pytest.mark.parametrize(("controller", "form"), FORMS)
+@CALM
+@given(st.data())
+def test_nothing_is_written_that_its_proof_refuses(controller, form, data):
+    dialect = controller if controller in DIALECTS else data.draw(st.sampled_from(READ))
+    machine = data.draw(described(controller, dialect))
+    program = data.draw(moving(machine, dialect))
+    note(program.decode())
+    profile = data.draw(st.sampled_from(PROFILES))
+    chosen = {"controller": controller, "form": form, "profile": profile, "dialect": dialect}
+    try:
+        event(f"planned: {process(program, machine, **chosen).planned > 0}")
+    except VerifyError:
+        raise
+    except GcodejerkError as error:
+        event(f"refused: {error.problem}")
