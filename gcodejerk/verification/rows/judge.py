@@ -312,8 +312,8 @@ class _Judge:
         u = pieces.turning()
         values = (
             np.maximum(np.abs(pieces.velocity(u)), np.maximum(abs(pieces.v0), abs(pieces.v1))),
-            np.maximum(np.abs(pieces.acceleration(0.0)), np.abs(pieces.acceleration(1.0))),
-            np.abs(pieces.jerk()),
+            np.maximum(*np.abs(pieces.accelerations)),
+            np.abs(pieces.jerk),
         )
         kinds = (Kind.VELOCITY, Kind.ACCELERATION, Kind.JERK)
         # The steps of an axis are no smaller where its part in a way that the path bounds is small.
@@ -331,7 +331,7 @@ class _Judge:
         """The acceleration is continuous, and 0 at both ends."""
         pieces = self.pieces
         blur = pieces.blur()[1]
-        begin, end = pieces.acceleration(0.0), pieces.acceleration(1.0)
+        begin, end = pieces.accelerations
         first = np.zeros(len(begin), dtype=np.bool_)
         first[pieces.first[:-1]] = True
         before = np.where(first[:, np.newaxis], 0.0, np.roll(end, 1, axis=0))

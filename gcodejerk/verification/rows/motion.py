@@ -15,8 +15,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.verification.physics.oscillators import Oscillators
@@ -27,7 +29,7 @@ CELLS = 1 << 20
 """Exponentials computed at a time."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Pieces:
     """The pieces of b moves, s in all; columns of all nine axes."""
 
@@ -72,18 +74,26 @@ class Pieces:
         last = self.first[1:] - 1
         return np.asarray(self.begin[last] + self.T[last])
 
-    def acceleration(self, u: float) -> Array:
-        """At a share of each piece, shape (s, 9)."""
+    @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """Axes that any piece moves, shape (9,)."""
+        return np.asarray(self.p1.any(axis=0) | self.v1.any(axis=0))
+
+    @cached_property
+    def accelerations(self) -> tuple[Array, Array]:
+        """At the begin and at the end of each piece, shape (s, 9)."""
         T = self.T[:, np.newaxis]
-        return np.asarray(
-            (12.0 * u - 6.0) * (self.p0 - self.p1) / T**2
-            + ((6.0 * u - 4.0) * self.v0 + (6.0 * u - 2.0) * self.v1) / T
+        even = 6.0 * (self.p1 - self.p0) / T**2
+        return (
+            np.asarray(even - (4.0 * self.v0 + 2.0 * self.v1) / T),
+            np.asarray((2.0 * self.v0 + 4.0 * self.v1) / T - even),
         )
 
+    @cached_property
     def jerk(self) -> Array:
         """Of each piece, shape (s, 9)."""
-        T = self.T[:, np.newaxis]
-        return np.asarray((self.acceleration(1.0) - self.acceleration(0.0)) / T)
+        a, b = self.accelerations
+        return np.asarray((b - a) / self.T[:, np.newaxis])
 
     def velocity(self, u: Array) -> Array:
         """At shares of each piece, shape (s, 9)."""
@@ -96,7 +106,7 @@ class Pieces:
 
     def turning(self) -> Array:
         """Share at which the acceleration is 0 within a piece; 0 where it is not."""
-        a, b = self.acceleration(0.0), self.acceleration(1.0)
+        a, b = self.accelerations
         with np.errstate(divide="ignore", invalid="ignore"):
             u = a / (a - b)
         return np.asarray(np.where((u > 0.0) & (u < 1.0), u, 0.0))
@@ -147,16 +157,21 @@ class Pieces:
 
     def response(self, modes: Oscillators) -> Array:
         """Displacement amplitude of every oscillator after each move, shape (b, m) [mm]."""
-        end = self.total[self.owner]
-        left0, left1 = end - self.begin, end - self.begin - self.T
-        a, b, j = self.acceleration(0.0), self.acceleration(1.0), self.jerk()
-        out = np.zeros((len(self.first) - 1, len(modes.poles)), dtype=np.complex128)
-        width = max(1, CELLS // max(len(end), 1))
+        left = (self.total[self.owner] - self.begin)[:, np.newaxis]
+        last = self.first[1:] - 1
+        axes = np.flatnonzero(self.moving)
+        a, b, j = (x[:, axes] for x in (*self.accelerations, self.jerk))
+        out = np.zeros((len(last), len(modes.poles)), dtype=np.complex128)
+        width = max(1, CELLS // max(len(left), 1))
         for at in range(0, len(modes.poles), width):
             part = slice(at, at + width)
-            pole, share = modes.poles[part], modes.participation[part].T
-            # The integral of (a + j s) exp(pole (left - s)) over a piece, by parts.
-            early = (a @ share + (j @ share) / pole) * np.exp(pole * left0[:, np.newaxis])
-            late = (b @ share + (j @ share) / pole) * np.exp(pole * left1[:, np.newaxis])
-            out[:, part] = np.add.reduceat((early - late) / pole, self.first[:-1], axis=0)
+            pole, share = modes.poles[part], modes.participation[part, axes].T
+            # The integral of (a + j s) exp(pole (left - s)) over a piece, by parts; where a piece
+            # ends, the next one begins.
+            early = np.exp(pole * left)
+            late = np.roll(early, -1, axis=0)
+            late[last] = 1.0
+            slope = (j @ share) / pole
+            each = (a @ share + slope) * early - (b @ share + slope) * late
+            out[:, part] = np.add.reduceat(each / pole, self.first[:-1], axis=0)
         return np.asarray(np.abs(out) / modes.poles.imag)
