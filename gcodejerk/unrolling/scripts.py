@@ -153,9 +153,7 @@ class ExactFollower(Follower):
 
     def _block(self, unit: Unit, at: int, line: Line, state: State, ways: Ways) -> None:
         block, dialect = line.block, self.runner.dialect
-        if (op := self.script.ops.get(at)) is not None:
-            here = self.script.called(op.name) is not None
-            self.stay[at] = LeftAloneError(NOT_TAKEN if here else NOT_HERE, self._at)
+        self._note_call(at, line)
         if block.problem is not None:
             raise LeftAloneError("a line is not understood", self._at)
         codes = {round((w.value or 0.0) * 10) for w in block.words if w.letter == "G"}
@@ -172,6 +170,13 @@ class ExactFollower(Follower):
             self._take(line, state)
         super()._block(unit, at, line, state, ways)
 
+    def _note_call(self, at: int, line: Line) -> None:
+        """Note a call that stays, by its line of flow or, of Siemens, by an unknown name or L."""
+        op = self.script.ops.get(at)
+        if op is not None or (self._is_named and self._calls_elsewhere(line)):
+            here = op is not None and self.script.called(op.name) is not None
+            self.stay[at] = LeftAloneError(NOT_TAKEN if here else NOT_HERE, self._at)
+
     def _return(self, unit: Unit, at: int, state: State, ways: Ways) -> None:
         if not self._calls and not self._is_named:
             raise LeftAloneError("M99 begins the program again", self._at)
@@ -183,13 +188,13 @@ class ExactFollower(Follower):
         """Write a block."""
         text: bytes | None = line.text
         if self._scopes:
-            if self.script.called(self._called(line)) is None and self._calls_elsewhere(line):
+            if self.script.called(self._called(line)) is None and self._calls_by_number(line):
                 raise LeftAloneError("a macro calls a program that is not here", self._at)
             text = worded(line, state, self.runner.dialect, self.runner.executor.declared)
         if text is not None:
             self._write(self._unnumbered(line, text), line)
 
-    def _calls_elsewhere(self, line: Line) -> bool:
+    def _calls_by_number(self, line: Line) -> bool:
         """Whether a block calls a program, which may share the macro's variables."""
         codes = {(word.letter, word.value) for word in line.block.words}
         return bool(codes & {("M", 98.0), ("G", 65.0), ("M", 97.0)})
@@ -267,6 +272,7 @@ class ScriptUnroller(FollowingReader):
             if self.structures:
                 unit = exact.write()
                 self.structures = sum(_decides(script.ops[at]) for at in exact.reached)
+                self.structures += len(exact.stay.keys() - script.ops.keys())
                 self._calls_left = len(exact.stay)
                 if self.structures > self._calls_left:
                     self._piece = self._made(script, unit, exact)

@@ -130,6 +130,19 @@ def test_a_call_of_what_is_not_here_stays_and_is_not_counted():
     assert found.whole
 
 
+def test_calls_by_name_of_what_is_not_here_stay_with_their_reasons_too():
+    """Siemens: an instruction that the table knows is no call, and neither is a cycle."""
+    lines, found = out(
+        "G71 G90\nR1=0\nAGAIN:\nG0 X=R1 Y5\nR1=R1+1\nIF R1<2 GOTOB AGAIN\n"
+        "SIDE(3,4)\nFNORM\nL7 P2\nCYCLE800()\nM30\n", "siemens"
+    )  # fmt: skip
+    assert lines[-5:] == ["SIDE(3,4)", "FNORM", "L7 P2", "CYCLE800()", "M30"]
+    assert lines.count("G0 X=R1 Y5") == 2
+    assert (found.structures, found.written) == (3, 1)
+    assert [finding.line for finding in found.findings] == [7, 9]
+    assert all("neither in this file nor in --sub" in each.message for each in found.findings)
+
+
 def test_a_program_that_only_calls_what_is_not_here_stays_as_it_is():
     program = f"O1\n{HEAD}M98 P7\nG0 X1.\nM30\nO2000\nG0 X2.\nM99\n".encode()
     result = process(program, VMC, unroll=True, dialect="haas", controller="haas")

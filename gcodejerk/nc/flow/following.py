@@ -395,10 +395,7 @@ class Follower:
         if self._leads_elsewhere(line):
             raise NotFollowedError
         runner.state = state
-        declared, dialect = runner.executor.declared, runner.dialect
-        unknown = [name.name for name in line.block.names if name.name not in declared]
-        self._lost |= any(name and dialect.names.get(name, "flow") == "flow" for name in unknown)
-        self._lost |= any(word.letter in dialect.calls for word in line.block.words)
+        self._lost |= self._calls_elsewhere(line)
         runner.entered = at in self._entered
         ended = runner.run(line, visit=True)
         runner.entered = False
@@ -415,6 +412,13 @@ class Follower:
             self._return(unit, at, ended, ways)
         else:
             self._end(ended)
+
+    def _calls_elsewhere(self, line: Line) -> bool:
+        """Whether a block runs a program that is not here, by its name or its number."""
+        declared, dialect = self.runner.executor.declared, self.runner.dialect
+        unknown = [name.name for name in line.block.names if name.name not in declared]
+        named = any(name and dialect.names.get(name, "flow") == "flow" for name in unknown)
+        return named or any(word.letter in dialect.calls for word in line.block.words)
 
     @staticmethod
     def _leads_elsewhere(line: Line) -> bool:
