@@ -262,7 +262,8 @@ def _quiet(task: Task, reference: Array) -> tuple[Profiles, Array]:
     """Profiles within the tolerance over the band, symmetric or optimal; else infinite."""
     profiles, worst = symmetric(task)
     worst = np.where(worst <= task.tolerance, worst, np.inf)
-    rows = np.nonzero(~np.isfinite(worst))[0]
+    # Where nothing vibrates, there is nothing to ask.
+    rows = np.nonzero(~np.isfinite(worst) & task.objective.weights.any(axis=1))[0]
     questions = [question_of(task, k, float(reference[k]), task.tolerance) for k in rows]
     return _answered(task, rows, answers(questions, task.progress), profiles, worst)
 

@@ -74,6 +74,16 @@ def test_where_nothing_vibrates_the_shortest_time_is_the_fastest():
     assert (plans.counts < np.ceil(plans.conventional_time / 0.001)).all()
 
 
+def test_where_nothing_vibrates_and_nothing_limits_the_jerk_a_short_way_has_a_shortest_time():
+    """The least time that the limits allow is too short for segments of an interval or more."""
+    limits = "limit: {acceleration: 11000}"
+    still = machine_of(["rapid: {velocity: 260, acceleration: 3700}", limits])
+    plans = plan_moves(moves({"Z": 0.04}, {"Z": 0.07}), still, "shortest")
+    assert plans.planned.all()
+    assert (plans.profiles.total <= plans.counts * 0.001 + 1e-12).all()
+    assert (plans.counts <= np.ceil(plans.conventional_time / 0.001)).all()
+
+
 def test_no_profile_of_the_same_time_leaves_less_than_the_bound():
     rng = np.random.default_rng(2)
     drawn = 10 ** rng.uniform(-1, 1.3, (12, 2))
