@@ -515,3 +515,25 @@ def test_an_axis_that_a_shaper_lets_stand_on_its_way_stands_there(
     made = process(program, machine(controller, options[controller], text))
     assert made.planned == 1
     assert made.verification.ok
+
+
+def test_a_move_may_last_the_ticks_that_its_intervals_begin_and_two_more():
+    """0.977 ms are a little more than a tick of 1/1024 s: 824 intervals begin the 825th tick."""
+    rapid = (
+        "{velocity: 300, acceleration: 5000, planner: trapezoidal, filter: {type: ei, "
+        "frequency: 25}}"
+    )
+    text = (
+        "interval: 0.000977\npositioning: linear\nspindle: mill\ndesign: {tolerance: 0.0001, max_extension: 0}\n"
+        f"axes:\n  Y:\n    resolution: 1.0e-4\n    rapid: {rapid}\n    modes:\n"
+        "    - {frequency: 157.5, damping: 0, participation: 2}\n"
+        "    - {frequency: 192.4, damping: 0.1, participation: 2}\n"
+        "    - {frequency: 9.491, damping: 0, participation: 0.3}\n"
+        f"  Z:\n    resolution: 0.01\n    rapid: {rapid}\n    limit: {{acceleration: 6000}}\n"
+        "    modes: [{frequency: 28.92, damping: 0.01, participation: 1}]\n"
+    )
+    options = "{counts_per_unit: {Y: 4096, Z: 1000}, axis_names: {Y: B, Z: C}}"
+    program = b"G21 G90 G94\nG0 Y-212. Z156.62\nG0 Y-.715 Z5.\nM2\n"
+    made = process(program, machine("galil", options, text))
+    assert made.planned == 1
+    assert made.verification.ok

@@ -56,7 +56,7 @@ WITHIN = 1e-8
 MOST_BLUR = 0.05
 """Share of a limit that rounding is an excuse for."""
 MORE_TICKS = 2.5
-"""Ticks that a move may last longer than whole intervals, since it lasts whole ticks."""
+"""Ticks that a move may last longer than whole intervals, or the ticks that those begin."""
 STATED = 2e-3
 """Share by which the residual that a file states may be off: its digits, and float64."""
 RELATIVE, SHORTEST = 0.02, 1.1
@@ -275,7 +275,7 @@ class _Judge:
         """No longer than the rapid may last; under independent positioning, no axis."""
         interval, tick = self.machine.interval, self.file.steps.tick
         _, most = conventional_counts(self.paths, self.machine)
-        late = self.pieces.total > most * interval + MORE_TICKS * tick
+        late = self.pieces.total > (np.ceil(most * interval / tick - WITHIN) + MORE_TICKS) * tick
         self._complain(Kind.TIME, late, "the motion lasts longer than the rapid may")
         if self.machine.positioning == "linear":
             return
