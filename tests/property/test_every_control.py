@@ -32,7 +32,7 @@ CALM = settings(
 FORMS = sorted((name, form.name) for name in controllers() for form in load_controller(name).forms)
 READ = ("linuxcnc", "grbl", "fanuc", "haas", "mach")
 """Dialects of programs for a controller that has none of its own."""
-PERIODS = {"galil": [1 / 1024], "fanuc15": [0.001, 0.002, 0.004, 0.008]}
+PERIODS = {"galil": [1 / 1024, 0.000977, 0.002], "fanuc15": [0.001, 0.002, 0.004, 0.008]}
 STARTUPS = {
     "klipper": ["G21 G90", "G90"],
     "marlin": ["G21 G90", "G90"],

@@ -524,7 +524,8 @@ def test_a_move_may_last_the_ticks_that_its_intervals_begin_and_two_more():
         "frequency: 25}}"
     )
     text = (
-        "interval: 0.000977\npositioning: linear\nspindle: mill\ndesign: {tolerance: 0.0001, max_extension: 0}\n"
+        "interval: 0.000977\npositioning: linear\nspindle: mill\n"
+        "design: {tolerance: 0.0001, max_extension: 0}\n"
         f"axes:\n  Y:\n    resolution: 1.0e-4\n    rapid: {rapid}\n    modes:\n"
         "    - {frequency: 157.5, damping: 0, participation: 2}\n"
         "    - {frequency: 192.4, damping: 0.1, participation: 2}\n"
@@ -537,3 +538,27 @@ def test_a_move_may_last_the_ticks_that_its_intervals_begin_and_two_more():
     made = process(program, machine("galil", options, text))
     assert made.planned == 1
     assert made.verification.ok
+
+
+@pytest.mark.parametrize("controller", ["acs", "pmac"])
+def test_an_axis_without_a_limit_of_jerk_ramps_within_ticks(controller):
+    """Its own rapid does, in 2.1 ms; an interval of 4 ms says nothing about that."""
+    law = "planner: averaged-trapezoid, second_average: 0.0021"
+    text = (
+        "interval: 0.004\npositioning: independent\nspindle: mill\naxes:\n"
+        f"  X:\n    rapid: {{velocity: 130, acceleration: 150, {law}}}\n"
+        "    limit: {acceleration: 180}\n"
+        f"  Y:\n    rapid: {{velocity: 140, acceleration: 650, {law}}}\n"
+        "    limit: {acceleration: 1300}\n    modes: [{frequency: 5.6, damping: 0.004}]\n"
+    )
+    options = {
+        "acs": "{axis_names: {X: '0', Y: '1'}}",
+        "pmac": "{isx90: 1000, axis_names: {X: X, Y: Y}, confirmed: [pmac-colon]}",
+    }
+    program = b"G21 G90 G94\nG0 X0 Y0\nG0 X3. Y33.\nM2\n"
+    limited = text.replace("limit: {acceleration: 180}", "limit: {acceleration: 180, jerk: 30000}")
+    made = process(program, machine(controller, options[controller], text))
+    assert made.planned == 1
+    assert made.verification.ok
+    found = verify(program, made.output, machine(controller, options[controller], limited))
+    assert any(violation.kind is Kind.JERK for violation in found.violations)
