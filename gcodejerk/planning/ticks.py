@@ -14,8 +14,8 @@ its strokes, with the stroke's share of the way for 1: or it would creep where i
 Phases of constant acceleration and of constant velocity stay that, symmetric profiles symmetric,
 steps of a trapezoid steps.
 
-Rule: what comes out is within the limits. Where no rounding is, the whole lasts a tick longer, and
-is rounded again.
+Rule: what comes out is within the limits, and goes forwards. Where no rounding does, the whole
+lasts a tick longer, and is rounded again.
 """
 
 from __future__ import annotations
@@ -232,7 +232,7 @@ class _Shape:
         )  # fmt: skip
 
     def solved(self, ticks: Ticks, tick: float) -> tuple[Profiles, NDArray[np.bool_]]:
-        """Scaled for these durations; and whether it accelerates first and then brakes."""
+        """Scaled for these durations; and whether it goes forwards all the way."""
         d: Array = np.asarray(ticks * tick, dtype=np.float64)
         a, b = self.begin, self.end
         good = np.ones(len(d), dtype=np.bool_)
@@ -245,7 +245,9 @@ class _Shape:
             a, b = (np.where(own, np.where(x > 0.0, up, down) * x, x) for x in (a, b))
         first = np.arange(len(d) + 1) * d.shape[1]
         jerk = (b - a) / d
-        return Profiles.of(first, d.ravel(), a.ravel(), jerk.ravel()), good
+        made = Profiles.of(first, d.ravel(), a.ravel(), jerk.ravel())
+        good &= made.least_velocity >= -SMALL * made.peak_velocity
+        return made, good
 
 
 def _shares(stroke: NDArray[np.int64], moved: Array) -> Array:

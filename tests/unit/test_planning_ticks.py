@@ -102,6 +102,26 @@ def test_what_stands_on_its_way_stands_there_in_ticks_too(seed, tick):
     assert stands == pytest.approx(np.cumsum(share)[:-1], abs=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("tick", [20e-6, 1 / 1024, 1e-3])
+def test_what_creeps_on_its_way_is_told_nothing_that_goes_backwards(seed, tick):
+    """A profile that all but stands, as a solver has it: no stroke of its own."""
+    rng = np.random.default_rng(seed)
+    t, rest, creeps = rng.uniform(0.004, 0.02, 2), rng.uniform(0.01, 0.03), 1e-5
+    up, down = np.array([1.0, 0.7]), np.array([1.0 - creeps, 0.7 + creeps * t[0] / t[1]])
+    none = np.zeros(2)
+    d = np.stack([t, t, t, t, [rest, 0.0]], axis=1).ravel()[:-1]
+    a = np.stack([none, up, none, -down, none], axis=1).ravel()[:-1]
+    j = (np.append(a[1:], 0.0) - a) / d
+    way = Profiles.of(np.array([0, 9]), d, a, j)
+    end = way.position[-1] + (way.velocity[-1] + (a[-1] / 2 + j[-1] * d[-1] / 6) * d[-1]) * d[-1]
+    profiles = Profiles.of(np.array([0, 9]), d, a / end, j / end)
+    limits = profiles.peak_velocity, profiles.peak_acceleration, profiles.peak_jerk
+    made, found = told(profiles, tuple(1.5 * limit for limit in limits), tick, 2, 10**4)
+    assert found.all()
+    assert made.least_velocity[0] >= -1e-9 * made.peak_velocity[0]
+
+
 def test_a_trapezoid_keeps_its_steps():
     first, d = np.array([0, 3]), np.array([0.1, 0.25, 0.1]) + 1e-4 / 3
     a = np.array([1.0, 0.0, -1.0]) / (d[0] * (d[0] + d[1]))
