@@ -1,10 +1,15 @@
 """What the proof takes for vibration, and what its points cannot show."""
 
+import numpy as np
 import pytest
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import Kind, verify
+from gcodejerk.verification.physics.own_rapids import rapid_limits
+from gcodejerk.verification.physics.points import Paths
+from gcodejerk.verification.physics.residual import leaves_more
 
 MACHINE = """
 interval: 0.0005
@@ -54,3 +59,29 @@ def test_each_stream_is_judged_by_its_own_points_whatever_stands_beside_it(short
     first = 4 + short.count("\n")
     lines = [v.original_line for v in found.violations if v.kind == Kind.RESIDUAL]
     assert [line for line in lines if line >= first] == [first, first + 1]
+
+
+@pytest.mark.parametrize("behind", [0, 1, 2, 3])
+def test_points_behind_the_arrival_hide_no_vibration(behind):
+    """Where blocks without a way end a stream, several points have the moment of its arrival."""
+    machine = Machine.loads(
+        "interval: 0.002\npositioning: linear\ndesign: {profile: shortest, tolerance: 0.0001}\n"
+        "axes:\n  Z:\n    rapid: {velocity: 50, acceleration: 500, jerk: 1.0e+4}\n"
+        "    modes: [{frequency: 31, damping: 0.01}]\n"
+    )
+    z = AXES.index("Z")
+    moment = np.append(np.arange(41), np.full(behind, 40))
+    position, none = np.zeros((len(moment), len(AXES))), np.zeros((1, len(AXES)))
+    position[:, z] = np.minimum(moment / 40.0, 1.0)  # at full speed at once
+    displacement = none.copy()
+    displacement[0, z] = 1.0
+    one = np.ones(1, dtype=np.int64)
+    paths = Paths(
+        rapid=0 * one, original_line=one, line=one + np.arange(len(moment)), begin=0 * one,
+        end=one * len(moment), position=position, feed=np.full(len(moment), np.nan), start=none,
+        displacement=displacement, unit=np.ones(1), speed=np.full(1, np.inf),
+        step=np.full((1, len(AXES)), 1e-4), lone=one > 0, lead=0 * one,
+    )  # fmt: skip
+    found = leaves_more(paths, machine, moment, rapid_limits(paths, machine))
+    assert found.stream.tolist() == [0]
+    assert found.left > found.allowed

@@ -213,7 +213,9 @@ class _Streams:
         place = np.arange(len(position)) - self.paths.begin[self.owner]
         odd = (place % 2 == 1) & (np.arange(len(position)) != (self.paths.end - 1)[self.owner])
         k = np.flatnonzero(odd)
-        share = (self.t[k] - self.t[k - 1]) / (self.t[k + 1] - self.t[k - 1])
+        # Points behind the arrival have its moment: they are where it is.
+        both = self.t[k + 1] - self.t[k - 1]
+        share = (self.t[k] - self.t[k - 1]) / np.where(both > 0.0, both, 1.0)
         middle = position[k - 1] + share[:, np.newaxis] * (position[k + 1] - position[k - 1])
         fine = self.lines(modes, position)
         position[k] = middle
