@@ -7,6 +7,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.verification import Kind, verify
+from gcodejerk.verification.physics import residual
 from gcodejerk.verification.physics.own_rapids import rapid_limits
 from gcodejerk.verification.physics.points import Paths
 from gcodejerk.verification.physics.residual import leaves_more
@@ -61,18 +62,18 @@ def test_each_stream_is_judged_by_its_own_points_whatever_stands_beside_it(short
     assert [line for line in lines if line >= first] == [first, first + 1]
 
 
-@pytest.mark.parametrize("behind", [0, 1, 2, 3])
-def test_points_behind_the_arrival_hide_no_vibration(behind):
-    """Where blocks without a way end a stream, several points have the moment of its arrival."""
+def shaken(behind, profile="shortest"):
+    """A machine, a stream at full speed at once with points behind its arrival; their moments."""
     machine = Machine.loads(
-        "interval: 0.002\npositioning: linear\ndesign: {profile: shortest, tolerance: 0.0001}\n"
+        "interval: 0.002\npositioning: linear\ndesign: {tolerance: 0.0001, "
+        f"profile: {profile}}}\n"
         "axes:\n  Z:\n    rapid: {velocity: 50, acceleration: 500, jerk: 1.0e+4}\n"
         "    modes: [{frequency: 31, damping: 0.01}]\n"
     )
     z = AXES.index("Z")
     moment = np.append(np.arange(41), np.full(behind, 40))
     position, none = np.zeros((len(moment), len(AXES))), np.zeros((1, len(AXES)))
-    position[:, z] = np.minimum(moment / 40.0, 1.0)  # at full speed at once
+    position[:, z] = np.minimum(moment / 40.0, 1.0)
     displacement = none.copy()
     displacement[0, z] = 1.0
     one = np.ones(1, dtype=np.int64)
@@ -82,6 +83,24 @@ def test_points_behind_the_arrival_hide_no_vibration(behind):
         displacement=displacement, unit=np.ones(1), speed=np.full(1, np.inf),
         step=np.full((1, len(AXES)), 1e-4), lone=one > 0, lead=0 * one,
     )  # fmt: skip
+    return paths, machine, moment
+
+
+@pytest.mark.parametrize("behind", [0, 1, 2, 3])
+def test_points_behind_the_arrival_hide_no_vibration(behind):
+    """Where blocks without a way end a stream, several points have the moment of its arrival."""
+    paths, machine, moment = shaken(behind)
     found = leaves_more(paths, machine, moment, rapid_limits(paths, machine))
     assert found.stream.tolist() == [0]
     assert found.left > found.allowed
+
+
+@pytest.mark.parametrize("profile", ["shortest", "condition3"])
+def test_what_is_not_a_number_is_no_excuse(monkeypatch, profile):
+    def unknown(displacement, machine, limits):
+        return lambda modes: np.full((len(displacement), len(modes.poles)), np.nan + 0j)
+
+    monkeypatch.setattr(residual, "left_by_rapids", unknown)
+    paths, machine, moment = shaken(1, profile)
+    found = leaves_more(paths, machine, moment, rapid_limits(paths, machine))
+    assert found.stream.tolist() == [0]

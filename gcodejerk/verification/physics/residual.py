@@ -87,7 +87,7 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
     allowed = (1.0 + RELATIVE) * rapid + streams.noise(modes)
     if machine.design.profile == "shortest":
         allowed = np.maximum(allowed, machine.design.tolerance + streams.noise(modes))
-    suspects = np.flatnonzero(left > allowed)
+    suspects = np.flatnonzero(~(left <= allowed))
     if not len(suspects):
         return none
     band = band_of(machine, modes, float(streams.t.max(initial=0.0)))
@@ -104,7 +104,7 @@ def leaves_more(paths: Paths, machine: Machine, moment: Index, limits: Array) ->
             return none
         near = streams.largest(modes, np.abs(streams.own(modes.at(float(factor)))))
         allowed = np.maximum(allowed, (1.0 + RELATIVE) * near)
-    bad = np.flatnonzero(left > allowed)
+    bad = np.flatnonzero(~(left <= allowed))
     return Excess(suspects[bad].astype(np.int64), left[bad], allowed[bad])
 
 

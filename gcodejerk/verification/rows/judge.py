@@ -378,7 +378,8 @@ class _Judge:
             # Lines of a spectrum are other oscillators there than here.
             if move.residual is None or not modes.banded.all():
                 continue
-            if abs(nominal[k] - move.residual) > STATED * max(move.residual, nominal[k]) + 1e-9:
+            most = STATED * max(move.residual, nominal[k]) + 1e-9
+            if not abs(nominal[k] - move.residual) <= most:
                 problem = (
                     f"leaves {1e3 * nominal[k]:.6g} um of vibration, the file says "
                     f"{1e3 * move.residual:.6g} um"
@@ -393,11 +394,11 @@ class _Judge:
             left = np.maximum(left, around.largest(self.pieces.response(around)))
         # Nearly every move leaves less by far: only the others are looked at closely.
         allowed = self._allowed(np.arange(len(left)), modes, band[:FIRST])
-        suspects = np.flatnonzero(left > allowed + TINY)
+        suspects = np.flatnonzero(~(left <= allowed + TINY))
         if len(suspects):
             whole = self._allowed(suspects, modes, band[FIRST:])
             allowed[suspects] = np.maximum(allowed[suspects], whole)
-        for k in np.flatnonzero(left > allowed + TINY).tolist():
+        for k in np.flatnonzero(~(left <= allowed + TINY)).tolist():
             problem = (
                 f"leaves {1e3 * left[k]:.3g} um of vibration, at most {1e3 * allowed[k]:.3g} um "
                 "are left by the controller's own rapid"
