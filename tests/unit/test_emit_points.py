@@ -562,3 +562,18 @@ def test_an_axis_without_a_limit_of_jerk_ramps_within_ticks(controller):
     assert made.verification.ok
     found = verify(program, made.output, machine(controller, options[controller], limited))
     assert any(violation.kind is Kind.JERK for violation in found.violations)
+
+
+def test_a_rapid_lasts_as_long_as_its_own_way_does_and_not_as_that_in_counts():
+    """40.0001 mm take 125.0003 intervals, the 40 mm that are told in counts 125."""
+    text = (
+        "interval: 0.004\npositioning: linear\nspindle: mill\ndesign: {max_extension: 0}\naxes:\n"
+        "  Y:\n    resolution: 1.0e-5\n    rapid: {velocity: 100, acceleration: 1000}\n"
+        "    limit: {velocity: 200, acceleration: 4000}\n"
+        "    modes: [{frequency: 9, damping: 0.01}]\n"
+    )
+    program = b"G21 G90 G94\nG0 Y0.\nG0 Y40.0001\nM2\n"
+    made = process(program, machine("csp", "{counts_per_unit: {Y: 4096}}", text))
+    assert made.planned == 1
+    assert made.plans.counts[1] == 126
+    assert made.verification.ok

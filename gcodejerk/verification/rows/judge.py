@@ -205,7 +205,9 @@ def _judge_points(
     check_rapids(ends, rapids, machine, found)
     check_line(paths, machine, found)
     if (paths.displacement != 0.0).any(axis=1).all():
-        check_dynamics(paths, machine, 1, found)
+        # The control's own rapid lasts as long as the program's way does, not as that in steps.
+        way = np.where(paths.displacement != 0.0, ends.displacement, 0.0)
+        check_dynamics(replace(paths, displacement=way), machine, 1, found)
 
 
 def _still_at_first(moves: list[Move], ends: Paths, machine: Machine, missing: Index) -> Index:
