@@ -138,6 +138,7 @@ REPEATS = {
     },
     "property/test_every_control.py": {
         "test_nothing_is_written_that_its_proof_refuses": 4,
+        "test_what_is_drawn_is_rewritten": 4,
     },
     "property/test_families.py": {
         "test_a_stepped_simulation_leaves_as_much": 3,
