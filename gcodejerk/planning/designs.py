@@ -43,7 +43,7 @@ MOST_REMEMBERED = 50_000
 NEXT_TO_NOTHING, SETTLED = 0.01, 0.1
 """A residual does not matter below this share of what today's rapid leaves, or below this one of
 the tolerance, whichever is more; but what can be settled on arrival, is."""
-AT_ONCE = 128
+AT_ONCE = 512
 """Moves that are searched together, by whoever has time."""
 COARSE = 24
 """Moves of so few intervals may gain from segments that end between them."""

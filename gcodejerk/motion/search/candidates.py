@@ -10,6 +10,7 @@ Rule: only magnitudes are computed, squared, and no complex number is built.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -46,20 +47,20 @@ def symmetric_worst(
 
     Parameters
     ----------
-    T1, Ta, T2 : ndarray, shape (n, k)
-        Of the ramps of k profiles for each of n moves; T1 and T2 above zero. [s]
+    T1, Ta, T2 : ndarray, shape (..., n)
+        Of the ramps of profiles for each of n moves; T1 and T2 above zero. [s]
     total : ndarray, shape (n,)
         T_SUM. [s]
     objective : Objective
         Of the n moves.
-    bound : ndarray, shape (n, k), optional
+    bound : ndarray, shape (..., n), optional
         What leaves more is infinite: it is given up as soon as some of the modes show that. What
         leaves less is as without a bound, to the last bit; below zero everything is infinite. Where
         poles share a group, nothing is given up. [mm]
 
     Returns
     -------
-    ndarray of float32, shape (n, k)
+    ndarray of float32, shape (..., n)
         [mm]
 
     Notes
@@ -69,40 +70,41 @@ def symmetric_worst(
     from the middle, where :math:`p = e^{-\sigma t}` and :math:`q = e^{-\sigma (T - t)}` are what is
     left of the two at the end.
     """
-    n, k = T1.shape
+    found = _Worst(objective, T1.shape, bound)
+    whole = np.broadcast_to(total, T1.shape).ravel()
     T1, Ta, T2 = (x.ravel() for x in (T1, Ta, T2))
-    whole = np.repeat(total, k)
     ramp, area = T1 + Ta + T2, Ta + 0.5 * (T1 + T2)
     moment = T1 * T1 / 3.0 + Ta * (T1 + 0.5 * Ta) + 0.5 * T2 * (T1 + Ta + T2 / 3.0)
     acceleration = 1.0 / (area * whole - 2.0 * moment)
     up, down = (acceleration / T1).astype(np.float32), (acceleration / T2).astype(np.float32)
-    pairs = [
-        (t.astype(np.float32), (whole - t).astype(np.float32), jerk)
-        for t, jerk in ((T1, -up), (T1 + Ta, -down), (ramp, down))
-    ]
-    middle = (0.5 * total).astype(np.float32)
-    found = _Worst(objective, n, k, bound)
+    moments = np.stack([T1, T1 + Ta, ramp])
+    t, rest = moments.astype(np.float32), (whole - moments).astype(np.float32)
+    jerk = np.stack([-up, -down, down])
+    begin, end = np.zeros(len(total), dtype=np.float32), total.astype(np.float32)
     for block, sigma, omega, scale in found.blocks():
         if (kept := found.kept()) is not None:
-            up = up[kept]
-            pairs = [(t[kept], rest[kept], jerk[kept]) for t, rest, jerk in pairs]
+            up, t, rest, jerk = up[kept], t[:, kept], rest[:, kept], jerk[:, kept]
             if not len(up):
                 break
         # The first pair, at the beginning and the end, depends on the move alone.
-        phase, late = middle * omega, np.exp(-sigma * (2.0 * middle))
-        real = found.spread((late - 1.0) * np.cos(phase)) * up
-        imaginary = found.spread((late + 1.0) * np.sin(phase)) * up
-        for t, rest, jerk in pairs:
-            even, odd = from_middle(t, rest, sigma, omega)
-            if even is not None:
-                real += even * jerk
-            imaginary += odd * jerk
-        found.add(block, real * real + imaginary * imaginary, scale**2 * omega)
+        first = from_middle(begin, end, sigma, omega)
+        deep = None if sigma is None else sigma[:, np.newaxis]
+        others = from_middle(t, rest, deep, omega[:, np.newaxis])
+        square = np.zeros(1, dtype=np.float32)
+        for own, three in zip(first, others, strict=True):
+            if own is not None and three is not None:
+                three *= jerk
+                part = found.times(own, up)
+                for pair in range(3):
+                    part += three[:, pair]
+                part *= part
+                square = square + part
+        found.add(block, square, scale**2 * omega)
     return found.displacement()
 
 
 def from_middle(
-    t: Single, rest: Single, sigma: Single, omega: Single
+    t: Single, rest: Single, sigma: Single | None, omega: Single
 ) -> tuple[Single | None, Single]:
     """What a pair of unit steps of the jerk at t and at T - t does, seen from the middle of T.
 
@@ -110,8 +112,10 @@ def from_middle(
     ----------
     t, rest : ndarray of float32
         The moment, and T less it. [s]
-    sigma, omega : ndarray of float32
-        Of the poles; shapes that broadcast with that of t. [1/s]
+    sigma : ndarray of float32 or None
+        Of the poles, in a shape that broadcasts with that of t; None without damping. [1/s]
+    omega : ndarray of float32
+        Of the poles, as `sigma`. [1/s]
 
     Returns
     -------
@@ -119,10 +123,16 @@ def from_middle(
         Real part (None: without damping it is zero) and imaginary part, as in `symmetric_worst`.
     """
     phase = (rest - t) * (np.float32(0.5) * omega)
-    if not sigma.any():
-        return None, np.float32(2.0) * np.sin(phase)
+    if sigma is None:
+        odd = np.sin(phase, out=phase)
+        odd *= np.float32(2.0)
+        return None, odd
     early, late = np.exp(t * -sigma), np.exp(rest * -sigma)
-    return (late - early) * np.cos(phase), (late + early) * np.sin(phase)
+    even = late - early
+    even *= np.cos(phase)
+    late += early
+    late *= np.sin(phase, out=phase)
+    return even, late
 
 
 def step_weights(objective: Objective) -> Single:
@@ -136,14 +146,14 @@ def cascade_worst(widths: tuple[Array, ...], objective: Objective) -> Single:
 
     Parameters
     ----------
-    widths : tuple of ndarray, shape (n, k)
+    widths : tuple of ndarray, shape (..., n)
         Of the boxes, above zero. [s]
     objective : Objective
         Of n moves.
 
     Returns
     -------
-    ndarray of float32, shape (n, k)
+    ndarray of float32, shape (..., n)
         [mm]
 
     Notes
@@ -153,13 +163,13 @@ def cascade_worst(widths: tuple[Array, ...], objective: Objective) -> Single:
     difference of nearly equal numbers where a box is as wide as a period.
     """
     single = [w.ravel().astype(np.float32) for w in widths]
-    found = _Worst(objective, *widths[0].shape)
+    found = _Worst(objective, widths[0].shape)
     for block, sigma, omega, scale in found.blocks():
         square = np.ones(1, dtype=np.float32)
         for w in single:
             sine = np.sin(w * (np.float32(0.5) * omega))
             sine *= sine
-            if sigma.any():
+            if sigma is not None:
                 rest = np.exp(w * -sigma)
                 sine *= np.float32(4.0) * rest
                 sine += (np.float32(1.0) - rest) ** 2
@@ -173,16 +183,19 @@ def cascade_worst(widths: tuple[Array, ...], objective: Objective) -> Single:
 class _Worst:
     """The largest of the groups of poles, of which a block at a time is evaluated.
 
-    With a bound, candidates beyond it are given up on the way, or at the end.
+    With a bound, candidates beyond it are given up on the way, or at the end. The moves of
+    candidates change fastest.
 
     Rule: what comes of a candidate depends on none that is evaluated beside it.
     """
 
-    def __init__(self, objective: Objective, n: int, k: int, bound: Array | None = None) -> None:
+    def __init__(
+        self, objective: Objective, shape: tuple[int, ...], bound: Array | None = None
+    ) -> None:
         self.poles, self.weights = objective.poles, objective.weights
-        self.shape, self.each = (n, k), k
+        self.shape, self.moves = shape, shape[-1]
         self.starts = np.diff(objective.group, prepend=-1) != 0
-        self.worst = np.zeros(n * k, dtype=np.float32)
+        self.worst = np.zeros(math.prod(shape), dtype=np.float32)
         self.carried: Single = self.worst
         self.index: NDArray[np.intp] | None = None
         """Those that are left, where some were given up."""
@@ -203,14 +216,20 @@ class _Worst:
         self.carried = self.worst
         return kept
 
-    def spread(self, of_moves: Single) -> Single:
-        """Numbers of moves, shape (p, n), as those of their candidates."""
-        if self.index is None:
-            return np.repeat(of_moves, self.each, axis=1)
-        return of_moves[:, self.index // self.each]
+    def times(self, of_moves: Single, of_candidates: Single) -> Single:
+        """Numbers of moves, shape (p, n), times those of their candidates, of one pole or of p."""
+        if self.index is not None:
+            return of_moves[:, self.index % self.moves] * of_candidates
+        # Moves side by side: what belongs to one is not written once for each of its candidates.
+        apart = of_candidates.reshape(*of_candidates.shape[:-1], -1, self.moves)
+        return (of_moves[:, np.newaxis] * apart).reshape(len(of_moves), -1)
 
-    def blocks(self) -> Iterator[tuple[slice, Single, Single, Single]]:
-        """Poles in blocks, with -Re, Im and modulus of each, shape (p, 1) [1/s]."""
+    def blocks(self) -> Iterator[tuple[slice, Single | None, Single, Single]]:
+        """Poles in blocks, with -Re, Im and modulus of each, shape (p, 1) [1/s].
+
+        Instead of -Re, None where no pole has damping.
+        """
+        damped = bool(self.poles.real.any())
         begin = 0
         while begin < len(self.poles):
             size = max(1, BLOCK // max(self.worst.size, 1))
@@ -222,15 +241,15 @@ class _Worst:
             sigma, omega, scale = (
                 x.astype(np.float32) for x in (-poles.real, poles.imag, np.abs(poles))
             )
-            yield block, sigma, omega, scale
+            yield block, sigma if damped else None, omega, scale
 
     def add(self, block: slice, square: Single, scale: Single) -> None:
-        """Take the squared responses of a block, shape (p, n k).
+        """Take the squared responses of a block, shape (p, m).
 
         Divided by the square of `scale`, shape (p, 1), they are squares of displacements.
         """
         weight = self.weights[:, block].T.astype(np.float32) / scale
-        square = square * self.spread(weight * weight)
+        square = self.times(weight * weight, square)
         for begins, own in zip(self.starts[block].tolist(), square, strict=True):
             if not begins:
                 own += self.carried
@@ -245,6 +264,6 @@ class _Worst:
             left[self.worst > self.bound] = np.inf
         if self.index is None:
             return left.reshape(self.shape)
-        out = np.full(self.shape[0] * self.shape[1], np.inf, dtype=np.float32)
+        out = np.full(math.prod(self.shape), np.inf, dtype=np.float32)
         out[self.index] = left
         return out.reshape(self.shape)

@@ -150,6 +150,6 @@ class _Search:
             legal &= (V <= self.V) & (1.0 / (w1 * w2) <= self.A) & (J <= self.J)
             # What is not legal is evaluated as something harmless.
             worst = cascade_worst(
-                tuple(np.where(legal, width, 1.0) for width in (w1, w2, w3)), self.objective
-            )
+                tuple(np.where(legal, width, 1.0).T for width in (w1, w2, w3)), self.objective
+            ).T
         return np.where(legal, worst, np.inf)

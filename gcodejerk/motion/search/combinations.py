@@ -1,20 +1,19 @@
 r"""Every combination of switching times on a grid: where a search for ramps begins.
 
 This module owns the first look at a move's symmetric profiles, thousands of them. The ramp of a
-profile ends its parts at three times. What T1 does to a mode is computed once for every T1 of the
-grid and every frequency, and so is what a pair of the other two does; a combination leaves their
-difference. What all frequencies together keep is then a product of two matrices: two operations a
-combination and frequency, where a profile by itself costs fifty.
+profile ends its parts at three times. What the ends of a ramp leave of a mode is computed once for
+every time of the grid and every frequency. All that combinations need of it are products of what
+two of the times leave, summed over the frequencies: a square of a sum is made of them, in a few
+operations a combination, however many frequencies there are.
 
 Rule 1: combinations are compared by the sum of all squares. It is near enough to the largest to
 find the valleys; which of these is deepest, the search looks at.
-Rule 2: no row knows another, and none is multiplied together with another.
+Rule 2: no move knows another. Moves stand side by side in memory, so that all are computed alike.
 """
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,32 +30,13 @@ NONE = 1e-12
 """What is shorter, times T_SUM, is not there at all."""
 TINY = np.float32(1e-30)
 """Less than any square that counts: the rest divided by it is no number beside a length of zero."""
-PRODUCT = 250_000
-"""Multiplications of a product of matrices at most: larger ones are shared out to threads, which
-costs more than it gains."""
-ROWS = 32
-"""Moves at a time."""
-SHRUNK = 0.4
-"""Values of T1 are taken together as long as the last has this share of the pairs of the first."""
-
-
-@cache
-def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], list[tuple[int, int, int]]]:
-    """Ends of constant and of falling acceleration; and which values of T1 are taken together.
-
-    Of these: the first, behind the last, and the first pair that does not end before the first.
-    """
-    second, third = np.triu_indices(count, 1)
-    begin = np.searchsorted(second, np.arange(count))
-    left = len(second) - begin
-    together, first = [], 0
-    while first < count - 1:
-        behind = first + 1
-        while behind < count - 1 and left[behind] >= SHRUNK * left[first]:
-            behind += 1
-        together.append((first, behind, int(begin[first])))
-        first = behind
-    return second, third, together
+MOVES = 128
+"""Moves at a time: of what ends at one time, some arrays stay in the processor's cache."""
+NUMBERED = 1 << 10
+"""Pairs of ends have numbers below this. They take the place of the last digits of what a pair
+leaves, of which 13 binary ones remain: so the least of them tells which it was."""
+LARGEST = int(np.iinfo(np.int32).max)
+"""No sign: what is not a number is larger than any."""
 
 
 def best_combinations(
@@ -67,8 +47,9 @@ def best_combinations(
 
     Parameters
     ----------
-    times : ndarray, shape (n, k)
-        For each of n moves, ascending; none is below the interval or above T_SUM/2. [s]
+    times : ndarray, shape (k, n)
+        For each of n moves, ascending; none is below the interval or above T_SUM/2. Of k times,
+        the pairs are fewer than `NUMBERED`. [s]
     total : ndarray, shape (n,)
         T_SUM. [s]
     limits : tuple of ndarray, shape (n,)
@@ -80,7 +61,7 @@ def best_combinations(
 
     Returns
     -------
-    T1, Ta, T2 : ndarray, shape (n, k - 1)
+    T1, Ta, T2 : ndarray, shape (k - 1, n)
         T1 is one of the times, all but the last. Where no combination keeps the limits, one that
         does not; to single precision all of them are kept. [s]
 
@@ -90,132 +71,130 @@ def best_combinations(
     t_1)/2` and its moment :math:`(t_2^2 + t_2 t_3 + t_3^2 - t_1^2)/6`: so all that limits ask for
     is a number of the pair of ends beside a number of T1.
     """
-    n, k = times.shape
-    second, third, _ = _pairs(k)
-    chosen = np.empty((n, k - 1), dtype=np.intp)
-    for begin in range(0, n, ROWS):
-        part = slice(begin, begin + ROWS)
-        own = _Combinations(
-            times[part], total[part], tuple(limit[part] for limit in limits),
-            objective.take(part), interval,
-        )  # fmt: skip
-        chosen[part] = own.best()
-    row = np.arange(n)[:, np.newaxis]
-    T1, t2 = times[:, :-1], times[row, second[chosen]]
-    return T1, np.maximum(t2 - T1, 0.0), times[row, third[chosen]] - t2
+    k, n = times.shape
+    chosen = np.empty((k - 1, n), dtype=np.int32)
+    for begin in range(0, n, MOVES):
+        part = slice(begin, begin + MOVES)
+        own = times[:, part], total[part], [limit[part] for limit in limits]
+        ends = _Ends.of(own[0], own[1], objective.take(part))
+        chosen[:, part] = _best(*own, ends, interval)
+    second, third = np.triu_indices(k, 1)
+    T1, t2 = times[:-1], np.take_along_axis(times, second[chosen], axis=0)
+    return T1, np.maximum(t2 - T1, 0.0), np.take_along_axis(times, third[chosen], axis=0) - t2
 
 
-class _Combinations:
-    """Some moves, shape (n, pairs) or (n, T1); times and what follows from them are over T_SUM."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ends:
+    r"""What the ends of parts leave, all modes together, for a peak acceleration of 1.
 
-    def __init__(
-        self, times: Array, total: Array, limits: tuple[Array, ...], objective: Objective,
-        interval: float,
-    ) -> None:  # fmt: skip
-        self.count = times.shape[1]
-        second, third, _ = _pairs(self.count)
-        T = total[:, np.newaxis]
-        V, A, J = (limit[:, np.newaxis] * T**k for k, limit in enumerate(limits, 1))
-        x, least = times / T, interval * (1.0 - ROUNDING) / T
-        begin, end = np.take(x, second, axis=1), np.take(x, third, axis=1)
-        cruise = 1.0 - 2.0 * end
-        impossible = (least > end - begin) | ((cruise >= NONE) & (cruise < least))
-        t1 = x[:, :-1].astype(np.float32)
-        t2, t3, T2 = (numbers.astype(np.float32) for numbers in (begin, end, end - begin))
-        v, a, j, later = (numbers.astype(np.float32) for numbers in (V, A, J, least))
-        sums = (t2 + t3) * HALF
-        # One over the acceleration is the difference of the two.
-        self.length = sums - (t2 * t2 + t3 * (t2 + t3)) * THIRD, (HALF - t1 * THIRD) * t1
-        # A part of no length is impossible, whatever comes of it where nothing limits the jerk.
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            shortest = FEWER / np.minimum(a, j * T2)
-            self.shortest = shortest, FEWER / (j * t1)
-        shortest[impossible] = np.inf
-        # Area and velocity, which must be no more than V.
-        v *= MORE
-        self.faster = v * self.length[0] - sums, v * self.length[1] - t1 * HALF
-        self.later = t2, t1 + later
-        self.still = np.logical_not(objective.weights.any(axis=1, keepdims=True))[:, 0]
-        self.jerk = t1, T2
-        self._ends(times, total, objective)
+    With :math:`u_i` what a unit step of the jerk at time i leaves, one number or two for each
+    frequency, a part between i and j leaves :math:`(u_i - u_j)/(t_j - t_i)`.
 
-    def _ends(self, times: Array, total: Array, objective: Objective) -> None:
-        """What each end of a part leaves of every mode, for a peak acceleration of 1."""
-        second, third, _ = _pairs(self.count)
-        poles = objective.poles
-        sigma, omega = (x.astype(np.float32) for x in (-poles.real, poles.imag))
-        every = np.insert(times, 0, 0.0, axis=1)[..., np.newaxis]
+    Attributes
+    ----------
+    first : ndarray, shape (k - 1, n)
+        Square of what the part leaves that begins with the move and ends at a time: T1.
+    last : ndarray, shape (k, k, n)
+        Square of what the part between two times leaves: T2.
+    both : ndarray, shape (k - 1, k, n)
+        The first part by what a step at a time leaves, twice.
+    fall : ndarray, shape (k, k, n)
+        One over the time between two times; 0 for the same, which are no pair. [1/s]
+    still : ndarray of bool, shape (n,)
+        Moves that excite nothing.
+    """
+
+    first: Single
+    last: Single
+    both: Single
+    fall: Single
+    still: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, times: Array, total: Array, objective: Objective) -> _Ends:
+        """Of the times of moves, shape (k, n)."""
+        sigma, omega = (x.astype(np.float32) for x in (-objective.poles.real, objective.poles.imag))
+        x = np.ascontiguousarray(times.T)
+        every = np.insert(x, 0, 0.0, axis=1)[..., np.newaxis]
         rest = (total[:, np.newaxis, np.newaxis] - every).astype(np.float32)
         # Whatever a move weighs: squares stay far from the least that single precision knows.
         weight = step_weights(objective).T[:, np.newaxis].copy()
         most = weight.max(axis=2, keepdims=True, initial=0.0)
         weight /= np.where(most > 0.0, most, np.float32(1.0))
-        both = from_middle(every.astype(np.float32), rest, sigma, omega)
-        at = np.concatenate([part * weight for part in both if part is not None], axis=2)
-        n, width = len(times), at.shape[2]
-        first = np.empty((n, self.count - 1, width + 2), dtype=np.float32)
-        pair = np.empty((n, len(second), width + 2), dtype=np.float32)
-        with np.errstate(divide="ignore"):
-            rise = (1.0 / times[:, :-1]).astype(np.float32)
-            fall = (1.0 / (times[:, third] - times[:, second])).astype(np.float32)
-        # Two ends at the same time are no pair: what they leave does not count.
-        fall = np.where(np.isfinite(fall), fall, np.float32(0.0))
-        rising, falling = first[..., :width], pair[..., :width]
-        np.subtract(at[:, :1], at[:, 1:-1], out=rising)
-        rising *= rise[..., np.newaxis]
-        begin = 0
-        for end in range(1, self.count):
-            behind = begin + self.count - end
-            np.subtract(at[:, end, np.newaxis], at[:, end + 1 :], out=falling[:, begin:behind])
-            begin = behind
-        falling *= fall[..., np.newaxis]
-        # The square of a difference, summed over all: -2 first pair + first^2 + pair^2.
-        first[..., width], pair[..., width] = (rising * rising).sum(axis=2), 1.0
-        first[..., width + 1], pair[..., width + 1] = 1.0, (falling * falling).sum(axis=2)
-        rising *= np.float32(-2.0)
-        self.first, self.pair = first, pair.swapaxes(1, 2)
-
-    def best(self) -> NDArray[np.intp]:
-        """The best pair for each T1, shape (n, T1)."""
-        n, k = len(self.still), self.count
-        chosen = np.empty((n, k - 1), dtype=np.intp)
-        for first, behind, start in _pairs(k)[2]:
-            own = slice(first, behind)
-            length = _beside(np.subtract, self.length, own, start)
-            keeps = length >= _beside(np.maximum, self.shortest, own, start)
-            keeps &= _beside(np.greater_equal, self.faster, own, start)
-            later = _beside(np.greater_equal, self.later, own, start)
-            for row, t1 in enumerate(range(first, behind)):
-                # Pairs that begin where T1 ends have no constant acceleration.
-                before = (t1 - first) * (2 * k - 1 - t1 - first) // 2
-                later[:, row, before : before + k - 1 - t1] = True
-                later[:, row, :before] = False
-            keeps &= later
-            left = self._sum(own, start)
-            length *= keeps
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                if self.still.any():
-                    # Where nothing vibrates the lowest jerk is the best.
-                    shorter = _beside(np.minimum, self.jerk[::-1], own, start)
-                    left[self.still] = (np.maximum(length, TINY) / shorter)[self.still]
-                length *= length
-                left /= length
-            chosen[:, own] = start + left.argmin(axis=2)
-        return chosen
-
-    def _sum(self, own: slice, start: int) -> Single:
-        """The sum of all squares, and next to nothing, shape (n, T1, pairs)."""
-        first, pair = self.first[:, own], self.pair[:, :, start:]
-        together = np.empty((len(first), first.shape[1], pair.shape[2]), dtype=np.float32)
-        width = max(1, PRODUCT // (first.shape[1] * first.shape[2]))
-        for begin in range(0, pair.shape[2], width):
-            part = slice(begin, begin + width)
-            np.matmul(first, pair[:, :, part], out=together[:, :, part])
-        np.maximum(together, TINY, out=together)
-        return together
+        damped = sigma if sigma.any() else None
+        parts = from_middle(every.astype(np.float32), rest, damped, omega)
+        step = np.concatenate([part * weight for part in parts if part is not None], axis=2)
+        # In double precision: what follows are differences of nearly equal products.
+        step = step.astype(np.float64)
+        products = step @ step.swapaxes(1, 2)
+        own = np.einsum("nii->ni", products)
+        first = own[:, :1] + own[:, 1:-1] - 2.0 * products[:, 0, 1:-1]
+        last = products[:, 1:, 1:] * -2.0
+        last += own[:, 1:, np.newaxis]
+        last += own[:, np.newaxis, 1:]
+        rise, between = 1.0 / x[:, :-1], x[:, np.newaxis] - x[..., np.newaxis]
+        fall = np.divide(1.0, between, out=np.zeros_like(between), where=between != 0.0)
+        first *= rise * rise
+        last *= fall
+        last *= fall
+        both = products[:, :1, 1:] - products[:, 1:-1, 1:]
+        both *= 2.0 * rise[..., np.newaxis]
+        first, last, both, fall = (
+            np.moveaxis(column.astype(np.float32), 0, -1).copy()
+            for column in (first, last, both, fall)
+        )
+        return cls(first, last, both, fall, np.logical_not(objective.weights.any(axis=1)))
 
 
-def _beside(function: np.ufunc, of: tuple[Any, Any], own: slice, start: int) -> Any:
-    """A function of numbers of the pairs from `start` on, and of numbers of some values of T1."""
-    pairs, first = of
-    return function(pairs[:, np.newaxis, start:], first[:, own, np.newaxis])
+def _best(
+    times: Array, total: Array, limits: list[Array], ends: _Ends, interval: float
+) -> NDArray[np.int32]:
+    """The number of the best pair for each T1, shape (k - 1, n); times are over T_SUM."""
+    x, least = times / total, interval * (1.0 - ROUNDING) / total
+    V, A, J = (limit * total**power for power, limit in enumerate(limits, 1))
+    v, a, j = (V * MORE).astype(np.float32), A.astype(np.float32), J.astype(np.float32)
+    second, third = np.triu_indices(len(x), 1)
+    single, lasts, cruise = x.astype(np.float32), x[third] - x[second], 1.0 - 2.0 * x[third]
+    t1, t2, t3, T2 = single[:-1], single[second], single[third], lasts.astype(np.float32)
+    numbers = np.arange(len(third), dtype=np.int32)[:, np.newaxis]
+    best = np.full(t1.shape, LARGEST, dtype=np.int32)
+    still = ends.still if ends.still.any() else None
+    # A part of no length is impossible, whatever comes of it where nothing limits the jerk.
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        # One over the acceleration is the length of a pair less that of T1.
+        length = (HALF - t1 * THIRD) * t1
+        rises, faster = FEWER / (j * t1), v * length - t1 * HALF
+        sums = (t2 + t3) * HALF
+        lengths = sums - (t2 * t2 + t3 * (t2 + t3)) * THIRD
+        falls, fast = FEWER / np.minimum(a, j * T2), v * lengths - sums
+        falls[(least > lasts) | ((cruise >= NONE) & (cruise < least))] = np.inf
+        behind = 0
+        for end in range(len(x) - 1):
+            # The constant part ends here, the falling one at each later time.
+            first, last = slice(0, end + 1), slice(end + 1, None)
+            pairs = slice(behind, behind + len(x) - 1 - end)
+            behind = pairs.stop
+            # Where the first part ends there is no constant one.
+            own = np.where(x[end] < x[:end] + least, np.float32(np.inf), rises[:end])
+            own = np.concatenate([own, rises[end : end + 1]])
+            longer = lengths[pairs] - length[first, np.newaxis]
+            keeps = longer >= np.maximum(falls[pairs], own[:, np.newaxis])
+            keeps &= fast[pairs] >= faster[first, np.newaxis]
+            left = ends.both[first, last] - ends.both[first, end, np.newaxis]
+            left *= ends.fall[end, last]
+            left += ends.last[end, last]
+            left += ends.first[first, np.newaxis]
+            np.maximum(left, TINY, out=left)
+            if still is not None:
+                # Where nothing vibrates the lowest jerk is the best.
+                jerk = np.maximum(longer, TINY) / np.minimum(t1[first, np.newaxis], T2[pairs])
+                left = np.where(still, jerk, left)
+            longer *= keeps
+            longer *= longer
+            left /= longer
+            code = left.view(np.int32)
+            code &= LARGEST - (NUMBERED - 1)
+            code |= numbers[pairs]
+            np.minimum(best[first], code.min(axis=1), out=best[first])
+    best &= NUMBERED - 1
+    return best

@@ -165,8 +165,8 @@ def _worst(T1: Array, total: Array, objective: Objective) -> Array:
     """Largest residual of four-segment profiles, T1 of shape (n, k); exact for a few poles."""
     T = total[:, np.newaxis]
     if len(objective.poles) > FEW_POLES:
-        worst = symmetric_worst(T1, np.zeros(T1.shape), 0.5 * T - T1, total, objective)
-        return worst.astype(np.float64)
+        ramps = (T1.T, np.zeros(T1.T.shape), (0.5 * T - T1).T)
+        return symmetric_worst(*ramps, total, objective).T.astype(np.float64)
     profiles = _four(T1, T)
     flat = SymmetricProfiles(*(column.ravel() for column in profiles.columns()))
     response = symmetric_response(flat, objective.poles).reshape(*T1.shape, -1)

@@ -28,6 +28,8 @@ LEAST = np.float32(1e-36)
 """Squares of less are none: what is divided by them would be no number in single precision."""
 DAMPED, SINGULAR = 1e-2, 1e-6
 """Added to the second derivatives, times each of them and times the largest."""
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+"""Rows and columns of what stands of a symmetric matrix."""
 
 
 def slopes(
@@ -37,7 +39,7 @@ def slopes(
 
     Parameters
     ----------
-    T1, Ta, T2 : ndarray, shape (n, k)
+    T1, Ta, T2 : ndarray, shape (k, n)
         Of the ramps of k profiles for each of n moves; T1 and T2 above zero. T_SUM stays. [s]
     total : ndarray, shape (n,)
         T_SUM. [s]
@@ -46,9 +48,9 @@ def slopes(
 
     Returns
     -------
-    left : ndarray of float32, shape (2, p, n k)
+    left : ndarray of float32, shape (2, p, k n)
         Displacement of each mode as two parts, of which squares add up. [mm]
-    slope : ndarray of float32, shape (3, 2, p, n k)
+    slope : ndarray of float32, shape (3, 2, p, k n)
         Of these by T1, Ta and T2. [mm/s]
 
     Notes
@@ -56,8 +58,8 @@ def slopes(
     Pairs of steps of the jerk as in `symmetric_worst`; a pair at t changes by
     :math:`-\lambda (q e^{j\omega_d y} + p e^{-j\omega_d y})` with t, times its step.
     """
-    k = T1.shape[1]
-    whole = np.repeat(total, k)
+    k = len(T1)
+    whole = np.tile(total, k)
     T1, Ta, T2 = (x.ravel() for x in (T1, Ta, T2))
     area = Ta + 0.5 * (T1 + T2)
     moment = T1 * T1 / 3.0 + Ta * (T1 + 0.5 * Ta) + 0.5 * T2 * (T1 + Ta + T2 / 3.0)
@@ -72,7 +74,7 @@ def slopes(
     up, down, rise, fall = (
         x.astype(np.float32) for x in (acceleration / T1, acceleration / T2, 1.0 / T1, 1.0 / T2)
     )
-    weight = np.repeat(step_weights(objective), k, axis=1)
+    weight = np.tile(step_weights(objective), k)
     at = [
         _moved(t.astype(np.float32), whole.astype(np.float32), objective)
         for t in (np.zeros_like(T1), T1, T1 + Ta, T1 + Ta + T2)
@@ -131,49 +133,65 @@ def proposed_steps(
 
     Returns
     -------
-    ndarray, shape (len(powers), m, 3)
+    ndarray, shape (3, len(powers), m)
         In the units of the three numbers.
     """
-    squares, radial = _summed(left * left), np.stack([_summed(own * left) for own in slope])
-    products = {(i, j): _summed(slope[i] * slope[j]) for i in range(3) for j in range(i, 3)}
+    squares = _summed(left * left)
+    radial = _summed(np.moveaxis(slope * left, 1, 0))
+    products = np.concatenate([_summed(np.moveaxis(slope[k] * slope[k:], 1, 0)) for k in range(3)])
     starts = np.flatnonzero(np.diff(objective.group, prepend=-1))
     if len(starts) < len(objective.group):
-        squares, radial = (np.add.reduceat(x, starts, axis=-2) for x in (squares, radial))
-        products = {k: np.add.reduceat(x, starts, axis=-2) for k, x in products.items()}
-    largest = squares.max(axis=0, initial=0.0)
-    share = squares / np.where(largest > 0.0, largest, np.float32(1.0))
+        squares, radial, products = (
+            np.add.reduceat(x, starts, axis=-2) for x in (squares, radial, products)
+        )
+    largest: Single = squares.max(axis=0, initial=0.0)
+    share: Single = np.divide(squares, np.where(largest > 0.0, largest, np.float32(1.0)))
     inverse = np.float32(1.0) / np.maximum(squares, LEAST)
-    steps = []
+    bends = np.concatenate([(inverse * radial[k]) * radial[k:] for k in range(3)])
+    gradients, matrices = [], []
     for power, bent in powers:
-        weight = share ** np.float32(0.5 * power - 1.0)
-        gradient = (weight * radial).sum(axis=1, dtype=np.float64)
-        held = (fixed[0] & (gradient > 0.0)) | (fixed[1] & (gradient < 0.0))
-        second = {k: weight * own for k, own in products.items()}
-        if bent:
-            bend = weight * inverse * np.float32(power - 2.0)
-            second = {(i, j): x + bend * radial[i] * radial[j] for (i, j), x in second.items()}
-        matrix = {k: x.sum(axis=0, dtype=np.float64) for k, x in second.items()}
-        steps.append(_solved(matrix, np.where(held, 0.0, -gradient), held))
-    return np.stack(steps)
+        weight = _power(share, power // 2 - 1)
+        gradients.append((weight * radial).sum(axis=1))
+        second = bends * np.float32(power - 2.0 if bent else 0.0)
+        second += products
+        second *= weight
+        matrices.append(second.sum(axis=1))
+    gradient, matrix = (
+        np.stack(every, axis=1).astype(np.float64) for every in (gradients, matrices)
+    )
+    outward = fixed[:, :, np.newaxis]
+    held = (outward[0] & (gradient > 0.0)) | (outward[1] & (gradient < 0.0))
+    return _solved(matrix, np.where(held, 0.0, -gradient), held)
 
 
 def _summed(parts: Single) -> Single:
-    """The sum of both parts."""
+    """The sum of both parts, which come first."""
     both: Single = parts[0] + parts[1]
     return both
 
 
-def _solved(matrix: dict[tuple[int, int], Array], right: Array, held: NDArray[np.bool_]) -> Array:
-    """Solutions of symmetric equations in three unknowns, some of which are held; shape (m, 3).
+def _power(base: Single, exponent: int) -> Single:
+    """A power by multiplications: of the same bits on every machine."""
+    power, square = np.ones_like(base), base
+    while exponent:
+        if exponent % 2:
+            power = power * square
+        square, exponent = square * square, exponent // 2
+    return power
 
-    By elimination, written out: the same to the last bit wherever it runs.
+
+def _solved(matrix: Array, right: Array, held: NDArray[np.bool_]) -> Array:
+    """Solutions of symmetric equations in three unknowns, some of which are held; shape (3, ...).
+
+    Of the matrices the upper triangles stand row by row, shape (6, ...). By elimination, written
+    out: the same to the last bit wherever it runs.
     """
-    most = np.maximum(np.maximum(matrix[0, 0], matrix[1, 1]), matrix[2, 2])
+    most = np.maximum(np.maximum(matrix[0], matrix[3]), matrix[5])
     free = ~held
     m = {
         (i, j): np.where(free[i] & free[j], x, 0.0) if i != j
         else np.where(free[i], x * (1.0 + DAMPED) + SINGULAR * most, 1.0) + (most == 0.0)
-        for (i, j), x in matrix.items()
+        for (i, j), x in zip(UPPER, matrix, strict=True)
     }  # fmt: skip
     a, b = m[0, 1] / m[0, 0], m[0, 2] / m[0, 0]
     m11, m12, m22 = m[1, 1] - a * m[0, 1], m[1, 2] - a * m[0, 2], m[2, 2] - b * m[0, 2]
@@ -182,4 +200,4 @@ def _solved(matrix: dict[tuple[int, int], Array], right: Array, held: NDArray[np
     z = (r2 - c * r1) / (m22 - c * m12)
     y = (r1 - m12 * z) / m11
     x = (right[0] - m[0, 1] * y - m[0, 2] * z) / m[0, 0]
-    return np.stack([x, y, z], axis=1)
+    return np.stack([x, y, z])

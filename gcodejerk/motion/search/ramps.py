@@ -13,6 +13,8 @@ Rule 2: what is compared is the objective, the largest residual displacement of 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +27,7 @@ from gcodejerk.motion.search.newton import LAST_POWERS, POWERS, Powers, proposed
 from gcodejerk.motion.search.objective import Objective
 from gcodejerk.motion.search.rows import ROUNDING, parts
 
-TIMES, SPREAD = 36, 1.6
+TIMES, SPREAD = 44, 1.6
 """Times of the grid of combinations, and the power by which they are closer where ramps are short.
 """
 EDGES, LINE = 5, 9
@@ -37,17 +39,20 @@ PROMISING = 4.0
 """What leaves so many times the least of the grid is not evaluated to its end."""
 FEW = 8
 """So few frequencies can be perfectly still: nulls are narrow, and worth a longer search."""
-STARTS, ROUNDS = 16, 1
+STARTS, ROUNDS = 20, 1
 """Profiles that are descended from, and in how many steps."""
-LEADERS, LAST = (8, 5), (16, 4)
+LEADERS, LAST = (8, 6), (16, 4)
 """Those that go on, and in how many steps: of `FEW` frequencies, and of more."""
 FINAL = (2, 6)
 """Of more, the best that go on to the bottom, where the largest residuals have edges."""
-REACH = (0.3, 0.3, 0.25)
-"""The longest first step: parts of T1 and of T2, and of Ta's range."""
+REACH = (0.3, 0.25, 0.3)
+"""The longest first step: parts of T1, of Ta's range and of T2."""
 GROWS, SHRINKS = 1.5, 0.3
 """What the longest step is multiplied by after one that led downhill, and after one that did not.
 """
+ARRIVED, TOGETHER = 0.1, 2
+"""A point whose longest step is a shorter part of `REACH` goes no further; points that go on are
+never fewer than this."""
 NUDGE = 1e-4
 """Relative change of T1 and T2 by which the slope of Ta's range is found."""
 WIDE = 256
@@ -85,98 +90,141 @@ def design_symmetric(
         Whether any profile within the limits was found.
     """
     n = len(total)
-    columns, feasible = [np.ones(n) for _ in range(4)], np.zeros(n, dtype=bool)
-    fastest = conventional_profiles(velocity, acceleration, jerk, interval)
+    search = _Search.of(total, velocity, acceleration, jerk, objective, interval)
+    starts = (*known, conventional_profiles(velocity, acceleration, jerk, interval))
+    found = _Points(np.empty((3, STARTS, n)), np.empty((STARTS, n)), np.ones((STARTS, n)))
     for part in parts(n, WIDE):
-        search = _Search(
-            total[part], velocity[part], acceleration[part], jerk[part], objective.take(part),
-            interval,
-        )  # fmt: skip
-        starts = [profiles.take(part) for profiles in (*known, fastest)]
-        profiles, feasible[part] = search.run(starts)
-        for column, new in zip(columns, profiles.columns(), strict=True):
-            column[part] = new
-    return SymmetricProfiles(*columns), feasible
+        found.put(part, search.take(part).first([profiles.take(part) for profiles in starts]))
+    width = len(objective.poles)
+    for count, rounds, powers in _descents(width):
+        found = found.best(count)
+        for part in parts(n, count * width):
+            found.put(part, search.take(part).descended(found.take(part), rounds, powers))
+    found = found.best(1)
+    return search.profiles(found.at[:, 0]), np.isfinite(found.value[0])
 
 
+def _descents(poles: int) -> list[tuple[int, int, Powers]]:
+    """How many of the best go on, in how many steps, and by which powers."""
+    many = poles > FEW
+    descents = [(STARTS, ROUNDS, POWERS), (LEADERS[many], LAST[many], POWERS)]
+    return [*descents, (*FINAL, LAST_POWERS)] if many else descents
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Points:
+    """Candidates of n moves, k of each, side by side.
+
+    Attributes
+    ----------
+    at : ndarray, shape (3, k, n)
+        T1, the share of Ta's range, and T2.
+    value : ndarray, shape (k, n)
+        What each leaves. [mm]
+    reach : ndarray, shape (k, n)
+        The longest step from each, as a part of `REACH`.
+    """
+
+    at: Array
+    value: Array
+    reach: Array
+
+    def take(self, part: slice | NDArray[np.intp]) -> _Points:
+        """Those of some of the moves."""
+        return _Points(self.at[..., part], self.value[:, part], self.reach[:, part])
+
+    def put(self, part: slice | NDArray[np.intp], some: _Points) -> None:
+        """Others in the place of those of some of the moves."""
+        self.at[..., part], self.value[:, part] = some.at, some.value
+        self.reach[:, part] = some.reach
+
+    def best(self, k: int) -> _Points:
+        """The k best of each move, the first among equals."""
+        index = np.argsort(self.value, axis=0, kind="stable")[:k]
+        move = np.arange(self.value.shape[1])
+        return _Points(self.at[:, index, move], self.value[index, move], self.reach[index, move])
+
+    def shaped(self, k: int, n: int) -> _Points:
+        """The same as k candidates of n moves; those of a move are n columns apart."""
+        shape = (k, n)
+        at = self.at.reshape(3, *shape)
+        return _Points(at, self.value.reshape(shape), self.reach.reshape(shape))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Search:
-    """One batch of moves; the last axis of points is T1, T2 and the share of Ta's range."""
+    """Moves and their limits; points are T1, the share of Ta's range, and T2, shape (3, ..., n).
 
-    def __init__(
-        self, total: Array, V: Array, A: Array, J: Array, objective: Objective, interval: float
-    ) -> None:
+    `centroid`: V = 1/(T_SUM - 2 centroid), so the velocity limit is a limit of the centroid.
+    """
+
+    total: Array
+    V: Array
+    A: Array
+    J: Array
+    centroid: Array
+    objective: Objective
+    interval: float
+
+    @classmethod
+    def of(
+        cls, total: Array, V: Array, A: Array, J: Array, objective: Objective, interval: float
+    ) -> _Search:
+        """With the limits as they are."""
         slack = 1.0 + ROUNDING
-        self.total, self.V, self.A, self.J = total, V * slack, A * slack, J * slack
-        self.objective, self.interval = objective, interval
-        # V = 1/(T_SUM - 2 centroid): the velocity limit is a limit of the centroid.
-        self.centroid = 0.5 * (total - 1.0 / self.V)
+        centroid = 0.5 * (total - 1.0 / (V * slack))
+        return cls(total, V * slack, A * slack, J * slack, centroid, objective, interval)
 
-    def run(self, known: list[SymmetricProfiles]) -> tuple[SymmetricProfiles, NDArray[np.bool_]]:
-        """The best of what is looked at first are descended from, and the leaders to the end."""
-        points, value = _best(STARTS, *self._first(known))
-        reach = np.ones(value.shape)
-        points, value, reach = self._descend(points, value, reach, ROUNDS)
-        many = len(self.objective.poles) > FEW
-        points, value, reach = _best(LEADERS[many], points, value, reach)
-        points, value, reach = self._descend(points, value, reach, LAST[many])
-        if many:
-            points, value, reach = _best(FINAL[0], points, value, reach)
-            points, value, _ = self._descend(points, value, reach, FINAL[1], LAST_POWERS)
-        points, value = (x[:, 0] for x in _best(1, points, value))
-        return self._profiles(points), np.isfinite(value)
+    def take(self, part: slice | NDArray[np.intp]) -> _Search:
+        """Some of the moves."""
+        total, V, A, J, centroid = (
+            column[part] for column in (self.total, self.V, self.A, self.J, self.centroid)
+        )
+        return _Search(total, V, A, J, centroid, self.objective.take(part), self.interval)
 
-    def _first(self, known: list[SymmetricProfiles]) -> tuple[Array, Array]:
-        """Points of the grid, one for each T1, and what is looked at besides; their values."""
+    def first(self, known: list[SymmetricProfiles]) -> _Points:
+        """The best of the grid, one for each T1, and of what is looked at besides."""
         spread = (np.linspace(0.0, 1.0, TIMES) ** SPREAD).round(12)
         # As far as the shortest T1 and Ta leave the velocity within its limit.
         longest = np.clip(
             3.0 * self.centroid - self.interval, 2.0 * self.interval, 0.5 * self.total
         )
-        times = self.interval + (longest - self.interval)[:, np.newaxis] * spread
+        times = self.interval + (longest - self.interval) * spread[:, np.newaxis]
         T1, Ta, T2 = best_combinations(
             times, self.total, (self.V, self.A, self.J), self.objective.rough(), self.interval
         )
         points = self._points(T1, Ta, T2)
         value = self._value(points)
         more = self._candidates(known)
-        bound = np.repeat(PROMISING * value.min(axis=1, keepdims=True), more.shape[1], axis=1)
-        return (
-            np.concatenate([points, more], axis=1),
-            np.concatenate([value, self._value(more, bound)], axis=1),
-        )
+        bound = np.broadcast_to(PROMISING * value.min(axis=0), more.shape[1:])
+        value = np.concatenate([value, self._value(more, bound)])
+        points = np.concatenate([points, more], axis=1)
+        return _Points(points, value, np.ones(value.shape)).best(STARTS)
 
     def _candidates(self, known: list[SymmetricProfiles]) -> Array:
         """Points at the ends of Ta's range, of four segments and of known profiles."""
         n, dt = len(self.total), self.interval
         spread = (np.linspace(0.0, 1.0, EDGES) ** SPREAD).round(12)
-        T1, T2 = (dt + (self._longest(which) - dt)[:, np.newaxis] * spread for which in (0, 1))
-        shape = (n, EDGES, EDGES, 2)
-        edges = np.stack(
-            [
-                np.broadcast_to(T1[:, :, np.newaxis, np.newaxis], shape),
-                np.broadcast_to(T2[:, np.newaxis, :, np.newaxis], shape),
-                np.broadcast_to([0.0, 1.0], shape),
-            ],
-            axis=-1,
-        ).reshape(n, -1, 3)
+        T1, T2 = (dt + (longest - dt) * spread[:, np.newaxis] for longest in self._longest())
+        edges = np.empty((3, EDGES, EDGES, 2, n))
+        edges[0], edges[2] = T1[:, np.newaxis, np.newaxis], T2[:, np.newaxis]
+        edges[1] = np.array([0.0, 1.0])[:, np.newaxis]
         low, high = four_segment_range(self.total, self.V, self.A, self.J, dt)
         low, high = np.where(low <= high, low, dt), np.where(low <= high, high, dt)
-        first = low[:, np.newaxis] + (high - low)[:, np.newaxis] * np.linspace(0.0, 1.0, LINE)
-        line = np.stack(
-            [first, 0.5 * self.total[:, np.newaxis] - first, np.zeros(first.shape)], axis=-1
-        )
+        first = low + (high - low) * np.linspace(0.0, 1.0, LINE)[:, np.newaxis]
+        line = np.stack([first, np.zeros(first.shape), 0.5 * self.total - first])
         own = np.stack([self._stretched(profiles) for profiles in known], axis=1)
-        return np.concatenate([edges, line, own], axis=1)
+        return np.concatenate([edges.reshape(3, -1, n), line, own], axis=1)
 
-    def _longest(self, which: int) -> Array:
-        """The longest T1 (0) or T2 (1) that V and A leave, with one interval for the other."""
-        low, high = np.full(len(self.total), self.interval), 0.5 * self.total
-        ramps = [low.copy(), low.copy()]
+    def _longest(self) -> Array:
+        """The longest T1 and T2 that V and A leave beside one interval of the other, (2, n)."""
+        dt = np.full(len(self.total), self.interval)
+        low, high = np.stack([dt, dt]), np.stack([0.5 * self.total] * 2)
         for _ in range(BISECTIONS):
-            ramps[which] = 0.5 * (low + high)
-            least, most = self._range_of_Ta(ramps[0], ramps[1])
+            middle = 0.5 * (low + high)
+            least, most = self._range_of_Ta(np.stack([middle[0], dt]), np.stack([dt, middle[1]]))
             fits = least <= most
-            low, high = np.where(fits, ramps[which], low), np.where(fits, high, ramps[which])
+            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
         return low
 
     def _stretched(self, profiles: SymmetricProfiles) -> Array:
@@ -190,72 +238,73 @@ class _Search:
         low, high = self._range_of_Ta(T1, T2)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.clip((Ta - low) / (high - low), 0.0, 1.0)
-        return np.stack([T1, T2, np.where(np.isfinite(share), share, 0.0)], axis=-1)
+        return np.stack([T1, np.where(np.isfinite(share), share, 0.0), T2])
 
-    def _descend(
-        self, points: Array, value: Array, reach: Array, rounds: int, powers: Powers = POWERS
-    ) -> tuple[Array, Array, Array]:
-        """Steps downhill from k points of each move, shape (n, k, 3), with their values.
-
-        `reach`: the longest step of each, as parts of `REACH`.
-        """
+    def descended(self, points: _Points, rounds: int, powers: Powers) -> _Points:
+        """Points that went downhill, until the longest step of each is short."""
+        k, n = points.value.shape
+        every = points.shaped(1, k * n)
         for _ in range(rounds):
-            step = self._steps(points, powers)
-            longest = np.abs(step).max(axis=-1, keepdims=True)
-            step *= np.minimum(1.0, reach[..., np.newaxis, np.newaxis] / np.maximum(longest, TINY))
-            near = self._within(points[:, :, np.newaxis] + step * _unit(points)[:, :, np.newaxis])
-            bound = np.repeat(value, near.shape[2], axis=1)
-            found = self._value(near.reshape(len(near), -1, 3), bound).reshape(near.shape[:3])
-            chosen = found.argmin(axis=2)[..., np.newaxis]
-            least = np.take_along_axis(found, chosen, axis=2)[..., 0]
-            better = least < value
-            there = np.take_along_axis(near, chosen[..., np.newaxis], axis=2)[:, :, 0]
-            points = np.where(better[..., np.newaxis], there, points)
-            value = np.where(better, least, value)
-            reach = reach * np.where(better, GROWS, SHRINKS)
-        return points, value, reach
+            going = np.flatnonzero(every.reach >= ARRIVED)
+            if not len(going):
+                break
+            # Never one alone: numpy adds up a single column in another order than many.
+            going = np.resize(going, max(len(going), TOGETHER))
+            every.put(going, self.take(going % n)._stepped(every.take(going), powers))
+        return every.shaped(k, n)
+
+    def _stepped(self, points: _Points, powers: Powers) -> _Points:
+        """A step from each point to the best that is proposed, if it is better."""
+        step = self._steps(points.at, powers)
+        longest = np.abs(step).max(axis=0)
+        step *= np.minimum(1.0, points.reach / np.maximum(longest, TINY))
+        near = self._within(points.at[:, np.newaxis] + step * _unit(points.at)[:, np.newaxis])
+        found = self._value(near, np.broadcast_to(points.value, near.shape[1:]))
+        at, value = points.at, points.value
+        for there, least in zip(np.moveaxis(near, 1, 0), found, strict=True):
+            at, value = np.where(least < value, there, at), np.minimum(least, value)
+        return _Points(at, value, points.reach * np.where(value < points.value, GROWS, SHRINKS))
 
     def _within(self, points: Array) -> Array:
         """Points moved back to the limits that they are beyond; nearly, where it is the jerk's."""
-        np.clip(points[..., 2], 0.0, 1.0, out=points[..., 2])
-        np.maximum(points[..., :2], self.interval, out=points[..., :2])
-        J = self._beside(points, self.J)
+        np.clip(points[1], 0.0, 1.0, out=points[1])
+        ramps = points[::2]
+        np.maximum(ramps, self.interval, out=ramps)
         acceleration = self._ramps(points)[1]
         with np.errstate(invalid="ignore", divide="ignore"):
-            shortest = acceleration[..., np.newaxis] / J * (1.0 + ROUNDING)
-        np.fmax(points[..., :2], np.where(shortest > 0.0, shortest, 0.0), out=points[..., :2])
+            shortest = acceleration / self.J * (1.0 + ROUNDING)
+        np.fmax(ramps, np.where(shortest > 0.0, shortest, 0.0), out=ramps)
         return points
 
     def _steps(self, points: Array, powers: Powers) -> Array:
-        """Proposed steps from points, in parts of `REACH`, shape (n, k, proposals, 3)."""
-        T1, T2, share = points[..., 0], points[..., 1], points[..., 2]
+        """Proposed steps from points, in parts of `REACH`, shape (3, proposals, k, n)."""
+        T1, share, T2 = points
         Ta, _, legal = self._ramps(points)
-        quarter = 0.25 * self.total[:, np.newaxis]
-        ramp = [np.where(legal, x, quarter) for x in (T1, Ta, T2)]
-        left, by = slopes(ramp[0], ramp[1], ramp[2], self.total, self.objective)
+        first, second, third = (np.where(legal, x, 0.25 * self.total) for x in (T1, Ta, T2))
+        left, by = slopes(first, second, third, self.total, self.objective)
         low, high, slope = self._slopes_of_Ta(T1, T2, share)
         width = np.where(np.isfinite(high - low), high - low, 0.0)
         unit = _unit(points)
-        by_T1, by_T2, by_Ta = (
-            x.ravel().astype(np.float32) for x in (slope[0], slope[1], width * unit[..., 2])
+        unit_T1, unit_T2, by_T1, by_Ta, by_T2 = (
+            x.ravel().astype(np.float32)
+            for x in (unit[0], unit[2], slope[0], width * unit[1], slope[1])
         )
-        first, second = (unit[..., k].ravel().astype(np.float32) for k in (0, 1))
-        by = np.stack(
-            [(by[0] + by[1] * by_T1) * first, (by[2] + by[1] * by_T2) * second, by[1] * by_Ta]
-        )
+        by[0] = (by[0] + by[1] * by_T1) * unit_T1
+        by[2] = (by[2] + by[1] * by_T2) * unit_T2
+        by[1] *= by_Ta
         shortest = self.interval * (1.0 + NUDGE)
         fixed = np.zeros((2, 3, share.size), dtype=bool)
-        fixed[0] = [(shortest >= T1).ravel(), (shortest >= T2).ravel(), (share <= 0.0).ravel()]
-        fixed[1, 2] = (share >= 1.0).ravel()
+        fixed[0] = [(shortest >= T1).ravel(), (share <= 0.0).ravel(), (shortest >= T2).ravel()]
+        fixed[1, 1] = (share >= 1.0).ravel()
         steps = proposed_steps(left, by, self.objective, fixed, powers)
-        return np.moveaxis(steps.reshape(len(steps), *share.shape, 3), 0, 2)
+        return steps.reshape(3, -1, *share.shape)
 
     def _value(self, points: Array, bound: Array | None = None) -> Array:
-        """Worst residual of candidates, shape (n, k); infinite where one is not legal.
+        """Worst residual of candidates, shape (..., n); infinite where one is not legal.
 
         It may be infinite, too, where it is above its bound, of the same shape.
         """
-        T1, T2 = points[..., 0], points[..., 1]
+        T1, _, T2 = points
         Ta, acceleration, legal = self._ramps(points)
         # What is not legal is evaluated as something harmless.
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -263,12 +312,12 @@ class _Search:
         T1, Ta, T2 = (
             np.where(legal, own, harmless) for own, harmless in ((T1, 1.0), (Ta, 0.0), (T2, 1.0))
         )
-        total = np.where(legal.any(axis=1), self.total, 4.0)
+        total = np.where(legal.reshape(-1, len(self.total)).any(axis=0), self.total, 4.0)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             bound = np.where(legal, np.inf if bound is None else bound, -1.0)
             worst = symmetric_worst(T1, Ta, T2, total, self.objective, bound)
         # Where nothing vibrates the lowest jerk is the best.
-        still = ~self.objective.weights.any(axis=1, keepdims=True)
+        still = ~self.objective.weights.any(axis=1)
         return np.where(legal, np.where(still, jerk, worst), np.inf)
 
     def _range_of_Ta(self, T1: Array, T2: Array) -> tuple[Array, Array]:
@@ -283,7 +332,7 @@ class _Search:
 
         Both limits are quadratic in Ta, since the ramp's moment is. Last: what T_SUM leaves to Ta.
         """
-        T, centroid, A = (self._beside(T1, x) for x in (self.total, self.centroid, self.A))
+        T, centroid, A = self.total, self.centroid, self.A
         half = 0.5 * (T1 + T2)
         moment = T1 * T1 / 3.0 + 0.5 * T1 * T2 + T2 * T2 / 6.0
         b, p = T1 + 0.5 * T2 - centroid, 0.5 * T - T1 - 0.5 * T2
@@ -295,7 +344,7 @@ class _Search:
     def _slopes_of_Ta(self, T1: Array, T2: Array, share: Array) -> tuple[Array, Array, list[Array]]:
         """Ta's range, and how a share of it changes with T1 and T2; 0 where there is no range."""
         (p, lower), (b, upper), room = self._roots_of_Ta(T1, T2)
-        T, centroid = (self._beside(T1, x) for x in (self.total, self.centroid))
+        T, centroid = self.total, self.centroid
         low, high = p - lower, upper - b
         slope = []
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -307,22 +356,17 @@ class _Search:
                 slope.append(np.where(np.isfinite(change), change, 0.0))
         return np.maximum(low, 0.0), np.minimum(high, room), slope
 
-    @staticmethod
-    def _beside(points: Array, column: Array) -> Array:
-        """A number of each move, shaped to stand beside numbers of its points."""
-        return column.reshape(-1, *(1,) * (points.ndim - 1))
-
-    def _profiles(self, points: Array) -> SymmetricProfiles:
-        """The profiles of points, shape (n, 3)."""
-        T1, T2 = points[:, 0], points[:, 1]
+    def profiles(self, points: Array) -> SymmetricProfiles:
+        """The profiles of points, shape (3, n)."""
+        T1, _, T2 = points
         Ta = self._ramps(points)[0]
         Tv = self.total - 2.0 * (T1 + Ta + T2)
         return SymmetricProfiles(T1, Ta, T2, np.where(np.abs(Tv) < SHORTEST, 0.0, Tv))
 
     def _ramps(self, points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Ta and the acceleration of points; whether each keeps limits and segment durations."""
-        T1, T2, share = points[..., 0], points[..., 1], points[..., 2]
-        T, J = (self._beside(T1, x) for x in (self.total, self.J))
+        T1, share, T2 = points
+        T, J = self.total, self.J
         low, high = self._range_of_Ta(T1, T2)
         dt = self.interval * (1.0 - ROUNDING)
         Ta = low + share * (high - low)
@@ -353,13 +397,5 @@ class _Search:
 
 def _unit(points: Array) -> Array:
     """The units of steps from points."""
-    return np.concatenate(
-        [REACH[:2] * points[..., :2], np.full((*points.shape[:-1], 1), REACH[2])], axis=-1
-    )
-
-
-def _best(k: int, points: Array, value: Array, *more: Array) -> tuple[Array, ...]:
-    """The k best points of each row, the first among equals, and what belongs to them."""
-    index = np.argsort(value, axis=1, kind="stable")[:, :k]
-    row = np.arange(len(index))[:, np.newaxis]
-    return tuple(column[row, index] for column in (points, value, *more))
+    T1, share, T2 = points
+    return np.stack([REACH[0] * T1, np.full(share.shape, REACH[1]), REACH[2] * T2])
