@@ -61,7 +61,7 @@ def test_page_says_what_changed_in_one_sentence_and_three_figures(plate):
     text = said(page)
     assert (
         "19 of 26 rapids were rewritten in the same time: the worst vibration that one of them "
-        "leaves falls from 469 to 35.8 µm (7.6 % of today's), and 9.67 s of waiting" in text
+        "leaves falls from 469 to 35.8 µm (7.6 % of today's), and 9.7 s of waiting" in text
     )
     assert page.count('<div class="figure">') == 3
     assert "839 bytes" in text
