@@ -53,10 +53,9 @@ def path_way(displacement: Array, machine: Machine) -> Array:
 def limits_of(displacement: Array, machine: Machine) -> Array:
     """Velocity, acceleration and jerk that a design may use of each axis, shape (3, moves, 9).
 
-    Infinite without axis. On a straight line an axis has its part of what bounds the path.
-
-    An axis without a jerk limit stands any jerk; from one interval to the next its acceleration can
-    then go from one limit to the other.
+    Infinite without axis, and the jerk of one without a limit of it: an acceleration from one limit
+    to the other is all that it stands. On a straight line an axis has its part of what bounds the
+    path.
     """
     own = _of_axes(machine)
     each: Array = np.repeat(own[:, np.newaxis, :], len(displacement), axis=1)
@@ -85,10 +84,7 @@ def _of_axes(machine: Machine) -> Array:
     out = np.full((3, len(AXES)), np.inf)
     for axis in machine.axes:
         limit = axis.limit
-        jerk = (
-            limit.jerk if np.isfinite(limit.jerk) else 2.0 * limit.acceleration / machine.interval
-        )
-        out[:, AXES.index(axis.name)] = limit.velocity, limit.acceleration, jerk
+        out[:, AXES.index(axis.name)] = limit.velocity, limit.acceleration, limit.jerk
     return out
 
 

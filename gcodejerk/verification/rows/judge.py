@@ -310,11 +310,7 @@ class _Judge:
     def _check_limits(self) -> None:
         """The extremes of every cubic against the limits."""
         pieces = self.pieces
-        limits = limits_of(self.displacement, self.machine)
-        # Rows stand at ticks, not at intervals: an axis without a jerk limit stands any jerk.
-        for axis in self.machine.axes:
-            limits[2, :, AXES.index(axis.name)] = axis.limit.jerk
-        limits = limits[:, pieces.owner]
+        limits = limits_of(self.displacement, self.machine)[:, pieces.owner]
         u = pieces.turning()
         values = (
             np.maximum(np.abs(pieces.velocity(u)), np.maximum(abs(pieces.v0), abs(pieces.v1))),
