@@ -29,7 +29,7 @@ from gcodejerk.parameters.search import (
     goal_value,
     representatives,
 )
-from gcodejerk.parameters.settings import PATH, Scheme
+from gcodejerk.parameters.settings import ALL, PATH, TODAY, Scheme
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.task import Task
 
@@ -345,6 +345,12 @@ def _ranges(scheme: Scheme, machine: Machine) -> Array:
                 "deceleration": own.acceleration,
                 "jerk": own.jerk,
             }
+            if setting.axis == ALL and TODAY + "acceleration" in scheme.fixed:
+                # A share of every axis's own, those too that are too slow ever to reach it.
+                spare = min(
+                    max(a.limit.acceleration / a.rapid.acceleration, 1.0) for a in machine.axes
+                )
+                most["acceleration"] = spare * float(scheme.fixed[TODAY + "acceleration"][at])
         name = setting.relation.quantity
         now = float(quantities[name][0]) if name in quantities else np.nan
         acceleration = float(quantities.get("acceleration", np.array([np.nan]))[0])

@@ -212,6 +212,33 @@ def test_nothing_is_inserted_where_nothing_is_gained():
         assert "left as it is" in "".join(result.notes)
 
 
+def test_an_axis_that_is_too_slow_to_reach_its_acceleration_is_told_no_more_than_it_may():
+    """G231 is of all axes, those too that the program's rapids do not move."""
+    machine = Machine.loads(
+        """schema: 1
+name: slow beside
+interval: 0.001
+positioning: linear
+axes:
+  Y:
+    resolution: 0.001
+    rapid: {velocity: 650.0, acceleration: 3500.0, jerk: 1.2e+6, planner: jerk-limited}
+    limit: {acceleration: 7000.0, jerk: 3.7e+6}
+    modes: [{frequency: 46.57, damping: 0.002, participation: 0.05}]
+  Z:
+    resolution: 0.001
+    rapid: {velocity: 18.0, acceleration: 6000.0, jerk: 1.4e+6, planner: jerk-limited}
+    limit: {acceleration: 6000.0, jerk: 1.4e+7}
+    modes: [{frequency: 82.43, damping: 0.004, participation: 0.09}]
+"""
+    )
+    program = b"G21 G90 G94\nG0 Y2 Z3\nG0 Y-3.18\nG1 Y1 F500\nM30\n"
+    output = process(program, machine, controller="twincat", form="parameters").output
+    told = [float(line[5:]) for line in output.split(b"\n") if line.startswith(b"G231=")]
+    assert told, output
+    assert max(told) <= 100.0
+
+
 def test_a_program_that_was_processed_is_refused():
     with pytest.raises(ProgramError, match="processed by gcodejerk before"):
         process(golden("twincat")[1], TWINCAT, form="parameters")
