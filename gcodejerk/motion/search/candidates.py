@@ -22,7 +22,7 @@ from gcodejerk.motion.search.objective import Objective
 Single = NDArray[np.float32]
 
 BLOCK = 1 << 14
-"""Numbers in an array at a time, about: a dozen of them stay in the processor's cache."""
+"""Poles times candidates at a time, about: what comes of them stays in the processor's cache."""
 
 BEYOND = 1.0 + 1e-5
 """A candidate beyond a bound by this factor is given up: more than single precision errs."""
@@ -90,7 +90,7 @@ def symmetric_worst(
         first = from_middle(begin, end, sigma, omega)
         deep = None if sigma is None else sigma[:, np.newaxis]
         others = from_middle(t, rest, deep, omega[:, np.newaxis])
-        square = np.zeros(1, dtype=np.float32)
+        squares = []
         for own, three in zip(first, others, strict=True):
             if own is not None and three is not None:
                 three *= jerk
@@ -98,8 +98,8 @@ def symmetric_worst(
                 for pair in range(3):
                     part += three[:, pair]
                 part *= part
-                square = square + part
-        found.add(block, square, scale**2 * omega)
+                squares.append(part)
+        found.add(block, sum(squares[1:], squares[0]), scale**2 * omega)
     return found.displacement()
 
 

@@ -152,10 +152,8 @@ def proposed_steps(
     for power, bent in powers:
         weight = _power(share, power // 2 - 1)
         gradients.append((weight * radial).sum(axis=1))
-        second = bends * np.float32(power - 2.0 if bent else 0.0)
-        second += products
-        second *= weight
-        matrices.append(second.sum(axis=1))
+        second = products + np.float32(power - 2.0) * bends if bent else products
+        matrices.append((weight * second).sum(axis=1))
     gradient, matrix = (
         np.stack(every, axis=1).astype(np.float64) for every in (gradients, matrices)
     )

@@ -53,9 +53,8 @@ def path_way(displacement: Array, machine: Machine) -> Array:
 def limits_of(displacement: Array, machine: Machine) -> Array:
     """Velocity, acceleration and jerk that a design may use of each axis, shape (3, moves, 9).
 
-    Infinite without axis, and the jerk of one without a limit of it: an acceleration from one limit
-    to the other is all that it stands. On a straight line an axis has its part of what bounds the
-    path.
+    Infinite without axis, and the jerk of one without a limit of it: its acceleration alone is
+    bounded. On a straight line an axis has its part of what bounds the path.
     """
     own = _of_axes(machine)
     each: Array = np.repeat(own[:, np.newaxis, :], len(displacement), axis=1)
