@@ -166,10 +166,24 @@ def conventional_limits(
     return V, A, J
 
 
+def path_direction(machine: Machine, share: Array) -> Array:
+    """Unit vectors of the ways that `path` bounds, shape (n, 9): of the linear axes together.
+
+    0 where only rotary axes move.
+    """
+    way = _way(machine, share)[:, np.newaxis]
+    out: Array = np.where(way > 0.0, _linear(machine) * share / np.where(way > 0.0, way, 1.0), 0.0)
+    return out
+
+
+def _linear(machine: Machine) -> NDArray[np.bool_]:
+    """Which of `AXES` the machine has as linear ones, shape (9,)."""
+    return np.array([a in machine.axis_names and not machine.axis(a).rotary for a in AXES])
+
+
 def _way(machine: Machine, share: Array) -> Array:
     """Way of the linear axes together, shape (n,) [mm]."""
-    linear = np.array([a in machine.axis_names and not machine.axis(a).rotary for a in AXES])
-    out: Array = np.sqrt((share[:, linear] ** 2).sum(axis=1))
+    out: Array = np.sqrt((share[:, _linear(machine)] ** 2).sum(axis=1))
     return out
 
 

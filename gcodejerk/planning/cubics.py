@@ -24,6 +24,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.sampling import CELLS
 from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
+from gcodejerk.planning.conventional import path_direction
 from gcodejerk.planning.plans import Plans, path_length
 
 MOST_PASSED = 0.05
@@ -131,14 +132,27 @@ class Cubics:
 
     def _peaks(self, axis: int) -> tuple[Array, Array, Array]:
         """Largest velocity, acceleration and jerk of an axis in each move."""
-        a, j, T = self.begin[axis], self.jerk[axis], self.T
+        return self._peaks_of(
+            self.velocity[axis], self.begin[axis], self.end[axis], self.jerk[axis]
+        )
+
+    def _peaks_along(self, direction: Array) -> tuple[Array, Array, Array]:
+        """The same along a unit vector of each move, (b, 9)."""
+        part = direction[self.of_row]
+
+        def along(column: Mapping[int, Array]) -> Array:
+            return np.asarray(sum(part[:, axis] * column[axis] for axis in self.axes))
+
+        columns = (self.velocity, self.begin, self.end, self.jerk)
+        return self._peaks_of(*map(along, columns))
+
+    def _peaks_of(self, v: Array, a: Array, end: Array, j: Array) -> tuple[Array, Array, Array]:
+        """The same of velocities at rows, accelerations at both ends of each cubic, and jerks."""
         with np.errstate(divide="ignore", invalid="ignore"):
             turn = np.where(j != 0.0, -a / j, 0.0)
-        turn = np.where((turn > 0.0) & (turn < T), turn, 0.0)
-        speed = np.maximum(
-            np.abs(self.velocity[axis]), np.abs(self.velocity[axis] + 0.5 * a * turn)
-        )
-        size = np.maximum(np.abs(a), np.abs(self.end[axis]))
+        turn = np.where((turn > 0.0) & (turn < self.T), turn, 0.0)
+        speed = np.maximum(np.abs(v), np.abs(v + 0.5 * a * turn))
+        size = np.maximum(np.abs(a), np.abs(end))
         return self._largest(speed), self._largest(size), self._largest(np.abs(j))
 
     def peaks(self) -> Array:
@@ -169,7 +183,9 @@ class Cubics:
             out |= velocity > (1.0 + MOST_PASSED) * limit.velocity
             out |= acceleration > (1.0 + MOST_PASSED) * limit.acceleration
         if machine.path != FREE:
-            along, path = self.peaks(), machine.path.limit
-            out |= along[0] > (1.0 + MOST_PASSED) * path.velocity
-            out |= along[1] > (1.0 + MOST_PASSED) * path.acceleration
+            path = machine.path.limit
+            direction = path_direction(machine, self.plans.displacement[self.moves])
+            velocity, acceleration, _ = self._peaks_along(direction)
+            out |= velocity > (1.0 + MOST_PASSED) * path.velocity
+            out |= acceleration > (1.0 + MOST_PASSED) * path.acceleration
         return out

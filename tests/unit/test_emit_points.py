@@ -577,3 +577,49 @@ def test_a_rapid_lasts_as_long_as_its_own_way_does_and_not_as_that_in_counts():
     assert made.planned == 1
     assert made.plans.counts[1] == 126
     assert made.verification.ok
+
+
+BOUNDED = """
+interval: 0.0005
+positioning: linear
+spindle: mill
+path: {rapid: {acceleration: 691.4}}
+axes:
+  X:
+    resolution: 1.0e-4
+    rapid: {velocity: 30, acceleration: 100.6, jerk: 50300}
+    limit: {jerk: 503000}
+  Z:
+    resolution: 1.0e-4
+    rapid: {velocity: 31.65, acceleration: 691.4, jerk: 197150}
+    limit: {jerk: 1971500}
+    modes: [{frequency: 60, damping: 0.01}]
+  A:
+    wrap: none
+    resolution: 1.0e-3
+    rapid: {velocity: 300, acceleration: 3000, jerk: 150000}
+    limit: {jerk: 600000}
+    modes: [{frequency: 27, damping: 0.02, participation: 0.01}]
+controller: pmac
+controller_options: {isx90: 1, axis_names: {X: X, Z: Z, A: A}, confirmed: [pmac-colon]}
+"""
+
+
+def test_what_bounds_the_path_is_no_limit_of_the_rounding_of_one_axis():
+    """X has 52 mm/s^2 of the path's 691; its velocities in steps of 0.01 mm/s make 60 of them."""
+    program = b"G21 G90 G94\nG0 X.5 Z2. A0\nG0 X.2853 Z-.8488\nM2\n"
+    made = process(program, Machine.loads(BOUNDED))
+    assert made.planned == 1
+    assert made.verification.ok
+    slower = BOUNDED.replace(
+        "path: {rapid: {acceleration: 691.4", "path: {rapid: {acceleration: 620"
+    )
+    found = verify(program, made.output, Machine.loads(slower))
+    assert "the path passes its limit of 620 mm, s" in {v.problem for v in found.violations}
+
+
+def test_what_bounds_the_path_bounds_no_axis_that_turns():
+    program = b"G21 G90 G94\nG0 X.5 Z2. A0\nG0 A90.\nM2\n"
+    made = process(program, Machine.loads(BOUNDED))
+    assert made.planned == 1
+    assert made.verification.ok

@@ -50,36 +50,36 @@ def path_way(displacement: Array, machine: Machine) -> Array:
     return way
 
 
+def path_direction(displacement: Array, machine: Machine) -> Array:
+    """Unit vectors of the path that the control bounds, shape (moves, 9); 0 where it bounds none.
+
+    Of the linear axes.
+    """
+    slides = np.array([a in machine.axis_names and not machine.axis(a).rotary for a in AXES])
+    way = path_way(displacement, machine)[:, np.newaxis]
+    moves = way > 0.0
+    out: Array = np.where(moves & slides, displacement / np.where(moves, way, 1.0), 0.0)
+    return out
+
+
 def limits_of(displacement: Array, machine: Machine) -> Array:
     """Velocity, acceleration and jerk that a design may use of each axis, shape (3, moves, 9).
 
     Infinite without axis, and the jerk of one without a limit of it: its acceleration alone is
     bounded. On a straight line an axis has its part of what bounds the path.
     """
-    own = _of_axes(machine)
-    each: Array = np.repeat(own[:, np.newaxis, :], len(displacement), axis=1)
+    each: Array = np.repeat(axis_limits(machine)[:, np.newaxis, :], len(displacement), axis=1)
     if machine.path != FREE:
-        most, way = machine.path.limit, path_way(displacement, machine)
-        slides = np.array([a in machine.axis_names and not machine.axis(a).rotary for a in AXES])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            part = np.abs(displacement) / way[:, np.newaxis]
-        part = np.where((part > 0.0) & slides, part, np.inf)
+        most = machine.path.limit
+        part = np.abs(path_direction(displacement, machine))
+        part = np.where(part > 0.0, part, np.inf)
         each[0] = np.minimum(each[0], part * most.velocity)
         each[1] = np.minimum(each[1], part * most.acceleration)
     return each
 
 
-def whole_limits(machine: Machine) -> Array:
-    """The same whatever the way, shape (3, 9): an axis may do alone what the path may."""
-    own = _of_axes(machine)
-    if machine.path != FREE:
-        most = machine.path.limit
-        own[:2] = np.minimum(own[:2].T, (most.velocity, most.acceleration)).T
-    return own
-
-
-def _of_axes(machine: Machine) -> Array:
-    """Limits of each axis, shape (3, 9)."""
+def axis_limits(machine: Machine) -> Array:
+    """The limits of each axis by itself, shape (3, 9); infinite without axis."""
     out = np.full((3, len(AXES)), np.inf)
     for axis in machine.axes:
         limit = axis.limit

@@ -24,10 +24,8 @@ from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.own_rapids import (
     conventional_counts,
     left_by_rapids,
-    limits_of,
     own_times,
     rapid_limits,
-    whole_limits,
 )
 from gcodejerk.verification.physics.points import (
     STANDSTILL,
@@ -41,6 +39,7 @@ from gcodejerk.verification.physics.points import (
 )
 from gcodejerk.verification.physics.residual import band_of
 from gcodejerk.verification.rows.files import RowsFile
+from gcodejerk.verification.rows.limits import WITHIN, passed_limits
 from gcodejerk.verification.rows.motion import Pieces
 from gcodejerk.verification.rows.moves import Move, Steps
 from gcodejerk.verification.rows.readers import CYCLIC
@@ -51,10 +50,6 @@ FIRST = 4
 """Frequencies of the band at which all moves are looked at."""
 BATCH = 500
 """Moves that are judged at a time."""
-WITHIN = 1e-8
-"""Share by which a number may pass a limit: float64 of decimal numbers."""
-MOST_BLUR = 0.05
-"""Share of a limit that rounding is an excuse for."""
 MORE_TICKS = 2.5
 """Ticks that a move may last longer than whole intervals, or the ticks that those begin."""
 STATED = 2e-3
@@ -308,26 +303,8 @@ class _Judge:
         )
 
     def _check_limits(self) -> None:
-        """The extremes of every cubic against the limits."""
-        pieces = self.pieces
-        limits = limits_of(self.displacement, self.machine)[:, pieces.owner]
-        u = pieces.turning()
-        values = (
-            np.maximum(np.abs(pieces.velocity(u)), np.maximum(abs(pieces.v0), abs(pieces.v1))),
-            np.maximum(*np.abs(pieces.accelerations)),
-            np.abs(pieces.jerk),
-        )
-        kinds = (Kind.VELOCITY, Kind.ACCELERATION, Kind.JERK)
-        # The steps of an axis are no smaller where its part in a way that the path bounds is small.
-        most = MOST_BLUR * whole_limits(self.machine)
-        for value, limit, blur, kind, excused in zip(
-            values, limits, pieces.blur(), kinds, most, strict=True
-        ):
-            excuse = blur if kind is Kind.JERK else np.minimum(blur, excused)
-            bad = self.of_piece & (value > limit * (1.0 + WITHIN) + excuse)
-            for a in np.flatnonzero(bad.any(axis=0)).tolist():
-                problem = f"{AXES[a]} passes its limit of {limit[bad[:, a], a][0]:g} mm, s"
-                self._complain(kind, pieces.owner[bad[:, a]], problem)
+        for kind, moves, problem in passed_limits(self.pieces, self.displacement, self.machine):
+            self._complain(kind, moves, problem)
 
     def _check_steps(self) -> None:
         """The acceleration is continuous, and 0 at both ends."""

@@ -14,7 +14,7 @@ Rule: columns hold the moves of a batch side by side; pieces never reach from on
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -110,6 +110,23 @@ class Pieces:
         with np.errstate(divide="ignore", invalid="ignore"):
             u = a / (a - b)
         return np.asarray(np.where((u > 0.0) & (u < 1.0), u, 0.0))
+
+    def extremes(self) -> tuple[Array, Array, Array]:
+        """Largest velocity, acceleration and jerk in each piece, each of shape (s, 9)."""
+        ends = np.maximum(np.abs(self.v0), np.abs(self.v1))
+        return (
+            np.maximum(np.abs(self.velocity(self.turning())), ends),
+            np.maximum(*np.abs(self.accelerations)),
+            np.abs(self.jerk),
+        )
+
+    def along(self, way: Array) -> Pieces:
+        """Of the path, by the unit vector of each piece (s, 9): one column in place of nine."""
+        p0, p1, v0, v1 = (
+            (column * way).sum(axis=1, keepdims=True)
+            for column in (self.p0, self.p1, self.v0, self.v1)
+        )
+        return replace(self, p0=p0, p1=p1, v0=v0, v1=v1)
 
     def blur(self) -> tuple[Array, Array, Array]:
         """What rounding may make of velocity, acceleration and jerk, each of shape (s, 9)."""
