@@ -9,16 +9,18 @@ is nowhere listed: it is drawn.
 from __future__ import annotations
 
 import random
+import re
 from dataclasses import replace
 
 import pytest
+import yaml
 from hypothesis import HealthCheck, Phase, event, find, given, note, settings
 from hypothesis import strategies as st
 
 from gcodejerk.emit import controllers, load_controller
 from gcodejerk.errors import GcodejerkError, VerifyError
 from gcodejerk.machine import PLANNERS
-from gcodejerk.machine.parts import ControllerOptions
+from gcodejerk.machine.parts import ControllerOptions, ControllerParameter
 from gcodejerk.nc import DIALECTS
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.machines import machines
@@ -33,6 +35,11 @@ CALM = settings(
 FORMS = sorted((name, form.name) for name in controllers() for form in load_controller(name).forms)
 READ = ("linuxcnc", "grbl", "fanuc", "haas", "mach")
 """Dialects of programs for a controller that has none of its own."""
+READ_BY = {"linuxcnc-hal": ("linuxcnc",)}
+"""What some of them have their own words in."""
+SET_BY_PROGRAM = sorted(
+    name for name in controllers() if getattr(load_controller(name), "program_way", "")
+)
 PERIODS = {"galil": [1 / 1024, 0.000977, 0.002], "fanuc15": [0.001, 0.002, 0.004, 0.008]}
 STARTUPS = {
     "klipper": ["G21 G90", "G90"],
@@ -50,7 +57,10 @@ def described(draw, controller, dialect):
         machines(
             axes=letters,
             modes=(0, 2),
-            planner=draw(st.sampled_from([None, *PLANNERS])),
+            positioning="linear" if controller == "linuxcnc-hal" else None,
+            # TwinCAT is told a share of today's jerk.
+            jerk_limited=True if controller == "twincat" else None,
+            planner=None if controller == "twincat" else draw(st.sampled_from([None, *PLANNERS])),
             filtered=None,
             interval=draw(st.sampled_from(PERIODS.get(controller, [0.0005, 0.001, 0.002, 0.004]))),
         )
@@ -118,7 +128,8 @@ def moving(draw, machine, dialect):
 @st.composite
 def cases(draw, controller, form):
     """A program, the machine that it runs on, and how it is processed."""
-    dialect = controller if controller in DIALECTS else draw(st.sampled_from(READ))
+    dialect = controller if controller in DIALECTS else None
+    dialect = dialect or draw(st.sampled_from(READ_BY.get(controller, READ)))
     machine = draw(described(controller, dialect))
     program = draw(moving(machine, dialect))
     profile = draw(st.sampled_from(PROFILES))
@@ -154,3 +165,60 @@ def test_what_is_drawn_is_rewritten(controller):
     form = next(form for name, form in FORMS if name == controller and form != "parameters")
     patient = settings(CALM, max_examples=100)
     find(cases(controller, form), planned, settings=patient, random=random.Random(1))
+
+
+def as_today(draw, machine, remedy):
+    """The machine with what a refusal asks for: settings as they might be today."""
+    answers = []
+    for one in yaml.safe_load(remedy):
+        old = str(one.pop("old"))
+        if old == "45":
+            old = f"{draw(st.floats(21.0, 90.0)):.1f}"
+        elif not old.replace(".", "").isdigit():
+            old = draw(st.sampled_from([old, "none"]))
+        answers.append(ControllerParameter(**one, old=old))
+    return replace(machine, controller_parameters=tuple(answers))
+
+
+@st.composite
+def known_today(draw, controller):
+    """A case in which the control's settings of today are stated where they have to be."""
+    program, machine, chosen = draw(cases(controller, "parameters"))
+    try:
+        process(program, machine, **chosen)
+    except VerifyError:
+        note(program.decode())
+        raise
+    except GcodejerkError as error:
+        if asked := re.search(r"controller_parameters: (\[.*\])", error.remedy or ""):
+            machine = as_today(draw, machine, asked[1])
+    return program, machine, chosen
+
+
+def places(case):
+    """How many lines of settings were written; none where the program or the machine is refused."""
+    program, machine, chosen = case
+    try:
+        return process(program, machine, **chosen).settings.places
+    except VerifyError:
+        raise
+    except GcodejerkError as error:
+        if "controller_parameters" in (error.remedy or ""):
+            raise AssertionError("it asks again for what was stated") from error
+        return 0
+
+
+@pytest.mark.parametrize("controller", SET_BY_PROGRAM)
+@CALM
+@given(st.data())
+def test_no_settings_are_written_that_their_proof_refuses(controller, data):
+    case = data.draw(known_today(controller))
+    note(case[0].decode())
+    event(f"set: {places(case) > 0}")
+
+
+@pytest.mark.parametrize("controller", SET_BY_PROGRAM)
+def test_what_is_drawn_is_set(controller):
+    """Or nothing would be proven above."""
+    patient = settings(CALM, max_examples=100)
+    find(known_today(controller), places, settings=patient, random=random.Random(1))
