@@ -149,6 +149,9 @@ REPEATS = {
     "property/test_never_worse.py": {
         "test_no_written_rapid_is_worse_than_the_control_s_own": 3,
     },
+    "property/test_never_worse_rows.py": {
+        "test_no_rows_are_worse_than_the_control_s_own_rapid": 2,
+    },
     "property/test_profiles.py": {
         "test_every_profile_keeps_what_it_promises": 4,
     },
