@@ -33,7 +33,8 @@ def cases(draw):
     dt = draw(st.sampled_from([0.0005, 0.001, 0.002]))
     between = lambda low, high: float(f"{low * (high / low) ** draw(st.floats(0, 1)):.4g}")  # noqa: E731
     axes, modes = {}, []
-    lines = [f"interval: {dt}", "positioning: linear", "axes:"]
+    positioning = draw(st.sampled_from(["linear", "independent"]))
+    lines = [f"interval: {dt}", f"positioning: {positioning}", "axes:"]
     for letter in letters:
         V, A = between(50, 800), between(500, 10000)
         J = A / between(0.004, 0.05)
@@ -191,14 +192,40 @@ def todays(V, A, J):
     return [(J, rise), (0, flat), (-J, rise), (0, cruise), (-J, rise), (0, flat), (J, rise)]
 
 
-def kept_today(segments, amount, f, zeta):
-    """The same of constant jerks, by the matrix exponential of oscillator and jerk together."""
+def todays_rapids(case, k):
+    """What the axes do today in one of the moves, as (their displacements, jerks and durations).
+
+    All along one line, or each on its own.
+    """
+    text, axes, _, _, moves = case
+    displacement = {a: d for a, d in moves[k][0].items() if d}
+
+    def along(moved):
+        each = np.array([axes[a][:3] for a in moved]).T / np.abs(list(moved.values()))
+        return moved, todays(*each.min(axis=1))
+
+    if "positioning: independent" in text:
+        return [along({a: d}) for a, d in displacement.items()]
+    return [along(displacement)]
+
+
+def kept_today(rapids, share, f, zeta):
+    """The same of constant jerks, by the matrix exponential of oscillator and jerk together.
+
+    When the last of the rapids has arrived.
+    """
     system = driven(f, zeta)
-    state = np.zeros((len(f), 4))
-    for jerk, duration in segments:
-        state[:, 3] = jerk * amount
-        state = (expm(system * duration) @ state[:, :, np.newaxis])[:, :, 0]
-    return envelope(state, 2.0 * pi * f, zeta)
+    last = max(sum(duration for _, duration in segments) for _, segments in rapids)
+    together = np.zeros((len(f), 4))
+    for moved, segments in rapids:
+        amount = sum(share.get(a, 0.0) * d for a, d in moved.items())
+        state = np.zeros((len(f), 4))
+        rest = last - sum(duration for _, duration in segments)
+        for jerk, duration in [*segments, (0.0, rest)]:
+            state[:, 3] = jerk * amount
+            state = (expm(system * duration) @ state[:, :, np.newaxis])[:, :, 0]
+        together += state
+    return envelope(together, 2.0 * pi * f, zeta)
 
 
 def frequencies(f, total):
@@ -214,14 +241,10 @@ def hold_to_today(case, result, motions, slack, reported=True):
     _, axes, modes, _, moves = case
     for k, motion in motions.items():
         displacement = moves[k][0]
-        limits = zip(*(axes[a][:3] for a in displacement), strict=True)
-        size = [abs(d) for d in displacement.values()]
-        V, A, J = (min(x / d for x, d in zip(own, size, strict=True) if d) for own in limits)
-        segments = todays(V, A, J)
+        rapids = todays_rapids(case, k)
         left = today = 0.0
         for m, (f, zeta, share) in enumerate(modes):
             p = np.array([share.get(a, 0.0) for a in axes])
-            amount = sum(share.get(a, 0.0) * d for a, d in displacement.items())
             if not any(displacement.get(a, 0.0) * x for a, x in share.items()):
                 continue
             around = frequencies(f, motion.total)
@@ -232,5 +255,5 @@ def hold_to_today(case, result, motions, slack, reported=True):
                 # Of F, and of what is computed here, times are rounded: by 3e-8 s at most together.
                 rounded = 1e-6 + 3e-8 * np.abs(motion.v @ p).max()
                 assert abs(own - said) <= 1e-4 * own + rounded, "the report says what is left"
-            today = max(today, kept_today(segments, amount, around, zeta).max())
+            today = max(today, kept_today(rapids, share, around, zeta).max())
         assert left <= today + slack[0] * today + slack[1], (k, left, today)

@@ -623,3 +623,27 @@ def test_what_bounds_the_path_bounds_no_axis_that_turns():
     made = process(program, Machine.loads(BOUNDED))
     assert made.planned == 1
     assert made.verification.ok
+
+
+def test_a_rapid_that_needs_more_time_may_end_between_two_intervals():
+    """X needs a tick more than 30 ms in whole ticks; the file allows it 31.8."""
+    text = (
+        "interval: 0.002\npositioning: independent\nspindle: mill\naxes:\n"
+        "  X:\n    resolution: 0.001\n"
+        "    rapid: {velocity: 176.4, acceleration: 1062, jerk: 265500}\n"
+        "    limit: {jerk: 504450}\n    modes:\n"
+        "    - {frequency: 36.48, damping: 0.02, participation: 0.3018}\n"
+        "    - {frequency: 14.18, damping: 0, participation: 0.3018}\n"
+        "  Y:\n    resolution: 0.001\n"
+        "    rapid: {velocity: 50, acceleration: 1388, jerk: 131439.4}\n"
+        "    limit: {jerk: 666322}\n"
+        "    modes: [{frequency: 49.82, damping: 0.1, participation: 0.5616}]\n"
+        "modes: [{frequency: 35.55, damping: 0, participation: {X: 0.5, Y: 0.5}}]\n"
+    )
+    program = b"G21 G90 G94\nG0 X0. Y0.\nG0 X-.16 Y-.05\nM2\n"
+    made = process(program, machine("json", text=text))
+    assert made.planned == 1
+    assert 0.030 < made.rapids[1].time < 0.0318
+    shorter = machine("json", text=text + "design: {max_extension: 0.03}\n")
+    found = verify(program, made.output, shorter)
+    assert any(violation.kind is Kind.TIME for violation in found.violations)

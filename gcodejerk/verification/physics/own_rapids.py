@@ -89,18 +89,30 @@ def axis_limits(machine: Machine) -> Array:
 
 def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
-    displacement = paths.displacement
-    limits = rapid_limits(paths, machine)
-    if has_law(machine):
-        total = OwnRapids(displacement, machine, limits).totals().max(axis=1, initial=0.0)
-    else:
-        total = _move_time(limits, displacement, machine, machine.planner == BELL)
+    total = _own_time(paths, machine)
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
     longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
     if machine.design.profile == "shortest":
-        longest = np.maximum(longest, _longest(total, displacement, machine))
+        longest = np.maximum(longest, _longest(total, paths.displacement, machine))
     most = np.maximum(usual, longest)
     return usual.astype(np.int64), most.astype(np.int64)
+
+
+def longest_times(paths: Paths, machine: Machine) -> Array:
+    """What rapids may take at most that need not end with an interval, shape (moves,) [s]."""
+    _, most = conventional_counts(paths, machine)
+    longer = (1.0 + machine.design.max_extension) * _own_time(paths, machine)
+    return np.asarray(np.maximum(most * machine.interval, longer))
+
+
+def _own_time(paths: Paths, machine: Machine) -> Array:
+    """What the control's own rapids take, until the last axis arrives, shape (moves,) [s]."""
+    displacement = paths.displacement
+    limits = rapid_limits(paths, machine)
+    if has_law(machine):
+        each = OwnRapids(displacement, machine, limits).totals()
+        return np.asarray(each.max(axis=1, initial=0.0))
+    return _move_time(limits, displacement, machine, machine.planner == BELL)
 
 
 def _move_time(limits: Array, displacement: Array, machine: Machine, bell: bool = False) -> Array:

@@ -24,6 +24,7 @@ from gcodejerk.verification.physics.oscillators import Oscillators
 from gcodejerk.verification.physics.own_rapids import (
     conventional_counts,
     left_by_rapids,
+    longest_times,
     own_times,
     rapid_limits,
 )
@@ -271,8 +272,8 @@ class _Judge:
     def _check_duration(self) -> None:
         """No longer than the rapid may last; under independent positioning, no axis."""
         interval, tick = self.machine.interval, self.file.steps.tick
-        _, most = conventional_counts(self.paths, self.machine)
-        late = self.pieces.total > (np.ceil(most * interval / tick - WITHIN) + MORE_TICKS) * tick
+        most = longest_times(self.paths, self.machine)
+        late = self.pieces.total > (np.ceil(most / tick - WITHIN) + MORE_TICKS) * tick
         self._complain(Kind.TIME, late, "the motion lasts longer than the rapid may")
         if self.machine.positioning == "linear":
             return
