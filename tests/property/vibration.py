@@ -9,9 +9,10 @@ is within the band.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, pi, sqrt
+from math import ceil, inf, pi, sqrt
 
 import numpy as np
+import yaml
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -34,7 +35,11 @@ def cases(draw):
     between = lambda low, high: float(f"{low * (high / low) ** draw(st.floats(0, 1)):.4g}")  # noqa: E731
     axes, modes = {}, []
     positioning = draw(st.sampled_from(["linear", "independent"]))
-    lines = [f"interval: {dt}", f"positioning: {positioning}", "axes:"]
+    lines = [f"interval: {dt}", f"positioning: {positioning}"]
+    if positioning == "linear" and draw(st.booleans()):
+        V, A = between(200, 800), between(500, 10000)
+        lines.append(f"path: {{rapid: {{velocity: {V}, acceleration: {A}}}}}")
+    lines.append("axes:")
     for letter in letters:
         V, A = between(50, 800), between(500, 10000)
         J = A / between(0.004, 0.05)
@@ -198,13 +203,17 @@ def todays_rapids(case, k):
     All along one line, or each on its own.
     """
     text, axes, _, _, moves = case
+    machine = yaml.safe_load(text)
+    bounds = machine.get("path", {"rapid": {"velocity": inf, "acceleration": inf}})["rapid"]
     displacement = {a: d for a, d in moves[k][0].items() if d}
 
     def along(moved):
-        each = np.array([axes[a][:3] for a in moved]).T / np.abs(list(moved.values()))
-        return moved, todays(*each.min(axis=1))
+        size = np.array([*np.abs(list(moved.values())), np.linalg.norm(list(moved.values()))])
+        path = (bounds["velocity"], bounds["acceleration"], inf)
+        limits = np.array([*(axes[a][:3] for a in moved), path])
+        return moved, todays(*(limits.T / size).min(axis=1))
 
-    if "positioning: independent" in text:
+    if machine["positioning"] == "independent":
         return [along({a: d}) for a, d in displacement.items()]
     return [along(displacement)]
 
