@@ -9,7 +9,7 @@ is within the band.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, inf, pi, sqrt
+from math import ceil, inf, isinf, pi, sqrt
 
 import numpy as np
 import yaml
@@ -34,6 +34,7 @@ def cases(draw):
     dt = draw(st.sampled_from([0.0005, 0.001, 0.002]))
     between = lambda low, high: float(f"{low * (high / low) ** draw(st.floats(0, 1)):.4g}")  # noqa: E731
     axes, modes = {}, []
+    jerk_limited = draw(st.booleans())
     positioning = draw(st.sampled_from(["linear", "independent"]))
     lines = [f"interval: {dt}", f"positioning: {positioning}"]
     if positioning == "linear" and draw(st.booleans()):
@@ -43,12 +44,13 @@ def cases(draw):
     for letter in letters:
         V, A = between(50, 800), between(500, 10000)
         J = A / between(0.004, 0.05)
+        own = f", jerk: {J:.6e}" if jerk_limited else ""
         step = draw(st.sampled_from([1e-4, 1e-3]))
-        axes[letter] = V, A, J, step
+        axes[letter] = V, A, J if jerk_limited else inf, step
         limit = J * draw(st.floats(1.0, 20.0))
         lines += [f"  {letter}:", f"    resolution: {step}"]
-        lines += [f"    rapid: {{velocity: {V}, acceleration: {A}, jerk: {J:.6e}}}"]
-        lines += [f"    limit: {{jerk: {limit:.6e}}}", "    modes:"]
+        lines += [f"    rapid: {{velocity: {V}, acceleration: {A}{own}}}"]
+        lines += [f"    limit: {{acceleration: {1.2 * A}, jerk: {limit:.6e}}}", "    modes:"]
         for _ in range(draw(st.integers(1, 2))):
             f, zeta = (
                 between(8, min(250, 0.45 / dt)),
@@ -185,7 +187,11 @@ def envelope(state, omega, zeta):
 
 
 def todays(V, A, J):
-    """Jerks and durations of the fastest symmetric rapid over a way of 1."""
+    """The fastest symmetric rapid over a way of 1, as accelerations, jerks and durations."""
+    if isinf(J):
+        high = min(V, sqrt(A))
+        ramp, cruise = high / A, 1.0 / high - high / A
+        return [(A, 0.0, ramp), (0.0, 0.0, cruise), (-A, 0.0, ramp)]
     low, high = 0.0, V
     for _ in range(100):
         v = 0.5 * (low + high)
@@ -194,11 +200,13 @@ def todays(V, A, J):
     rise = min(A / J, sqrt(high / J))
     flat = max(high / (J * rise) - rise, 0.0)
     cruise = max(1.0 / high - 2.0 * rise - flat, 0.0)
-    return [(J, rise), (0, flat), (-J, rise), (0, cruise), (-J, rise), (0, flat), (J, rise)]
+    most = J * rise
+    ramp = [(0.0, J, rise), (most, 0.0, flat), (most, -J, rise)]
+    return [*ramp, (0.0, 0.0, cruise), *((-a, -j, duration) for a, j, duration in ramp)]
 
 
 def todays_rapids(case, k):
-    """What the axes do today in one of the moves, as (their displacements, jerks and durations).
+    """What the axes do today in one of the moves, as (their displacements, `todays`).
 
     All along one line, or each on its own.
     """
@@ -219,19 +227,16 @@ def todays_rapids(case, k):
 
 
 def kept_today(rapids, share, f, zeta):
-    """The same of constant jerks, by the matrix exponential of oscillator and jerk together.
-
-    When the last of the rapids has arrived.
-    """
+    """What oscillators keep of today's rapids when the last of them has arrived."""
     system = driven(f, zeta)
-    last = max(sum(duration for _, duration in segments) for _, segments in rapids)
+    last = max(sum(duration for *_, duration in segments) for _, segments in rapids)
     together = np.zeros((len(f), 4))
     for moved, segments in rapids:
         amount = sum(share.get(a, 0.0) * d for a, d in moved.items())
         state = np.zeros((len(f), 4))
-        rest = last - sum(duration for _, duration in segments)
-        for jerk, duration in [*segments, (0.0, rest)]:
-            state[:, 3] = jerk * amount
+        rest = last - sum(duration for *_, duration in segments)
+        for acceleration, jerk, duration in [*segments, (0.0, 0.0, rest)]:
+            state[:, 2], state[:, 3] = acceleration * amount, jerk * amount
             state = (expm(system * duration) @ state[:, :, np.newaxis])[:, :, 0]
         together += state
     return envelope(together, 2.0 * pi * f, zeta)
