@@ -2,7 +2,8 @@
 
 Under `positioning: independent` every axis runs on its own, so a rapid of several axes is a dogleg.
 A designed profile keeps each axis's ends and time but not its place at every moment in between, so
-the path differs a little from the one that the control itself takes. This module owns how much.
+the path differs a little from the one that the control itself takes. This module owns how much,
+and how much it may.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.motion import Grid, sample_profiles
+from gcodejerk.motion import Grid, Profiles, sample_profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.planning.batch import Batch
 from gcodejerk.planning.plans import Plans
@@ -24,10 +25,35 @@ WINDOW = 24
 """
 MARKS = 64
 """At most so many places of the control's path are tried for the nearest."""
+MIDDLE = (0.25, 0.75)
+"""Share of its time in which the mean moment of an axis's motion lies."""
 LEAST = 1e-9
 """Less is what rounding leaves. [mm]"""
 AT_ONCE = 64
 """Points of a path that are looked at together."""
+
+
+def in_the_middle(profiles: Profiles, usual: Array) -> NDArray[np.bool_]:
+    """Whether axes that run on their own move when the control's own rapids do, by and large.
+
+    One that waits and then hurries, or the other way round, takes the tool along another path.
+
+    Parameters
+    ----------
+    profiles : Profiles
+        n of them.
+    usual : ndarray, shape (n,)
+        What the control's own rapid takes. [s]
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        Where the mean moment of the motion is within the middle half of its time.
+    """
+    early, late = MIDDLE
+    mean = profiles.mean_moment
+    middle: NDArray[np.bool_] = (mean >= early * usual) & (mean <= late * profiles.total)
+    return middle
 
 
 def arrivals(plans: Plans, move: int) -> dict[str, tuple[float, float]]:

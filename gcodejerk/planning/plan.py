@@ -29,6 +29,7 @@ from gcodejerk.motion.search.condition3 import TIE
 from gcodejerk.motion.shapers import SHAPERS, shaped_profile
 from gcodejerk.planning.conventional import least_time
 from gcodejerk.planning.designs import DESIGNS, shortest
+from gcodejerk.planning.independent_axes import in_the_middle
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.refusals import limit_error, time_error
@@ -322,8 +323,11 @@ class _Planner:
             useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
             if self.machine.positioning != "linear":
                 # Axes that run on their own: one may keep what it has while another gains.
+                off = np.isfinite(worst) & ~in_the_middle(profiles, self.conventional.total)
+                useless |= off
                 in_time = self.conventional.total <= counts * self.interval * (1.0 + 1e-9)
                 keeps = useless & fits & (alone | in_time)
+                self._rule_out_profiles(off & ~keeps, Reason.NOT_BETTER)
                 profiles = profiles.replaced(keeps, self.conventional.take(keeps))
                 worst, reference = self._at_arrival(profiles, worst)
                 if self.profile == "optimal":

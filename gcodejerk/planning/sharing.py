@@ -17,6 +17,7 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.together import OFF
 from gcodejerk.motion.search.unit_move import optimum_profiles
 from gcodejerk.planning.designs import move_of, slack_of
+from gcodejerk.planning.independent_axes import in_the_middle
 from gcodejerk.planning.optima import Question, joint_answers
 from gcodejerk.planning.plans import Modes
 from gcodejerk.planning.task import Task, worst_at_arrival
@@ -148,5 +149,6 @@ def joint_optima(
     )
     better, after = concerned.copy(), left.copy()
     better[concerned] = (less < before) & (now < left[concerned])
+    better &= ~np.isin(move, move[~in_the_middle(joint, task.conventional.total)])
     after[better] = now[better[concerned]]
     return profiles.replaced(better, joint.take(better)), after

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from gcodejerk import Machine, plan_move, process
+from gcodejerk.motion import sample_profiles
 from gcodejerk.planning.independent_axes import arrivals, path_deviation
 from gcodejerk.report.move_record import move_record
 
@@ -146,3 +148,40 @@ def test_axes_that_are_quiet_enough_alone_may_be_too_loud_together():
     for rapid in made.rapids:
         if rapid.rewritten:
             assert rapid.residual <= max(0.102, rapid.conventional_residual)
+
+
+WAITING = """
+interval: 0.004
+positioning: independent
+spindle: mill
+axes:
+  X:
+    rapid: {velocity: 27.91, acceleration: 2009, planner: time-constants, first_average: 0.01746,
+      second_average: 0.003904}
+    limit: {jerk: 301350}
+    modes: [{frequency: 6.152, damping: 0.00129, participation: 0.1159}]
+  Y:
+    rapid: {velocity: 154.9, acceleration: 904, planner: time-constants, first_average: 0.3324,
+      second_average: 0.002376}
+    limit: {acceleration: 2712}
+    modes: [{frequency: 8.646, damping: 0.009916, participation: 0.2195}]
+modes:
+  - {frequency: 58.5, damping: 0, participation: {X: -0.06841, Y: 0.167}}
+  - {frequency: 13.08, damping: 0.2, participation: {X: -1.467, Y: -0.06285}}
+design: {profile: optimal, band: 0, guard: 0, tolerance: 0.0006871, max_extension: 0}
+"""
+
+
+def test_no_axis_waits_and_hurries_where_that_would_cancel_what_another_leaves():
+    """Y has 0.34 s for 1 mm: at the very end of them it would leave least, by another path."""
+    program = b"G21 G90 G94 G64\nG0 X1. Y2.\nG0 X9.6496 Y1.001\nM30\n"
+    made = process(program, Machine.loads(WAITING), controller="csv", form="stream")
+    assert made.verification.ok
+    assert made.planned == 1
+    profiles = made.plans.profiles
+    t = np.linspace(0.0, profiles.total.max(), 20_001)[np.newaxis].repeat(2, axis=0)
+    place, _ = sample_profiles(profiles, t / 0.004, 0.004)
+    mean = trapezoid(1.0 - np.clip(place, 0.0, 1.0), t, axis=1)
+    assert profiles.mean_moment == pytest.approx(mean, rel=1e-4)
+    assert (0.25 * profiles.total < mean).all()
+    assert (0.75 * profiles.total > mean).all()

@@ -119,6 +119,23 @@ class Profiles:
         return turning
 
     @property
+    def mean_moment(self) -> Array:
+        """When the motion is made, on average: the integral of what is left, shape (n,) [s].
+
+        Half the duration, where a profile is its own mirror image.
+
+        Examples
+        --------
+        >>> columns = ([0, 2], [1.0, 1.0], [1.0, -1.0], [0.0, 0.0])
+        >>> Profiles.of(*(np.array(x) for x in columns)).mean_moment.tolist()
+        [1.0]
+        """
+        d = self.duration
+        further = (self.velocity + (self.acceleration / 3.0 + self.jerk * d / 12.0) * d) * d
+        passed = (self.position + 0.5 * further) * d
+        return self.total - np.bincount(self.owner, passed, len(self))
+
+    @property
     def peak_velocity(self) -> Array:
         """Largest velocity of each profile, shape (n,) [1/s]."""
         return self._largest(np.maximum(self.velocity, self.turning_velocity))
