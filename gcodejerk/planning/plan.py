@@ -360,26 +360,35 @@ class _Planner:
     def _extend(
         self, profiles: Profiles, counts: NDArray[np.int64], worst: Array
     ) -> tuple[Profiles, NDArray[np.int64], Array]:
-        """The least feasible time, at most `max_extension` longer, where T_SUM is impossible."""
+        """The least feasible time, at most `max_extension` longer, where T_SUM is impossible.
+
+        What is possible in a time is so in any longer one: steps grow until it is, and the last of
+        them is halved.
+        """
         rows = np.nonzero(~np.isfinite(worst))[0]
         if not len(rows):
             return profiles, counts, worst
-        counts = counts.copy()
+        counts, worst = counts.copy(), worst.copy()
         longest = (1.0 + self.machine.design.max_extension) * self.conventional.total
         most = np.floor(longest / self.interval + GRID_TOLERANCE).astype(np.int64)
         fastest = conventional_profiles(*self.limits, self.interval).total
-        least = whole_intervals(fastest, self.interval)
-        counts[rows] = np.maximum(counts[rows] + 1, least[rows])
-        for _ in range(8):
-            rows = rows[counts[rows] <= most[rows]]
-            if not len(rows):
-                break
-            found, value = DESIGNS[self.profile](self.task.after(counts).take(rows))
+        low = np.maximum(counts, whole_intervals(fastest, self.interval) - 1)
+        high, step = most + 1, 1
+        rows = rows[low[rows] < most[rows]]
+        while len(rows):
+            found = np.isfinite(worst[rows])
+            leap = np.minimum(low[rows] + step, most[rows])
+            counts[rows] = np.where(found, (low[rows] + high[rows]) // 2, leap)
+            new, value = DESIGNS[self.profile](self.task.after(counts).take(rows))
             done = np.isfinite(value)
-            profiles = profiles.replaced(rows[done], found.take(done))
+            profiles = profiles.replaced(rows[done], new.take(done))
             worst[rows[done]] = value[done]
-            rows = rows[~done]
-            counts[rows] += 1
+            high[rows[done]], low[rows[~done]] = counts[rows[done]], counts[rows[~done]]
+            step *= 2
+            possible = np.isfinite(worst[rows])
+            rows = rows[np.where(possible, high[rows] - low[rows] > 1, low[rows] < most[rows])]
+        extended = np.isfinite(worst) & (high <= most)
+        counts[extended] = high[extended]
         return profiles, counts, worst
 
     def _worthwhile(self, worst: Array, reference: Array) -> NDArray[np.bool_]:
