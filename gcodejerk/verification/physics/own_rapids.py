@@ -89,20 +89,25 @@ def axis_limits(machine: Machine) -> Array:
 
 def conventional_counts(paths: Paths, machine: Machine) -> tuple[Index, Index]:
     """Whole intervals that rapids take conventionally, and those that they may take at most."""
+    return _whole_counts(_own_time(paths, machine), paths, machine)
+
+
+def longest_times(paths: Paths, machine: Machine) -> Array:
+    """What rapids may take at most that need not end with an interval, shape (moves,) [s]."""
     total = _own_time(paths, machine)
+    _, most = _whole_counts(total, paths, machine)
+    longer = (1.0 + machine.design.max_extension) * total
+    return np.asarray(np.maximum(most * machine.interval, longer))
+
+
+def _whole_counts(total: Array, paths: Paths, machine: Machine) -> tuple[Index, Index]:
+    """`conventional_counts` of what the control's own rapids take."""
     usual = np.maximum(np.ceil(total / machine.interval - ON_GRID), 1.0)
     longest = np.floor(total * (1.0 + machine.design.max_extension) / machine.interval + ON_GRID)
     if machine.design.profile == "shortest":
         longest = np.maximum(longest, _longest(total, paths.displacement, machine))
     most = np.maximum(usual, longest)
     return usual.astype(np.int64), most.astype(np.int64)
-
-
-def longest_times(paths: Paths, machine: Machine) -> Array:
-    """What rapids may take at most that need not end with an interval, shape (moves,) [s]."""
-    _, most = conventional_counts(paths, machine)
-    longer = (1.0 + machine.design.max_extension) * _own_time(paths, machine)
-    return np.asarray(np.maximum(most * machine.interval, longer))
 
 
 def _own_time(paths: Paths, machine: Machine) -> Array:
