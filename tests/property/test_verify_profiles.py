@@ -100,10 +100,14 @@ def written(data, machine, controller="linuxcnc"):
         return None
 
 
-def judged(data, machine, controller):
-    """What verification says of an undamaged output."""
+def judged(data, machine, controller, seldom=()):
+    """What verification says of an undamaged output, in which something is rewritten.
+
+    `seldom`: but for profiles that hardly ever are.
+    """
     result = written(data, machine, controller)
     assume(result is not None)
+    assume(result.planned or machine.design.profile in seldom)
     if controller != "csv":
         return verify(data, result.output, machine)
     return verify_files(io.BytesIO(data), io.BytesIO(result.output), machine, table=True)
@@ -122,20 +126,23 @@ def test_outputs_on_shipped_machines_are_accepted(controller, profile, name, dat
         resolution=data.draw(st.sampled_from([None, 1e-5, 0.01])),
     )
     program = data.draw(short_programs("".join(machine.axis_names)))
-    assert judged(program, machine, controller).violations == ()
+    # The router's own rapids have no limit of jerk.
+    seldom = ("conventional",) if name == "router" else ()
+    assert judged(program, machine, controller, seldom).violations == ()
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "mach", "csv"])
 @pytest.mark.parametrize("profile", WRITTEN)
 @settings(CALM, max_examples=3)
-@given(machine=machines(axes="XZ", modes=(0, 2)), data=st.data())
+@given(machine=machines(axes="XZ", modes=(1, 2)), data=st.data())
 def test_outputs_on_drawn_machines_are_accepted(controller, profile, machine, data):
     # The slowest axes take seconds for what is short on others.
     quickest = min(a.rapid.velocity for a in machine.axes)
     program = data.draw(short_programs("XZ", longest=0.1 * quickest))
     # Blocks of three periods have to be short enough for LinuxCNC.
     assume(controller != "linuxcnc" or machine.interval < 0.004)
-    assert judged(program, ready(machine, profile), controller).violations == ()
+    seldom = ("condition1", "condition2") if controller == "linuxcnc" else ()
+    assert judged(program, ready(machine, profile), controller, seldom).violations == ()
 
 
 # On every shipped machine: one rapid that a profile of its own is found for, and one for
@@ -281,6 +288,7 @@ def test_most_feeds_changed_by_one_percent_are_noticed(profile):
             for point in rng.sample(points, 5):
                 damaged = output.put(point, scaled(output.line(point), rng.choice([0.99, 1.01])))
                 noticed.append(bool(output.kinds(damaged)))
+    assert noticed
     assert sum(noticed) >= LEAST.get(profile, 0.5) * len(noticed), (sum(noticed), len(noticed))
 
 
