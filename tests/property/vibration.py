@@ -82,7 +82,7 @@ def cases(draw):
 
 
 def known():
-    """A case whose rapids are all rewritten, for every controller and by every profile."""
+    """A case of which at most one rapid is left alone, whatever the controller and the profile."""
     axes = {"X": (400.0, 4000.0, 2e5, 1e-4), "Y": (300.0, 3000.0, 1e5, 1e-4)}
     modes = [(31.0, 0.01, {"X": 0.6}), (42.0, 0.02, {"Y": 0.8})]
     lines = ["interval: 0.001", "positioning: linear", "axes:"]
