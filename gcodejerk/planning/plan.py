@@ -368,28 +368,24 @@ class _Planner:
         rows = np.nonzero(~np.isfinite(worst))[0]
         if not len(rows):
             return profiles, counts, worst
-        counts, worst = counts.copy(), worst.copy()
+        counts = counts.copy()
         longest = (1.0 + self.machine.design.max_extension) * self.conventional.total
         most = np.floor(longest / self.interval + GRID_TOLERANCE).astype(np.int64)
         fastest = conventional_profiles(*self.limits, self.interval).total
+        # Impossible, and possible: beyond what is allowed, as long as nothing is.
         low = np.maximum(counts, whole_intervals(fastest, self.interval) - 1)
         high, step = most + 1, 1
-        rows = rows[low[rows] < most[rows]]
-        while len(rows):
-            found = np.isfinite(worst[rows])
-            leap = np.minimum(low[rows] + step, most[rows])
-            counts[rows] = np.where(found, (low[rows] + high[rows]) // 2, leap)
-            new, value = DESIGNS[self.profile](self.task.after(counts).take(rows))
+        while len(rows := rows[high[rows] - low[rows] > 1]):
+            begin, end = low[rows], high[rows]
+            leap = np.minimum(begin + step, most[rows])
+            counts[rows] = np.where(end <= most[rows], (begin + end) // 2, leap)
+            found, value = DESIGNS[self.profile](self.task.after(counts).take(rows))
             done = np.isfinite(value)
-            profiles = profiles.replaced(rows[done], new.take(done))
+            profiles = profiles.replaced(rows[done], found.take(done))
             worst[rows[done]] = value[done]
             high[rows[done]], low[rows[~done]] = counts[rows[done]], counts[rows[~done]]
             step *= 2
-            possible = np.isfinite(worst[rows])
-            rows = rows[np.where(possible, high[rows] - low[rows] > 1, low[rows] < most[rows])]
-        extended = np.isfinite(worst) & (high <= most)
-        counts[extended] = high[extended]
-        return profiles, counts, worst
+        return profiles, np.where(high <= most, high, counts), worst
 
     def _worthwhile(self, worst: Array, reference: Array) -> NDArray[np.bool_]:
         """Whether a gain is more than what judging at single frequencies and rounding may hide."""

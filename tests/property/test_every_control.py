@@ -199,7 +199,7 @@ def known_today(draw, controller):
 
 
 def places(case):
-    """How many lines of settings were written; none where the program or the machine is refused."""
+    """At how many places settings were written; none where program or machine are refused."""
     program, machine, chosen = case
     try:
         return process(program, machine, **chosen).settings.places
