@@ -219,9 +219,9 @@ class Reader:
         number = place[0] + first
         if number < self._by_hand or self.dialect.text.klartext or not self.can_run():
             return first
-        said = self._computable(data, lines, first)
+        said, seen = self._computable(data, lines, first)
         if len(said) < FEWEST_COMPUTED:
-            self._by_hand = number + len(said) + 1
+            self._by_hand = number + seen
             return first
         computed = Computed([form for _, form in said], self.state, self.dialect)
         spelled = computed.lines(lines, first)
@@ -232,16 +232,17 @@ class Reader:
         stop = self.read_run(spelled, 0, last, (number, place[1])) if last else 0
         computed.take_back(stop)
         if stop < FEWEST_COMPUTED:
-            # Were every other line one that is not sure, looking ahead each time would be for
-            # nothing: double the distance instead.
+            # Where every other line is one that is not sure, looking ahead is for nothing.
             self._by_hand = number + stop + self._patience
             self._patience *= 2
         else:
             self._patience = FEWEST_COMPUTED
         return first + stop
 
-    def _computable(self, data: bytes, lines: Lines, first: int) -> list[tuple[bytes, Form]]:
-        """Lines from one on that a run may hold, up to where many plain ones follow."""
+    def _computable(
+        self, data: bytes, lines: Lines, first: int
+    ) -> tuple[list[tuple[bytes, Form]], int]:
+        """Lines that a run may hold, up to where many plain ones follow; and how many were seen."""
         last = min(first + MOST_COMPUTED, len(lines))
         places = zip(lines.begin[first:last].tolist(), lines.end[first:last].tolist(), strict=True)
         said: list[tuple[bytes, Form]] = []
@@ -250,12 +251,12 @@ class Reader:
             text = data[begin:end]
             form = self._form(text)
             if form is None:
-                break
+                return said, len(said) + 1
             said.append((text, form))
             plain = 0 if form.computes else plain + 1
             if plain == SHORT_RUN:
-                return said[:-plain]
-        return said
+                return said[:-plain], len(said)
+        return said, len(said)
 
     def _form(self, text: bytes) -> Form | None:
         """What a run may make of a line, as it is remembered."""

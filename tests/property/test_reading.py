@@ -240,3 +240,33 @@ def test_numbers_read_many_at_a_time_are_those_of_float(numbers):
     source = np.frombuffer(text.encode(), dtype=np.uint8)
     value = parse_numbers(source, begin, end)
     assert list(map(str, value.tolist())) == [str(float(number)) for number in numbers]
+
+
+TURNING = [
+    *("G0 X1. A90.", "G1 X2. A-45. F90.", "A100.5", "A359.", "A-0.", "A-360.", "G0 A0.", "A720."),
+    *("G0 A12.345", "X3. A12.345", "G1 A180.", "G0 A190.", "B30.", "G0 B-30. Y2.", "C15. Z1."),
+    *("G1 X5.", "", "G0 X4. F80.", "A89.9999999999", "G0 A450.", "A-1.5 B2. C-3.", "G0 C0."),
+]
+WRAPS = [None, "none", "shortest", "sign"]
+
+
+@settings(QUICK, max_examples=150)
+@given(st.sampled_from(WRAPS), st.sampled_from(WRAPS), st.booleans(), st.data())
+def test_quick_and_careful_reading_agree_where_rotary_axes_turn(wrap, other, known, data):
+    dialect = data.draw(st.sampled_from(["linuxcnc", "fanuc", "haas", "mach", "grbl", "siemens"]))
+    run = st.lists(st.sampled_from(TURNING), min_size=8, max_size=40)
+    odd = st.lists(st.sampled_from(["G91", "G90", "G2 X9. Y2. I4. A5.", "A#1", "M6", "F0.", "G93"]))
+    parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
+    begin = begun(dialect)[:3] + (["A5. B-5.", "G0 C359."] if known else [])
+    lines = [*begin, *(line for run, odd in parts for line in (*run, *odd[:2]))]
+    wraps = {axis: wrap for axis, wrap in (("A", wrap), ("B", other)) if wrap is not None}
+    start = Start(wraps=wraps, positions={"A": 725.0, "B": 0.0, "C": 0.0} if known else {})
+    assert differences("\n".join([*lines, ""]).encode(), start, dialect) == []
+
+
+@pytest.mark.parametrize("wrap", WRAPS)
+def test_runs_are_taken_at_once_where_rotary_axes_turn(wrap):
+    begin = [*begun("linuxcnc")[:3], *["G1 X1. A5.", "X2. A-6.", "X3. A7."] * 500]
+    start = Start(wraps={} if wrap is None else {"A": wrap})
+    read = read_program(io.BytesIO("\n".join(begin).encode()), dialect="linuxcnc", start=start)
+    assert read.steps < 50

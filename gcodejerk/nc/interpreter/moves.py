@@ -9,6 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import LINEAR, PLANES, Dialect
 from gcodejerk.nc.dialects.gcodes import G28, G91
@@ -53,16 +56,52 @@ def _turn(state: State, axis: int, angle: float, step: Step) -> float:
     stands = state.position[axis]
     wrap = state.wraps[axis]
     step.way_unknown |= wrap is None and stands != angle
-    if wrap is None and math.copysign(1.0, angle) < 0.0:
-        return NAN  # by its sign alone, some controls go backwards, to the positive angle
-    if wrap in (None, "none"):
+    if wrap == "none":
         return angle
+    if wrap is None:
+        # By its sign alone, some controls go backwards, to the positive angle.
+        return NAN if math.copysign(1.0, angle) < 0.0 else angle
     end = way_round(stands, angle, wrap)
     step.way_unknown |= end != end
-    moves = end != stands and (wrap == "sign" or not 0.0 <= stands < 360.0)
-    if moves or end != angle:
-        step.turned |= 1 << axis
+    step.turned |= _turns(stands, angle, end, wrap) << axis
     return end
+
+
+def _turns(stands: float, angle: float, end: float, wrap: str) -> bool:
+    """Whether the word alone does not say which way an axis goes that counts turns."""
+    moves = end != stands and (wrap == "sign" or not 0.0 <= stands < 360.0)
+    return moves or end != angle
+
+
+def turn_by_turn(
+    stands: float, angles: NDArray[np.float64], wrap: str | None
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Where a rotary axis stands behind each of many absolute words, as `go_straight` has it.
+
+    Parameters
+    ----------
+    stands : float
+        Where it stands in front of them. [deg]
+    angles : ndarray, shape (n,)
+        What they say. [deg]
+    wrap : str or None
+        ``shortest`` or ``sign`` (`way_round`); None: nobody says which way it goes.
+
+    Returns
+    -------
+    ends : ndarray, shape (n,)
+        NaN where nobody knows. [deg]
+    turned : ndarray of bool, shape (n,)
+        The word alone does not say which way.
+    """
+    if wrap is None:
+        return np.where(np.signbit(angles), NAN, angles), np.zeros(len(angles), dtype=bool)
+    ends, turned = np.empty(len(angles)), np.empty(len(angles), dtype=bool)
+    for k, angle in enumerate(angles.tolist()):
+        ends[k] = end = way_round(stands, angle, wrap)
+        turned[k] = _turns(stands, angle, end, wrap)
+        stands = end
+    return ends, turned
 
 
 def go_to_machine_position(state: State, values: dict[str, float], dialect: Dialect) -> None:

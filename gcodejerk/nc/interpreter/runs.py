@@ -21,6 +21,7 @@ from gcodejerk.nc.interpreter.arcs import doubtful
 from gcodejerk.nc.interpreter.eligibility import barred
 from gcodejerk.nc.interpreter.limits import beyond_path
 from gcodejerk.nc.interpreter.modal import NAN, State
+from gcodejerk.nc.interpreter.moves import turn_by_turn
 from gcodejerk.nc.interpreter.rapids import FEED_UNKNOWN, GIVES_FEED, USES_FEED, RapidLog
 from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines, Words, read_words
@@ -70,6 +71,18 @@ def _spread(
     return np.repeat(held, np.diff(edges))
 
 
+def turning(state: State, *, unstated: bool = False) -> int:
+    """The bits of rotary axes whose absolute words do not say by themselves where they lead.
+
+    `unstated`: of those alone that nobody says the way of.
+    """
+    if state.distance != G90:
+        return 0
+    plain = ("none", "shortest", "sign") if unstated else ("none",)
+    wraps = enumerate(state.wraps)
+    return sum(1 << k for k, wrap in wraps if AXES[k] not in LINEAR and wrap not in plain)
+
+
 def sure_lines(
     letters: NDArray[np.uint32], motion: NDArray[np.uint8], state: State, dialect: Dialect
 ) -> NDArray[np.bool_]:
@@ -88,11 +101,7 @@ def sure_lines(
         sure = np.where(is_arc, by_centre | by_radius | silent, sure)
     if dialect.refuses.bare_centre:
         sure = sure & ((arc_words == 0) | (letters & AXIS_BITS != 0))
-    counting = sum(
-        1 << k for k, wrap in enumerate(state.wraps) if AXES[k] not in LINEAR and wrap != "none"
-    )
-    if counting and state.distance == G90:
-        sure = sure & (letters & np.uint32(counting) == 0)  # where they end, the way they go says
+    sure = sure & (~is_arc | (letters & np.uint32(turning(state)) == 0))
     if state.feed_mode == 93:
         feeding = AXIS_BITS | (BIT["G"] if dialect.refuses.bare_inverse else 0)
         sure = sure & ((motion == 0) | (letters & feeding == 0) | (letters & BIT["F"] != 0))
@@ -170,7 +179,7 @@ def run_plain(
     rapid = np.flatnonzero(fast)
     feeds = run.history("F", rapid)
     events[feeds.words.line] = GIVES_FEED
-    start, target, feed = run.told(feeds, rapid)
+    start, target, turned, feed = run.told(feeds, rapid)
     row = rapid + first
     said = letters.take(rapid)
     columns: dict[str, Any] = asdict(ModeColumns.of(state))
@@ -182,6 +191,7 @@ def run_plain(
         start=start,
         target=target,
         words=named.take(rapid),
+        turned=turned,
         feed=NAN if dialect.feed_lost else feed,
         # F without a decimal point would have made its line odd.
         feed_whole=feeds.behind == 0 if state.feed_whole else False,
@@ -300,28 +310,40 @@ class _Run:
 
     def told(
         self, feeds: _History, rapid: NDArray[np.intp]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
-        """Where each rapid starts and ends, and its F; the state is moved to the run's end."""
+    ) -> tuple[
+        NDArray[np.float64], NDArray[np.float64], NDArray[np.uint16], NDArray[np.float64] | float
+    ]:
+        """Where each rapid starts and ends, which axes turn, and its F.
+
+        The state is moved to the run's end.
+        """
         state = self.state
         start = np.empty((len(rapid), len(AXES)))
         start[:] = state.position
         target, feed = start.copy(), state.feed
+        turned = np.zeros(len(rapid), dtype=np.uint16)
         axes = _axes_of(int(np.bitwise_or.reduce(self.letters)))
-        summed = state.distance == G91
+        summed, turns = state.distance == G91, turning(state)
         histories = [self.history(AXES[axis], rapid) for axis in axes]
-        which = [history.which(summed) for history in histories]
+        every = [summed or bool(turns >> axis & 1) for axis in axes]
+        which = [history.which(each) for history, each in zip(histories, every, strict=True)]
         given = feeds.which(summed=False)
         words = (history.words for history in histories)
         *numbers, fed = read_words([*zip(words, which, strict=True), (feeds.words, given)])
         for axis, history, index, values in zip(axes, histories, which, numbers, strict=True):
-            held = history.held(state.position[axis], index, values * state.scale(axis), summed)
+            here, values = state.position[axis], values * state.scale(axis)
+            if turns >> axis & 1:
+                values, turned_by = turn_by_turn(here, values, state.wraps[axis])
+                named = history.behind > history.before
+                turned[named] |= turned_by.take(history.before[named]) * np.uint16(1 << axis)
+            held = history.held(here, index, values, summed)
             start[:, axis], target[:, axis] = held.take(history.before), held.take(history.behind)
             state.position[axis] = float(held[-1])
         if not len(given):
-            return start, target, feed
+            return start, target, turned, feed
         held = feeds.held(feed, given, fed, summed=False)
         state.feed = float(held[-1])
-        return start, target, held.take(feeds.behind)
+        return start, target, turned, held.take(feeds.behind)
 
 
 def _axes_of(bits: int) -> list[int]:
@@ -361,6 +383,8 @@ def reasons(
         reason[(linear != 0) & (moving != linear)] = _INDEX[Reason.MIXED_AXES]
     if dialect.extrudes and not dialect.uses:
         reason[letters & BIT["E"] != 0] = _INDEX[Reason.OTHER_WORDS]
+    if ways := turning(state, unstated=True):
+        reason[moving & np.uint16(ways) != 0] = _INDEX[Reason.ROTARY_WAY]
     if dialect.path_has_to_be_stated and not state.path:
         reason[:] = _INDEX[Reason.PATH_UNKNOWN]
     if dialect.lengths_only and state.feed_unit != state.unit:

@@ -21,7 +21,14 @@ from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.dialects.gcodes import G90
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog
-from gcodejerk.nc.interpreter.runs import AXIS_BITS, CENTRES, can_run, reasons, sure_lines
+from gcodejerk.nc.interpreter.runs import (
+    AXIS_BITS,
+    CENTRES,
+    can_run,
+    reasons,
+    sure_lines,
+    turning,
+)
 from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines
 from gcodejerk.reasons import CERTAIN
@@ -87,6 +94,7 @@ def run_unfed(
     does = np.where(stated >= 0, stated, motion)
     sure = sure_lines(letters, np.maximum(does, 0).astype(np.uint8), state, dialect)
     # Nor where G1 is stated and nothing moves, or G80 may be in force.
+    sure &= letters & np.uint32(turning(state)) == 0
     sure &= (letters & BIT["F"] == 0) & np.where(moves, does >= 0, stated < 1)
     stop = len(sure) if sure.all() else int(np.argmin(sure))
     if stop == 0:
