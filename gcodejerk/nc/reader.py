@@ -206,13 +206,12 @@ class Reader:
         what = (self.state, self.log, lines, first, last, place, self.dialect)
         executor = self.runner.executor
         if self._unfed:
-            stop, certain = run_unfed(*what, executor.stays)
+            taken = run_unfed(*what, executor.stays)
         else:
-            stop, certain = run_plain(*what, executor.rapid_feed)
-        self.blocks += int(np.count_nonzero(lines.letters[first:stop]))
-        if certain is not None:
-            self.runner.ask(certain)
-        return stop
+            taken = run_plain(*what, executor.rapid_feed)
+        self.blocks += int(np.count_nonzero(lines.letters[first : taken.stop]))
+        self.runner.took(taken)
+        return taken.stop
 
     def read_computed(self, data: bytes, lines: Lines, first: int, place: tuple[int, int]) -> int:
         """Take lines of a chunk whose numbers are computed; the first that was not taken."""

@@ -66,7 +66,7 @@ def differences(data: bytes, start: Start | None = None, dialect: str = "linuxcn
     found += [f"state.{name}" for name in MODES if getattr(ends[0], name) != getattr(ends[1], name)]
     if ends[0].variables != ends[1].variables:
         found.append("state.variables")
-    for name in ("position", "feed", "g5x", "g92", "tool"):
+    for name in ("position", "meant", "feed", "g5x", "g92", "tool"):
         if not np.array_equal(getattr(ends[0], name), getattr(ends[1], name), equal_nan=True):
             found.append(f"state.{name}")
     return found

@@ -242,6 +242,36 @@ def test_numbers_read_many_at_a_time_are_those_of_float(numbers):
     assert list(map(str, value.tolist())) == [str(float(number)) for number in numbers]
 
 
+UNTOLD = [
+    *((), ("G90",), ("G91",), ("G21",), ("G17 G90",), ("G90 G94",), ("G18 G94",), ("F100.",)),
+    *(("G40 G90", "G21"), ("G17", "G94", "G20"), ("G90 G21 G40 G17", "G0 X1. Y2. Z3."), ("G93",)),
+]
+"""What a program may state; it depends on the control what is known of the rest."""
+LOSSES = ["G999", "M428", "G41 D1", "G42 D1 X5. Y5.", "G40", "G40 X1.", "G0 G91", "X1 Y1 X2", "G18"]
+MORE = ["G2 X3. Z1. I1. K0.", "G3 Y0. Z1. R5.", "I1. J1.", "G0 I2. J0.", "G2 I1.", "X0.", "R4."]
+
+
+@settings(QUICK, max_examples=250)
+@given(st.sampled_from(sorted(DIALECTS)), st.sampled_from(UNTOLD), st.booleans(), st.data())
+def test_quick_and_careful_reading_agree_where_little_is_known(dialect, stated, known, data):
+    run = st.lists(st.sampled_from([*PLAIN, *MORE]), min_size=8, max_size=40)
+    odd = st.lists(st.sampled_from([*LOSSES, *(line for told in UNTOLD for line in told)]))
+    parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
+    lines = [*stated, *(line for run, odd in parts for line in (*run, *odd[:2]))]
+    start = Start(positions={"X": 1.0, "Y": -2.0, "Z": 5.0} if known else {})
+    assert differences("\n".join([*lines, ""]).encode(), start, dialect) == []
+
+
+@pytest.mark.parametrize(
+    "dialect", ["fanuc", "haas", "fanuc-lathe-b", "linuxcnc", "mach", "siemens"]
+)
+@pytest.mark.parametrize("stated", ["", "G90", "G21", "G94 G21", "G90 G21 G40", "G41 D1", "M999"])
+def test_runs_are_taken_at_once_whatever_is_not_known(dialect, stated):
+    lines = [stated, "G0 X1. Z1.", "G1 X2. F90.", *["X3. Z2.", "G1 X4. Z-1.", "G0 X5."] * 500]
+    data = "\n".join(lines).encode()
+    assert read_program(io.BytesIO(data), dialect=dialect).steps < 60
+
+
 TURNING = [
     *("G0 X1. A90.", "G1 X2. A-45. F90.", "A100.5", "A359.", "A-0.", "A-360.", "G0 A0.", "A720."),
     *("G0 A12.345", "X3. A12.345", "G1 A180.", "G0 A190.", "B30.", "G0 B-30. Y2.", "C15. Z1."),
@@ -270,3 +300,59 @@ def test_runs_are_taken_at_once_where_rotary_axes_turn(wrap):
     start = Start(wraps={} if wrap is None else {"A": wrap})
     read = read_program(io.BytesIO("\n".join(begin).encode()), dialect="linuxcnc", start=start)
     assert read.steps < 50
+
+
+GAPS = [
+    *(
+        "G0 X  5.000 Y -2.5",
+        "G1 Z   -1.500",
+        "X 3.",
+        "G 1 X5. F 90",
+        "N 7 G0 X1.",
+        "(X 5)",
+        "Y\t2.",
+    ),
+    *("G0 Z  15.", "G2 X 3. Y 1. I 1. J0.", "X 0", "G1X 1.Y 2.", "z 4.", "G0 A 5. (and B 6)"),
+]
+BAD_GAPS = [
+    *(
+        "X 1 2.5",
+        "X - 5.",
+        "X . 5",
+        "G 0 1",
+        "X  5. X 4.",
+        "Z 5 5",
+        "(print, X 5)",
+        "X 5 (a",
+        "N X 5",
+    ),
+    *(
+        "E 5.",
+        "X #1",
+        "G1 2",
+        "S 5",
+        "T 1",
+        "F 0",
+        "X 0X 5",
+        "M 30 X 5",
+        "X 5. 0",
+        "X 123456789012",
+    ),
+]
+
+
+@settings(QUICK, max_examples=200)
+@given(st.sampled_from(sorted(DIALECTS)), st.data())
+def test_quick_and_careful_reading_agree_where_blanks_stand_in_front_of_numbers(dialect, data):
+    run = st.lists(st.sampled_from([*GAPS, *PLAIN]), min_size=8, max_size=40)
+    odd = st.lists(st.sampled_from(BAD_GAPS), max_size=2)
+    parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
+    lines = ["G21 G90 G94 G17 G40", "G0 X0. Y0. Z0.", "G1 X1. F100."]
+    lines += [line for run, odd in parts for line in (*run, *odd)]
+    assert differences("\n".join([*lines, ""]).encode(), Start(), dialect) == []
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "grbl", "mach", "rs274"])
+def test_runs_are_taken_at_once_where_blanks_stand_in_front_of_numbers(dialect):
+    lines = ["G21 G90 G94 G17 G40", *["G0 X  1.000 Y  5.500", "G1 X 2.5 F  90"] * 500, ""]
+    assert read_program(io.BytesIO("\n".join(lines).encode()), dialect=dialect).steps < 60

@@ -204,7 +204,8 @@ def why_left_alone(
     if effects & _FRAME_CHANGES or not dialect.tool_frame.isdisjoint(codes.values):
         return Reason.FRAME_CHANGE
     if state.compensation != G40:
-        return _why_compensated(step, state)
+        step.since = unknown_since(state)
+        return why_compensated(state)
     if state.transforms.get(COMPENSATION, False) is not False:
         return Reason.CUTTER_COMPENSATION
     if state.transformed:
@@ -212,13 +213,10 @@ def why_left_alone(
     return barred(state) or _check_move(codes, step, state, dialect)
 
 
-def _why_compensated(step: Step, state: State) -> Reason:
+def why_compensated(state: State) -> Reason:
     """Say why cutter compensation is, or may be, in force."""
     loss = state.lost.get("compensation") if state.compensation is None else None
-    if loss is None:
-        return Reason.CUTTER_COMPENSATION
-    step.since = loss.line
-    return loss.reason
+    return Reason.CUTTER_COMPENSATION if loss is None else loss.reason
 
 
 def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Reason | None:
@@ -230,9 +228,7 @@ def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
         return Reason.NO_MOTION
     if _beyond_path(step, state, named):
         return Reason.LIMIT_SET
-    for mode in ("distance", "unit"):
-        if state.unknown(mode) and mode in state.lost:
-            step.since = step.since or state.lost[mode].line
+    step.since = unknown_since(state)
     if state.distance is None:
         return Reason.DISTANCE_MODE_UNKNOWN
     if state.unit is None:
@@ -241,6 +237,16 @@ def _check_move(codes: Codes, step: Step, state: State, dialect: Dialect) -> Rea
         return Reason.START_UNKNOWN
     mixed = len({AXES[k] in LINEAR for k in named if step.start[k] != step.end[k]}) > 1
     return _check_known_move(codes, step, state, dialect, mixed=mixed)
+
+
+def unknown_since(state: State) -> Line | None:
+    """The line that has made unknown what a move is left alone for.
+
+    That is the compensation, or where none is in force the distance mode, or the unit.
+    """
+    modes = ("distance", "unit") if state.compensation == G40 else ("compensation",)
+    losses = (state.lost.get(mode) for mode in modes if state.unknown(mode))
+    return next((loss.line for loss in losses if loss is not None and loss.line is not None), None)
 
 
 def _beyond_path(step: Step, state: State, named: list[int]) -> bool:

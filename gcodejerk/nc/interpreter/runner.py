@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 from gcodejerk.errors import Place
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.interpreter.eligibility import Call, Step
+from gcodejerk.nc.interpreter.eligibility import Call, Step, unknown_since
 from gcodejerk.nc.interpreter.execute import Executor
 from gcodejerk.nc.interpreter.initial import initial_state
 from gcodejerk.nc.interpreter.modal import NAN, State, join
 from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED, RapidLog
+from gcodejerk.nc.interpreter.runs import Taken
 from gcodejerk.nc.interpreter.visits import EXACT, Row
 from gcodejerk.nc.text.block import Line
 from gcodejerk.nc.text.chunks import Chunk
@@ -99,11 +100,12 @@ class Runner:
         self.steps += 1
         executor.state.line = line
         before = executor.state.copy() if block.block_delete else None
+        ended = executor.state.ended
         step = executor.run(block)
         if not (visit and line.number in self.log.visits.rows):  # else said on the first pass
             self._name_problem(step, line)
-        if not ((before is not None or uncertain) and step.feed_event == GIVES_FEED):
-            self.log.feed_event(step.feed_event)
+        if not ended:
+            self._feed_event(step.feed_event, surely=before is None and not uncertain)
         self.log.habits |= step.habit
         self.log.outputs |= step.outputs
         if step.limits and self.limited is None:
@@ -122,6 +124,11 @@ class Runner:
         if before is not None:
             executor.state = join(before, after) if goes_on else before
         return None if goes_on else after
+
+    def _feed_event(self, event: int, *, surely: bool) -> None:
+        """Enter what a block does with F; one that may not run replaces none."""
+        if surely or event != GIVES_FEED:
+            self.log.feed_event(event)
 
     def _name_problem(self, step: Step, line: Line) -> None:
         """Tell the user of a block that the control refuses, or of a code nobody knows."""
@@ -152,11 +159,8 @@ class Runner:
     def _rapid(self, step: Step, line: Line, *, uncertain: bool, visit: bool) -> None:
         """Enter a rapid."""
         state, reason = self.state, step.reason
-        if step.since is not None and not uncertain:
-            self._lost[step.since.number] = (
-                step.since,
-                self._lost.get(step.since.number, (0, 0))[1] + 1,
-            )
+        if not uncertain:
+            self._count_lost(step.since, 1)
         if uncertain and reason not in (Reason.AFTER_END, Reason.BLOCK_DELETE):
             reason = Reason.SUBPROGRAM
         speed = NAN
@@ -177,6 +181,18 @@ class Runner:
             self.log.visit(line.number, reason, row)
         else:
             self.log.add(reason, row)
+
+    def took(self, taken: Taken) -> None:
+        """Note what a run of lines, taken at once, has said."""
+        if taken.certain is not None:
+            self.ask(taken.certain)
+        self._count_lost(unknown_since(self.state), taken.unknown)
+
+    def _count_lost(self, since: Line | None, rapids: int) -> None:
+        """Count rapids that are left alone for what is not known since a line."""
+        if since is not None and rapids:
+            _, before = self._lost.get(since.number, (since, 0))
+            self._lost[since.number] = since, before + rapids
 
     def enter_unreached(self, lines: Iterable[Line]) -> None:
         """Enter rapids that no pass has come to, as far as they can be told."""

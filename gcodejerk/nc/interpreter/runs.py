@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LEFT_OVER, LINEAR, PLANES, Dialect
-from gcodejerk.nc.dialects.gcodes import G40, G90, G91
+from gcodejerk.nc.dialects.gcodes import G40
 from gcodejerk.nc.interpreter.arcs import doubtful
-from gcodejerk.nc.interpreter.eligibility import barred
+from gcodejerk.nc.interpreter.eligibility import barred, why_compensated
 from gcodejerk.nc.interpreter.limits import beyond_path
 from gcodejerk.nc.interpreter.modal import NAN, State
-from gcodejerk.nc.interpreter.moves import turn_by_turn
 from gcodejerk.nc.interpreter.rapids import FEED_UNKNOWN, GIVES_FEED, USES_FEED, RapidLog
+from gcodejerk.nc.interpreter.run_words import Run, axes_of, turning
 from gcodejerk.nc.interpreter.visits import ModeColumns
-from gcodejerk.nc.text.words import BIT, Lines, Words, read_words
+from gcodejerk.nc.text.words import BIT, Lines
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.start import RapidFeed
 from gcodejerk.units import SECONDS_PER_MINUTE
@@ -34,6 +34,8 @@ _ROTARY_BITS = sum(BIT[axis] for axis in AXES if axis not in LINEAR)
 CENTRES = BIT["I"] | BIT["J"] | BIT["K"]
 _ARC_WORDS = CENTRES | BIT["R"]
 _INDEX = {reason: index for index, reason in enumerate(REASONS)}
+_AFTER_END = [_INDEX[Reason.AFTER_END]]
+_UNKNOWN_MODES = [_INDEX[Reason.DISTANCE_MODE_UNKNOWN], _INDEX[Reason.UNITS_UNKNOWN]]
 _MOTIONS = (0, 10, 20, 30)
 _BESIDE = "FSE"
 """Letters beside a straight move that some dialects have no use for."""
@@ -44,22 +46,55 @@ def _bits(axes: Iterable[str]) -> np.uint16:
     return np.uint16(sum(BIT[axis] for axis in axes if axis in AXES))
 
 
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What was taken of a run of lines.
+
+    Attributes
+    ----------
+    stop : int
+        The first line that was not executed.
+    certain : int or None
+        Number, in the file, of the first certain rapid.
+    unknown : int
+        Rapids that are left alone for what `eligibility.unknown_since` asks about.
+    """
+
+    stop: int
+    certain: int | None = None
+    unknown: int = 0
+
+    @classmethod
+    def of(
+        cls, stop: int, numbers: NDArray[np.int64], reason: NDArray[np.uint8], state: State
+    ) -> Taken:
+        """What holds of rapids with these line numbers and reasons."""
+        certain = np.flatnonzero(reason == CERTAIN)
+        compensated = state.compensation != G40
+        unknown = np.isin(reason, _AFTER_END if compensated else _UNKNOWN_MODES, invert=compensated)
+        first = int(numbers[certain[0]]) if len(certain) else None
+        return cls(stop, first, int(np.count_nonzero(unknown)))
+
+
 def can_run(state: State, dialect: Dialect) -> bool:
     """Whether the state is one that runs are computed in."""
     return (
         (state.motion in _MOTIONS or not dialect.modal_motion)
-        and state.compensation == G40
-        and state.distance is not None
-        and state.diameter is not None
-        and (state.plane in ARC_CENTRES or dialect.text.klartext)  # whose arcs are no plain lines
-        and state.feed_mode is not None
-        and (state.unit is not None or not state.lost)
+        and _plain_state(state, dialect)
         and state.touched is None
         and state.cycle is None
         and state.bars.get(LEFT_OVER, False) is False
         and not any(on is not False for on in state.transforms.values())
         and not any(on is not False for on in state.shifted.values())
     )
+
+
+def _plain_state(state: State, dialect: Dialect) -> bool:
+    """Whether plain lines say in these modes what they say in others."""
+    if dialect.text.klartext:
+        # Its arcs are no plain lines; and R0 on a plain one is not read.
+        return state.compensation == G40
+    return state.plane is None or state.plane in ARC_CENTRES
 
 
 def _spread(
@@ -71,18 +106,6 @@ def _spread(
     return np.repeat(held, np.diff(edges))
 
 
-def turning(state: State, *, unstated: bool = False) -> int:
-    """The bits of rotary axes whose absolute words do not say by themselves where they lead.
-
-    `unstated`: of those alone that nobody says the way of.
-    """
-    if state.distance != G90:
-        return 0
-    plain = ("none", "shortest", "sign") if unstated else ("none",)
-    wraps = enumerate(state.wraps)
-    return sum(1 << k for k, wrap in wraps if AXES[k] not in LINEAR and wrap not in plain)
-
-
 def sure_lines(
     letters: NDArray[np.uint32], motion: NDArray[np.uint8], state: State, dialect: Dialect
 ) -> NDArray[np.bool_]:
@@ -91,19 +114,20 @@ def sure_lines(
     is_arc = motion >= 2
     sure: NDArray[np.bool_] = arc_words == 0
     if is_arc.any():
-        assert state.plane is not None
-        plane = PLANES[state.plane]
-        allowed = sum(BIT[letter] for letter in ARC_CENTRES[state.plane])
+        # In a plane that is not known, any centre may be meant, and any axis.
+        plane = state.plane
+        allowed = sum(BIT[i] for i in ARC_CENTRES[plane]) if plane else CENTRES
         by_centre = (arc_words != 0) & (arc_words & ~np.uint32(allowed) == 0)
-        in_plane = BIT[plane[0]] | BIT[plane[1]]
+        in_plane = sum(BIT[i] for i in PLANES[plane][:2]) if plane else AXIS_BITS
         by_radius = (arc_words == BIT["R"]) & (letters & in_plane != 0)
         silent = letters & (AXIS_BITS | _ARC_WORDS | BIT["G"]) == 0
         sure = np.where(is_arc, by_centre | by_radius | silent, sure)
     if dialect.refuses.bare_centre:
         sure = sure & ((arc_words == 0) | (letters & AXIS_BITS != 0))
     sure = sure & (~is_arc | (letters & np.uint32(turning(state)) == 0))
-    if state.feed_mode == 93:
-        feeding = AXIS_BITS | (BIT["G"] if dialect.refuses.bare_inverse else 0)
+    if state.feed_mode in (93, None):
+        feeding = AXIS_BITS if state.feed_mode == 93 else 0
+        feeding |= BIT["G"] if dialect.refuses.bare_inverse else 0
         sure = sure & ((motion == 0) | (letters & feeding == 0) | (letters & BIT["F"] != 0))
     if not dialect.modal_motion:
         sure = sure & ((letters & BIT["G"] != 0) | (letters & ~np.uint32(BIT["N"]) == 0))
@@ -125,7 +149,7 @@ def run_plain(
     place: tuple[int, int],
     dialect: Dialect,
     rapid_feed: RapidFeed | None,
-) -> tuple[int, int | None]:
+) -> Taken:
     """Execute the plain lines first:last of a chunk, or as many of them as are sure.
 
     Parameters
@@ -147,10 +171,8 @@ def run_plain(
 
     Returns
     -------
-    stop : int
-        The first line that was not executed.
-    certain : int or None
-        Number, in the file, of the first certain rapid.
+    Taken
+        How many of them, and what the rapids among them are left alone for.
     """
     letters = lines.letters[first:last]
     codes = lines.words("G", first, last)
@@ -165,7 +187,7 @@ def run_plain(
         last = first + int(np.argmin(sure))
         letters, motion = letters[: last - first], motion[: last - first]
     if last == first:
-        return first, None
+        return Taken(first)
 
     named = (letters & AXIS_BITS).astype(np.uint16)
     moves = (named != 0) | ((motion >= 2) & (letters & CENTRES != 0))
@@ -173,13 +195,15 @@ def run_plain(
         moves & ((motion != 0) | dialect.feed_on_rapids), np.uint8(USES_FEED), np.uint8(0)
     )
     fast = (named != 0) & (motion == 0)
-    run = _Run(state, lines, letters, first)
+    run = Run(state, lines, letters, first)
     fed = run.counted((named != 0) & (motion == 1), rapid_feed)
     fast[fed] = True
     rapid = np.flatnonzero(fast)
     feeds = run.history("F", rapid)
     events[feeds.words.line] = GIVES_FEED
     start, target, turned, feed = run.told(feeds, rapid)
+    if state.compensation != G40:
+        run.displace(np.flatnonzero(moves), rapid, start, target)
     row = rapid + first
     said = letters.take(rapid)
     columns: dict[str, Any] = asdict(ModeColumns.of(state))
@@ -211,8 +235,7 @@ def run_plain(
         log.habits |= bool((feeding & (letters & BIT["S"] != 0)).any())
     state.motion = _motion_behind(letters, motion, state, dialect)
     state.feed_whole = bool(state.feed_whole) and not len(feeds.words.line)
-    certain = np.flatnonzero(columns["reason"] == CERTAIN)
-    return last, int(row[certain[0]]) + place[0] if len(certain) else None
+    return Taken.of(last, row + place[0], columns["reason"], state)
 
 
 def _doubt_arcs(
@@ -227,6 +250,8 @@ def _doubt_arcs(
     arcs = np.flatnonzero(sure & (motion >= 2) & (letters & (AXIS_BITS | _ARC_WORDS) != 0))
     if state.unit is None:
         sure[arcs] = letters[arcs] & _ROTARY_BITS == 0
+    elif state.plane is None:
+        sure[arcs] = False
     else:
         sure[arcs] = ~doubtful(state, lines, letters, arcs, first)
 
@@ -243,114 +268,6 @@ def _motion_behind(
     return int(motion[blocks[-1]]) * 10 if letters[blocks[-1]] & BIT["G"] else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _History:
-    """The words of one letter in a run, and how many stand in front of some lines, and behind."""
-
-    words: Words
-    before: NDArray[np.intp]
-    behind: NDArray[np.intp]
-
-    def which(self, summed: bool) -> NDArray[np.intp]:
-        """Words whose numbers matter: all where they are summed, else the last ones somewhere."""
-        matters = np.full(len(self.words.line) + 1, summed)
-        matters[self.before] = matters[self.behind] = matters[-1] = True
-        return np.flatnonzero(matters[1:])
-
-    def held(
-        self, before: float, which: NDArray[np.intp], values: NDArray[np.float64], summed: bool
-    ) -> NDArray[np.float64]:
-        """What holds behind each word, and in front of all, where that was `before`."""
-        held = np.empty(len(self.words.line) + 1)
-        held[0] = before
-        held[which + 1] = values
-        return np.add.accumulate(held) if summed else held
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Run:
-    """A run of plain lines, and what is in force in front of it."""
-
-    state: State
-    lines: Lines
-    letters: NDArray[np.uint32]
-    """Of the lines of the run."""
-    first: int
-    """The first of these in the chunk."""
-
-    def history(self, letter: str, rows: NDArray[np.intp]) -> _History:
-        """The words of a letter, as some lines see them."""
-        words = self.lines.words(letter, self.first, self.first + len(self.letters))
-        if not len(words.line):
-            none = np.zeros(len(rows), dtype=np.intp)
-            return _History(words, none, none)
-        stands = self.letters & BIT[letter] != 0
-        behind = np.cumsum(stands, dtype=np.intp).take(rows)
-        return _History(words, behind - stands.take(rows), behind)
-
-    def counted(self, feeding: NDArray[np.bool_], rapid_feed: RapidFeed | None) -> NDArray[np.intp]:
-        """Which of the feed moves count as rapids; the state stays where it is."""
-        state = self.state
-        rows = np.flatnonzero(feeding)
-        if rapid_feed is None or state.unit is None or state.feed_mode != 94:
-            return rows[:0]
-        feeds, summed = self.history("F", rows), False
-        which = feeds.which(summed)
-        (values,) = read_words([(feeds.words, which)])
-        feed = feeds.held(state.feed, which, values, summed).take(feeds.behind)
-        rows = rows[feed == rapid_feed.feed]
-        z, summed = AXES.index("Z"), state.distance == G91
-        heights = self.history("Z", rows)
-        which = heights.which(summed)
-        (values,) = read_words([(heights.words, which)])
-        held = heights.held(state.position[z], which, values * state.scale(z), summed)
-        begin, end = held.take(heights.before), held.take(heights.behind)
-        counted: NDArray[np.intp] = rows[rapid_feed.covers(rapid_feed.feed, begin, end, state.unit)]
-        return counted
-
-    def told(
-        self, feeds: _History, rapid: NDArray[np.intp]
-    ) -> tuple[
-        NDArray[np.float64], NDArray[np.float64], NDArray[np.uint16], NDArray[np.float64] | float
-    ]:
-        """Where each rapid starts and ends, which axes turn, and its F.
-
-        The state is moved to the run's end.
-        """
-        state = self.state
-        start = np.empty((len(rapid), len(AXES)))
-        start[:] = state.position
-        target, feed = start.copy(), state.feed
-        turned = np.zeros(len(rapid), dtype=np.uint16)
-        axes = _axes_of(int(np.bitwise_or.reduce(self.letters)))
-        summed, turns = state.distance == G91, turning(state)
-        histories = [self.history(AXES[axis], rapid) for axis in axes]
-        every = [summed or bool(turns >> axis & 1) for axis in axes]
-        which = [history.which(each) for history, each in zip(histories, every, strict=True)]
-        given = feeds.which(summed=False)
-        words = (history.words for history in histories)
-        *numbers, fed = read_words([*zip(words, which, strict=True), (feeds.words, given)])
-        for axis, history, index, values in zip(axes, histories, which, numbers, strict=True):
-            here, values = state.position[axis], values * state.scale(axis)
-            if turns >> axis & 1:
-                values, turned_by = turn_by_turn(here, values, state.wraps[axis])
-                named = history.behind > history.before
-                turned[named] |= turned_by.take(history.before[named]) * np.uint16(1 << axis)
-            held = history.held(here, index, values, summed)
-            start[:, axis], target[:, axis] = held.take(history.before), held.take(history.behind)
-            state.position[axis] = float(held[-1])
-        if not len(given):
-            return start, target, turned, feed
-        held = feeds.held(feed, given, fed, summed=False)
-        state.feed = float(held[-1])
-        return start, target, turned, held.take(feeds.behind)
-
-
-def _axes_of(bits: int) -> list[int]:
-    """The axes of which a bit is set."""
-    return [axis for axis in range(len(AXES)) if bits >> axis & 1]
-
-
 def reasons(
     state: State,
     letters: NDArray[np.uint32],
@@ -362,13 +279,15 @@ def reasons(
     named = (letters & AXIS_BITS).astype(np.uint16)
     if state.ended:
         return np.full(len(named), _INDEX[Reason.AFTER_END], dtype=np.uint8)
+    if state.compensation != G40:
+        return np.full(len(named), _INDEX[why_compensated(state)], dtype=np.uint8)
     if state.transformed:
         return np.full(len(named), _INDEX[Reason.ROTATION], dtype=np.uint8)
     bar = barred(state)
     if bar is not None:
         return np.full(len(named), _INDEX[bar], dtype=np.uint8)
     unknown, moving = (np.zeros(len(named), dtype=np.uint16) for _ in range(2))
-    for axis in _axes_of(int(np.bitwise_or.reduce(named, initial=0))):
+    for axis in axes_of(int(np.bitwise_or.reduce(named, initial=0))):
         begin, end, bit = start[:, axis], target[:, axis], np.uint16(1 << axis)
         unknown |= (np.isnan(begin) | np.isnan(end)) * bit
         moving |= (begin != end) * bit
@@ -397,4 +316,6 @@ def reasons(
     reason[unknown] = _INDEX[Reason.START_UNKNOWN]
     if state.unit is None:
         reason[moves | unknown] = _INDEX[Reason.UNITS_UNKNOWN]
+    if state.distance is None:
+        reason[moves | unknown] = _INDEX[Reason.DISTANCE_MODE_UNKNOWN]
     return reason

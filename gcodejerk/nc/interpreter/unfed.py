@@ -18,27 +18,28 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.nc.dialects.gcodes import G90
+from gcodejerk.nc.dialects.gcodes import G40, G90
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog
+from gcodejerk.nc.interpreter.run_words import turning
 from gcodejerk.nc.interpreter.runs import (
     AXIS_BITS,
     CENTRES,
+    Taken,
     can_run,
     reasons,
     sure_lines,
-    turning,
 )
 from gcodejerk.nc.interpreter.visits import ModeColumns
 from gcodejerk.nc.text.words import BIT, Lines
-from gcodejerk.reasons import CERTAIN
 
 _NOBODY_KNOWS = -1
 
 
 def can_run_unfed(state: State, dialect: Dialect) -> bool:
     """Whether the state is one that such runs are computed in."""
-    return state.distance == G90 and (can_run(state, dialect) or _without_motion(state, dialect))
+    plain = state.distance == G90 and state.compensation == G40
+    return plain and (can_run(state, dialect) or _without_motion(state, dialect))
 
 
 def _without_motion(state: State, dialect: Dialect) -> bool:
@@ -60,7 +61,7 @@ def run_unfed(
     place: tuple[int, int],
     dialect: Dialect,
     stays: bool,
-) -> tuple[int, int | None]:
+) -> Taken:
     """Execute the plain lines first:last of a chunk, or as many of them as are sure.
 
     Parameters
@@ -74,10 +75,8 @@ def run_unfed(
 
     Returns
     -------
-    stop : int
-        The first line that was not executed.
-    certain : int or None
-        Number, in the file, of the first certain rapid.
+    Taken
+        As of `runs.run_plain`.
     """
     letters = lines.letters[first:last]
     codes = lines.words("G", first, last)
@@ -98,7 +97,7 @@ def run_unfed(
     sure &= (letters & BIT["F"] == 0) & np.where(moves, does >= 0, stated < 1)
     stop = len(sure) if sure.all() else int(np.argmin(sure))
     if stop == 0:
-        return first, None
+        return Taken(first)
     letters, does, moves, centred = letters[:stop], does[:stop], moves[:stop], centred[:stop]
     doubted = (does >= 1) & (moves | ((does >= 2) & centred))
     lost = np.zeros_like(doubted) if stays else doubted
@@ -123,8 +122,7 @@ def run_unfed(
     if dialect.dark_rapids and state.spindle != 5 and not state.ended:
         log.habits |= bool((moves & (does >= 1) & (letters & BIT["S"] != 0)).any())
     state.motion = None if motion[stop - 1] < 0 else int(motion[stop - 1]) * 10
-    certain = np.flatnonzero(columns["reason"] == CERTAIN)
-    return first + stop, int(row[certain[0]]) + place[0] if len(certain) else None
+    return Taken.of(first + stop, row + place[0], columns["reason"], state)
 
 
 def _positions(

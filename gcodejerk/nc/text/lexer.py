@@ -1,15 +1,17 @@
 """The quick reading of a chunk: every plain line at once, as arrays.
 
 Rule: when in doubt a line is read with care. A plain line holds letters of a small vocabulary, each
-at most once and directly followed by a decimal number, with blanks between words and comments
-anywhere; G0 to G3 are its only codes. Whatever else stands on a line makes it one for the careful
-`tokenizer`.
+at most once and directly followed by a decimal number (or behind blanks, where blanks count
+nowhere), with blanks between words and comments anywhere; G0 to G3 are its only codes. Whatever
+else stands on a line makes it one for the careful `tokenizer`.
 
 Whether a line is plain shows in its `joints` and their distances: no number is read for that, but
 where its value decides.
 """
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +33,8 @@ _SHORT = (LONGEST + 1) // 2 - 1
 _IN_FRONT = 5
 """Digits in front of the point that make a long number one to be looked at."""
 _BITS = len(BIT)
+_GAP = re.compile(rb"([A-Za-z])([ \t]+)([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))")
+"""Blanks in front of a number, which may as well stand behind it."""
 
 
 def _weights() -> NDArray[np.int64]:
@@ -66,6 +70,9 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     # A line feed stands in front of the first line, and one behind the last.
     text = b"\n" * _PAD + data + (b"" if complete else b"\n") + b"\n" + b"0" * AROUND
     joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
+    if dialect.text.blanks == "anywhere" and _has_gaps(kind):
+        text = _GAP.sub(rb"\1\3\2", text)
+        joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
     joints = Joints(np.frombuffer(text, dtype=np.uint8), joint, kind)
     width = np.diff(joint, append=joint[-1])
     bad |= _misplaced(kind, width > 1)
@@ -97,6 +104,11 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
         letters[careful] = 0
         joints = Joints(joints.text, joint, _without(kind, at, np.flatnonzero(careful)))
     return Lines(begin, end - crlf, terminator, careful, letters, joints)
+
+
+def _has_gaps(kind: NDArray[np.uint8]) -> bool:
+    """Whether a blank may stand between a letter and its number, as in ``X 12.5``."""
+    return bool(((kind[:-1] >= LETTERS) & (kind[1:] == BLANK)).any())
 
 
 def _next(flags: Flags, far: int = 1) -> Flags:
