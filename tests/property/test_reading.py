@@ -13,6 +13,7 @@ from gcodejerk.errors import ProgramError
 from gcodejerk.nc import CERTAIN, DIALECTS, Start, parse_block, read_program, trace
 from gcodejerk.nc.dialects.dialect import LINEAR
 from gcodejerk.nc.text.numbers import AROUND, LONGEST, parse_numbers
+from gcodejerk.start import RapidFeed
 from gcodejerk.testing.programs import differences, programs
 
 QUICK = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
@@ -258,7 +259,10 @@ def test_quick_and_careful_reading_agree_where_little_is_known(dialect, stated, 
     odd = st.lists(st.sampled_from([*LOSSES, *(line for told in UNTOLD for line in told)]))
     parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
     lines = [*stated, *(line for run, odd in parts for line in (*run, *odd[:2]))]
-    start = Start(positions={"X": 1.0, "Y": -2.0, "Z": 5.0} if known else {})
+    start = Start(
+        positions={"X": 1.0, "Y": -2.0, "Z": 5.0} if known else {},
+        rapid_feed=data.draw(st.sampled_from([None, RapidFeed(90.0, -1.0)])),
+    )
     assert differences("\n".join([*lines, ""]).encode(), start, dialect) == []
 
 
@@ -356,3 +360,12 @@ def test_quick_and_careful_reading_agree_where_blanks_stand_in_front_of_numbers(
 def test_runs_are_taken_at_once_where_blanks_stand_in_front_of_numbers(dialect):
     lines = ["G21 G90 G94 G17 G40", *["G0 X  1.000 Y  5.500", "G1 X 2.5 F  90"] * 500, ""]
     assert read_program(io.BytesIO("\n".join(lines).encode()), dialect=dialect).steps < 60
+
+
+@pytest.mark.parametrize("plane", ["G17", "G18", "G19"])
+@pytest.mark.parametrize("distance", ["G90", "G91"])
+def test_feed_moves_that_count_as_rapids_are_the_same_under_compensation(plane, distance):
+    lines = [f"G21 G94 G90 {plane} G40", "G0 X0. Y0. Z5.", "G1 X1. F90.", f"G41 D1 {distance}"]
+    lines += ["X2. Y1.", "Z6.", "X3. Y0.", "Z5. X4."] * 10
+    start = Start(rapid_feed=RapidFeed(90.0, 1.0))
+    assert differences("\n".join([*lines, ""]).encode(), start, "linuxcnc") == []

@@ -68,6 +68,13 @@ class Run:
     """Of the lines of the run."""
     first: int
     """The first of these in the chunk."""
+    moving: NDArray[np.intp]
+    """Those that move, or may."""
+
+    @property
+    def displaced(self) -> list[int]:
+        """Axes of which cutter compensation leaves nobody knows what behind each move."""
+        return [] if self.state.compensation == G40 else plane_axes(self.state)
 
     def scale(self, axis: int) -> float:
         """Mm (or deg) per unit of an axis word; NaN where nobody knows what it says."""
@@ -95,6 +102,8 @@ class Run:
         feed = feeds.held(state.feed, which, values, summed).take(feeds.behind)
         rows = rows[feed == rapid_feed.feed]
         z, summed = AXES.index("Z"), state.distance == G91
+        if z in self.displaced:
+            rows = rows[np.isin(rows, self.moving[:1])]
         heights = self.history("Z", rows)
         which = heights.which(summed)
         (values,) = read_words([(heights.words, which)])
@@ -117,9 +126,8 @@ class Run:
         start[:] = state.position
         target, feed = start.copy(), state.feed
         turned = np.zeros(len(rapid), dtype=np.uint16)
-        axes = axes_of(int(np.bitwise_or.reduce(self.letters)))
-        if state.compensation != G40:
-            axes = [axis for axis in axes if axis not in plane_axes(state)]
+        named = axes_of(int(np.bitwise_or.reduce(self.letters)))
+        axes = [axis for axis in named if axis not in self.displaced]
         summed, turns = state.distance == G91, turning(state)
         histories = [self.history(AXES[axis], rapid) for axis in axes]
         every = [summed or bool(turns >> axis & 1) for axis in axes]
@@ -131,45 +139,39 @@ class Run:
             here, values = state.position[axis], values * self.scale(axis)
             if turns >> axis & 1:
                 values, turned_by = turn_by_turn(here, values, state.wraps[axis])
-                named = history.behind > history.before
-                turned[named] |= turned_by.take(history.before[named]) * np.uint16(1 << axis)
+                says = history.behind > history.before
+                turned[says] |= turned_by.take(history.before[says]) * np.uint16(1 << axis)
             held = history.held(here, index, values, summed)
             start[:, axis], target[:, axis] = held.take(history.before), held.take(history.behind)
             state.position[axis] = float(held[-1])
+        self._displace(rapid, start, target)
         if not len(given):
             return start, target, turned, feed
         held = feeds.held(feed, given, fed, summed=False)
         state.feed = float(held[-1])
         return start, target, turned, held.take(feeds.behind)
 
-    def displace(
-        self,
-        moving: NDArray[np.intp],
-        rapid: NDArray[np.intp],
-        start: NDArray[np.float64],
-        target: NDArray[np.float64],
+    def _displace(
+        self, rapid: NDArray[np.intp], start: NDArray[np.float64], target: NDArray[np.float64]
     ) -> None:
-        """Forget where compensated moves leave the axes that the tool's radius displaces.
-
-        And keep where the program says that they stand, as `moves.displace` does. `moving`: the
-        lines of the run that move, or may.
-        """
+        """Forget where moves leave displaced axes, and keep where the program says they stand."""
         state = self.state
-        if not len(moving):
+        if not (self.displaced and len(self.moving)):
             return
+        begins = self.moving[0]
         meant = list(state.meant)
-        for axis in plane_axes(state):
+        for axis in self.displaced:
             words = self.lines.words(AXES[axis], self.first, self.first + len(self.letters))
             if len(words.line):
                 (values,) = read_words([(words, np.array([-1]))])
                 meant[axis] = float(values[0]) * self.scale(axis)
                 if state.distance == G91:
-                    alone = words.line[0] == words.line[-1] == moving[0]
+                    alone = words.line[0] == words.line[-1] == begins
                     meant[axis] += state.position[axis] if alone else NAN
-            start[rapid != moving[0], axis] = NAN
+            start[rapid != begins, axis] = NAN
             target[:, axis] = NAN
         state.meant = meant
-        state.forget_positions(plane_axes(state))
+        state.forget_positions(self.displaced)
 
 
 def axes_of(bits: int) -> list[int]:

@@ -195,15 +195,13 @@ def run_plain(
         moves & ((motion != 0) | dialect.feed_on_rapids), np.uint8(USES_FEED), np.uint8(0)
     )
     fast = (named != 0) & (motion == 0)
-    run = Run(state, lines, letters, first)
+    run = Run(state, lines, letters, first, np.flatnonzero(moves))
     fed = run.counted((named != 0) & (motion == 1), rapid_feed)
     fast[fed] = True
     rapid = np.flatnonzero(fast)
     feeds = run.history("F", rapid)
     events[feeds.words.line] = GIVES_FEED
     start, target, turned, feed = run.told(feeds, rapid)
-    if state.compensation != G40:
-        run.displace(np.flatnonzero(moves), rapid, start, target)
     row = rapid + first
     said = letters.take(rapid)
     columns: dict[str, Any] = asdict(ModeColumns.of(state))
