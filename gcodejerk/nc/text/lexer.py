@@ -70,7 +70,7 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     # A line feed stands in front of the first line, and one behind the last.
     text = b"\n" * _PAD + data + (b"" if complete else b"\n") + b"\n" + b"0" * AROUND
     joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
-    if dialect.text.blanks == "anywhere" and _has_gaps(kind):
+    if dialect.text.blanks == "anywhere" and _has_gaps(joint, kind):
         text = _GAP.sub(rb"\1\3\2", text)
         joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
     joints = Joints(np.frombuffer(text, dtype=np.uint8), joint, kind)
@@ -106,9 +106,10 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     return Lines(begin, end - crlf, terminator, careful, letters, joints)
 
 
-def _has_gaps(kind: NDArray[np.uint8]) -> bool:
+def _has_gaps(joint: Places, kind: NDArray[np.uint8]) -> bool:
     """Whether a blank may stand between a letter and its number, as in ``X 12.5``."""
-    return bool(((kind[:-1] >= LETTERS) & (kind[1:] == BLANK)).any())
+    blank = np.flatnonzero((kind[:-1] >= LETTERS) & (kind[1:] == BLANK))
+    return bool((joint.take(blank + 1) - joint.take(blank) == 1).any())
 
 
 def _next(flags: Flags, far: int = 1) -> Flags:
