@@ -3,10 +3,11 @@
     python tests/bench/bench_reading.py [--megabytes 10] [--memory]
 
 The finishing program is three-axis, modal words omitted, with a retract and an approach every 200
-lines; in Klartext each line has its number; the printed part is Marlin's, with extrusion. The plain
-tracker does the least that finds the rapids: a regular expression over each line, G0 to G3 or FMAX,
-G90, G91 and the last X, Y, Z. `--memory`
-reads 100 MB in a fresh process and prints its largest resident size.
+lines; in Klartext each line has its number; the printed part is Marlin's, with extrusion. The last
+three are the finishing program without its feed mode, with blanks in its words, and with A for Y.
+The plain tracker does the least that finds the rapids: a regular expression over each line, G0 to
+G3 or FMAX, G90, G91 and the last X, Y, Z. `--memory` reads 100 MB in a fresh process and prints
+its largest resident size.
 """
 
 import argparse
@@ -81,7 +82,23 @@ def printed_part(lines):
     return b"\n".join([*rows, b"M107", b"M84", b""])
 
 
-WORD = re.compile(rb"([A-Z])([-+]?[0-9.]+)")
+def without_feed_mode(lines):
+    """The finishing program as it is posted for Fanuc: G94 is what the control starts in."""
+    return finishing_program(lines).replace(b" G94", b"")
+
+
+def with_blanks(lines):
+    """The same with blanks in front of numbers, as dxf2gcode writes them."""
+    return re.sub(rb"([XYZ])(?=[-0-9])", rb" \1  ", finishing_program(lines))
+
+
+def with_a(lines):
+    """The same with A in every line of three axes, on a machine that says nothing of its turns."""
+    data = finishing_program(lines)
+    return re.sub(rb"Y([0-9]+)\.([0-9]+)(?=Z)", rb"A\1.\2", data)
+
+
+WORD = re.compile(rb"([A-Z]) *([-+]?[0-9.]+)")
 
 
 def plain_tracker(data):
@@ -122,6 +139,9 @@ def main():
         "commented drilling": (drilling_program, "linuxcnc"),
         "Klartext finishing": (klartext_program, "klartext"),
         "printed part": (printed_part, "marlin"),
+        "no G94, for Fanuc": (without_feed_mode, "fanuc"),
+        "blanks in front": (with_blanks, "linuxcnc"),
+        "a rotary axis": (with_a, "linuxcnc"),
     }
     for name, (make, dialect) in makers.items():
         data = make(lines)
