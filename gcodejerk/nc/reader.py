@@ -231,7 +231,7 @@ class Reader:
         stop = self.read_run(spelled, 0, last, (number, place[1])) if last else 0
         computed.take_back(stop)
         if stop < FEWEST_COMPUTED:
-            # Where every other line is one that is not sure, looking ahead is for nothing.
+            # In vain, as at every other line that is not sure: look ahead ever less often.
             self._by_hand = number + stop + self._patience
             self._patience *= 2
         else:

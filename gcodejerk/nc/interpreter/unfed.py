@@ -92,8 +92,8 @@ def run_unfed(
     motion = held[np.searchsorted(at, np.arange(len(letters)), side="right")]
     does = np.where(stated >= 0, stated, motion)
     sure = sure_lines(letters, np.maximum(does, 0).astype(np.uint8), state, dialect)
-    # Nor where G1 is stated and nothing moves, or G80 may be in force.
     sure &= letters & np.uint32(turning(state)) == 0
+    # Nor where G1 is stated and nothing moves, or G80 may be in force.
     sure &= (letters & BIT["F"] == 0) & np.where(moves, does >= 0, stated < 1)
     stop = len(sure) if sure.all() else int(np.argmin(sure))
     if stop == 0:
