@@ -94,8 +94,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.EXPRESSION: Explanation(
         "an axis word is a variable or an expression; where it ends is known if every variable is",
-        "let the program set its variables, to whole increments (LinuxCNC: to numbers of at most "
-        "six decimals, which a third is not)",
+        "let the program set its variables; on controls other than LinuxCNC, to whole increments, "
+        "which a third is not",
     ),
     Reason.DECIMAL_POINT: Explanation(
         "X100 is 100 mm or 0.1 mm, as a parameter of the control decides",

@@ -7,6 +7,7 @@ the modal values that the program relies on behind it.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from decimal import Decimal
@@ -29,6 +30,8 @@ _SIMPLE = re.compile(
     rb"(?:G0?0 )?((?:[XYZABCUVW]-?[0-9]+\.[0-9]*)(?: [XYZABCUVW]-?[0-9]+\.[0-9]*)*)"
 )
 """A block of G0 and places: the most usual one, which need not be taken apart."""
+NO_DIGIT = 1e-11
+"""Of a difference of two positions: it may be an error of rounding. [mm] or [deg]"""
 _SHOWN = bytes(c if 32 <= c < 127 and c not in b"()" else ord("?") for c in range(256))
 """Characters as comments have them."""
 
@@ -204,7 +207,9 @@ class Frame:
         incremental = bool(self.rapids.incremental[self.move])
         if word.value is None or word.function:
             # A variable, or X=IC(5): the points know nothing of either.
-            number = programmed_end(self.rapids, self.move, word.letter, incremental)
+            exact = self.dialect.arithmetic.exact
+            end = computed_end if exact else programmed_end
+            number = end(self.rapids, self.move, word.letter, incremental)
             left = number - before_end.get(AXES.index(word.letter), Decimal(0))
             return word.letter.encode() + plain(left if incremental else number)
         # X=3 of Siemens is X3.
@@ -284,13 +289,44 @@ def programmed_end(rapids: Rapids, move: int, axis: str, incremental: bool) -> D
     Decimal
         In the program's unit; a diameter where the program has diameters.
     """
-    k = AXES.index(axis)
-    end = float(rapids.target[move, k]) - (float(rapids.start[move, k]) if incremental else 0.0)
-    if rapids.inch[move] and axis not in "ABC":
-        end /= MM_PER_INCH
-    if rapids.diameter[move] and axis == "X":
-        end *= 2.0
+    end = _way(rapids, move, axis, incremental) / _scale(rapids, move, axis)
     return Decimal(repr(round(end, 6)))
+
+
+def computed_end(rapids: Rapids, move: int, axis: str, incremental: bool) -> Decimal:
+    """The same where the control rounds no number that it computes: to its last digit.
+
+    Parameters
+    ----------
+    rapids, move, axis, incremental
+        As of `programmed_end`.
+
+    Returns
+    -------
+    Decimal
+        Where it ends: a number that the control takes for the very double that it had computed. How
+        far it goes: to twelve decimals, beyond which sums of increments are not certain either.
+    """
+    way, scale = _way(rapids, move, axis, incremental), _scale(rapids, move, axis)
+    end = way / scale
+    short = round(end, 6)
+    if incremental:
+        return Decimal(repr(short if abs(end - short) < NO_DIGIT else round(end, 12)))
+    near = (short, end, math.nextafter(end, math.inf), math.nextafter(end, -math.inf))
+    return Decimal(repr(next((number for number in near if number * scale == way), end)))
+
+
+def _way(rapids: Rapids, move: int, axis: str, incremental: bool) -> float:
+    """Where an axis ends, or how far it goes, in mm or degrees."""
+    k = AXES.index(axis)
+    start = float(rapids.start[move, k]) if incremental else 0.0
+    return float(rapids.target[move, k]) - start
+
+
+def _scale(rapids: Rapids, move: int, axis: str) -> float:
+    """Of the numbers of an axis in the program, in mm or degrees."""
+    unit = MM_PER_INCH if rapids.inch[move] and axis not in "ABC" else 1.0
+    return unit * (0.5 if rapids.diameter[move] and axis == "X" else 1.0)
 
 
 def plain(number: Decimal) -> bytes:

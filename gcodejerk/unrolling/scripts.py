@@ -21,11 +21,10 @@ from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.following_reader import FollowingReader
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.runner import Runner
-from gcodejerk.nc.interpreter.variables import is_local
+from gcodejerk.nc.interpreter.variables import is_local, number_text
 from gcodejerk.nc.text.block import ELSEWHERE, Line
 from gcodejerk.start import Start
 from gcodejerk.unrolling.pieces import LeftAloneError, Piece, Written, named
-from gcodejerk.unrolling.spelling import number_text
 from gcodejerk.unrolling.wording import worded
 
 ROOM = 16

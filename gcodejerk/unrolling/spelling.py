@@ -10,30 +10,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from decimal import Decimal
 
 from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.interpreter.expressions import evaluate, variable_name
-from gcodejerk.nc.interpreter.variables import is_local
+from gcodejerk.nc.interpreter.variables import is_local, number_text
 from gcodejerk.nc.text.block import Line
 from gcodejerk.unrolling.pieces import LeftAloneError
 
 _VARIABLE = re.compile(rb"#[ \t]*(?:([0-9][0-9 \t]*)|(<[^<>]*>)|([#\[]))")
 _SHOWS = re.compile(rb"[(;][ \t]*(?:PRINT|DEBUG|LOG|ABORT)[ \t]*,", re.IGNORECASE)
 _SHOWN = re.compile(rb"#(?:([0-9]+)|(<[^<>]*>))")
-
-
-def number_text(value: float) -> bytes:
-    """A number with all its digits, and without an exponent.
-
-    Examples
-    --------
-    >>> number_text(3.0), number_text(0.1), number_text(-0.0), number_text(1e-7)
-    (b'3', b'0.1', b'0', b'0.0000001')
-    """
-    if value == int(value):
-        return b"%d" % int(value)
-    return format(Decimal(repr(value)), "f").encode()
 
 
 def _own(text: bytes, rules: Arithmetic) -> bool:

@@ -15,11 +15,10 @@ from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.interpreter.expressions import evaluate, variable_name
 from gcodejerk.nc.interpreter.modal import State
 from gcodejerk.nc.interpreter.operations import VACANT
-from gcodejerk.nc.interpreter.variables import is_local, named_assignment, word_value
+from gcodejerk.nc.interpreter.variables import is_local, named_assignment, number_text, word_value
 from gcodejerk.nc.text.block import Line, Word
 from gcodejerk.units import MM_PER_INCH
 from gcodejerk.unrolling.pieces import LeftAloneError
-from gcodejerk.unrolling.spelling import number_text
 
 _HASH = re.compile(rb"#[ \t]*(?:([0-9]+)|[#\[])")
 _NAME = re.compile(rb"(?<![A-Za-z0-9_$])[A-Za-z_][A-Za-z_][A-Za-z0-9_]*")

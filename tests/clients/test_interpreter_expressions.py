@@ -1,6 +1,7 @@
 """Expressions against LinuxCNC's own interpreter: what we compute is what it computes."""
 
 import math
+import re
 import shutil
 
 import pytest
@@ -8,8 +9,10 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from interpreter import run_oracle
 
+from gcodejerk.machine import Machine, find_machine
 from gcodejerk.nc import DIALECTS
 from gcodejerk.nc.interpreter.expressions import evaluate
+from gcodejerk.rewrite.pipeline import process
 
 RULES = DIALECTS["linuxcnc"].arithmetic
 KNOWN = {"1": 3.5, "2": -2.0, "3": 0.0, "4": 1.0, "<A>": 7.25}
@@ -116,3 +119,47 @@ def test_at_the_poles_of_the_tangent_nothing_is_known(tmp_path, text):
 def test_where_the_sign_of_a_zero_decides_nothing_is_known(text):
     """The interpreter's zero of the first has a sign: it turns to -180."""
     assert math.isnan(computed(text))
+
+
+numbers_of_places = st.one_of(
+    st.integers(1, 90).map(str), st.floats(0.5, 90.0, allow_nan=False).map(lambda v: f"{v:.6f}")
+)
+places = st.one_of(
+    st.builds("[{}/{}]".format, numbers_of_places, st.integers(1, 9)),
+    st.builds("[{}*0.375-{}*[1/7]]".format, numbers_of_places, numbers_of_places),
+    st.builds("[#1*{}[{}]+{}]".format, st.sampled_from(["SIN", "COS"]), numbers_of_places, numbers),
+    st.builds("[0-SQRT[{}]]".format, numbers_of_places),
+)
+MODES = ["G90 G21", "G91 G21", "G90 G20", "G91 G20"]
+EXACT = 2e-9
+"""What nine decimals of mm leave open, as the oracle prints them."""
+
+
+@settings(
+    max_examples=12,
+    deadline=None,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+@given(st.lists(st.tuples(st.sampled_from(MODES), places, places), min_size=20, max_size=20))
+def test_rapids_to_drawn_places_end_where_the_interpreter_takes_them(tmp_path_factory, drawn):
+    text = re.sub(r"travel: \[.*\]", "travel: [-1.0e+5, 1.0e+5]", find_machine("vmc").read_text())
+    machine = Machine.loads(text, "vmc, long")
+    long = ("G90 G21", "[0-[77/3]]", "[22/7]")  # one that is rewritten at any rate
+    lines = [f"{modes}\nG0 X{x} Y{y}\n" for modes, x, y in (*drawn, long)]
+    data = f"{HEAD}G17 G40 G49 G64 G94 F100\nG0 X0 Y0 Z0\n{''.join(lines)}M2\n".encode()
+    result = process(data, machine, controller="linuxcnc", name="part.ngc")
+    assert result.planned
+    ends = []
+    for name, program in (("before.ngc", data), ("after.ngc", result.output)):
+        path = tmp_path_factory.mktemp("places") / name
+        path.write_bytes(program)
+        table = path.with_name("tools.tbl")
+        table.write_text("T1 P1 Z0 D5\n")
+        done = run_oracle(path, "--tool-table", table)
+        assert done.returncode == 0, done.stderr
+        rows = [row.split() for row in done.stdout.splitlines() if " TRAVERSE " in row]
+        ends.append([[float(word) for word in row[2:5]] for row in rows])
+    after = iter(ends[1])
+    for place in ends[0]:
+        assert any(reached == pytest.approx(place, abs=EXACT) for reached in after), place

@@ -12,7 +12,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
 from gcodejerk.nc import CERTAIN, DIALECTS, Start, parse_block, read_program, trace
 from gcodejerk.nc.dialects.dialect import LINEAR
-from gcodejerk.nc.text.numbers import AROUND, LONGEST, parse_numbers
+from gcodejerk.nc.text.numbers import AROUND, parse_numbers
 from gcodejerk.start import RapidFeed
 from gcodejerk.testing.programs import differences, programs
 
@@ -91,8 +91,15 @@ R_DOUBTS = [
     *("S1=R1", "T=R1", "G0 X=AC(R1)", "G2 X=R1 Y0 I=R1/2 J0", "MCALL", "TRANS X=R1", "G0 X=R9"),
     *("G91", "G90", "G0 A=R1", "G0 X=R3", "ROT RPL=R1", "G70", "G71", "SUPA Z=R1"),
 ]
+UNROUNDED = [
+    *RUNS,
+    *("G0 X[#1/3] Y[#2*0.7]", "G1 X[50*SIN[#1]] F100.", "Z[#2/7]", "G0 X[50*COS[90]] Y[1/3]"),
+    *("X[1.51463*0.375] Y-[#1/9]", "G2 X[#1/3] Y0. I[#1/6] J[#2/3]"),
+]
+"""Numbers of as many digits as a double has, which a control takes that rounds none."""
 BY_VARIABLES = [
-    *((name, RUNS, DOUBTS) for name in ("linuxcnc", "fanuc", "haas", "mach", "fanuc-lathe-b")),
+    ("linuxcnc", UNROUNDED, DOUBTS),
+    *((name, RUNS, DOUBTS) for name in ("fanuc", "haas", "mach", "fanuc-lathe-b")),
     ("siemens", R_RUNS, R_DOUBTS),
 ]
 
@@ -133,6 +140,7 @@ def test_quick_and_careful_reading_agree_of_programs_by_variables(dialect, sure,
 PLAIN = [
     *("G0 X1. Y2.", "G0 Z5.", "X3.5", "Y-2.", "Z-.5", "X1. Y1. Z1.", "G1 X2. F90.", "G1 Y3.", ""),
     *("G0X1.Y2.", "G1Z-1.", "G2 X3. Y1. I1. J0.", "G3 X0. Y0. R5.", "(rest)", "N7 G0 X4."),
+    *("G0 X12.345678901234567 Y.00000000000000000125", "G1 X-0.3333333333333333148296 F100."),
 ]
 ODD = [
     *("(expr, a=5)", "(_do ,1)", "(print, 1)", "X5. (expr, 1)", "F0", "F0.", "G1 F0", "F80", "C5."),
@@ -224,13 +232,12 @@ def test_words_and_comments_of_a_block_are_where_they_say(text):
 @QUICK
 @given(
     st.lists(
-        st.from_regex(r"[-+]?([0-9]{1,9}(\.[0-9]{0,6})?|\.[0-9]{1,9})", fullmatch=True),
+        st.from_regex(r"[-+]?([0-9]{1,9}(\.[0-9]{0,25})?|\.[0-9]{1,25})", fullmatch=True),
         min_size=1,
         max_size=50,
     )
 )
 def test_numbers_read_many_at_a_time_are_those_of_float(numbers):
-    numbers = [number for number in numbers if len(number.lstrip("+-")) <= LONGEST]
     text = " " * AROUND + " ".join(numbers) + " " * AROUND
     begins, at = [], AROUND
     for number in numbers:

@@ -187,28 +187,29 @@ G0 Z#<safe>
 G0 X[#1 * 2] Y[#<Safe>/2]
 G0 X#2 Y[#<ab>+0.25]
 G0 X[1/3]
-G0 X[0.1+0.2]
+G0 X[0.1+0.2] Y[50*COS[90]]
 G0 X#3
 G0 Z1
 M2
 """
 
 
-def test_a_number_of_six_decimals_is_certain_for_both_readers():
+def test_a_computed_number_is_certain_for_both_readers():
     places = dict.fromkeys("XYZ", 1.0)
     start = Start(positions=places)
     rapids = read_program(io.BytesIO(COMPUTED), start=start).rapids
     certain = [i for i, reason in enumerate(rapids.reason.tolist()) if reason == CERTAIN]
-    assert rapids.line[certain].tolist() == [4, 5, 6, 7, 11]
+    assert rapids.line[certain].tolist() == [4, 5, 6, 7, 8, 9, 11]
     assert rapids.target[certain, :3].tolist() == [
         [0.0, 0.0, 0.0], [0.0, 0.0, 7.5], [10.0, 3.75, 7.5], [2.5, -4.75, 7.5],
-        pytest.approx([math.nan, -4.75, 1.0], nan_ok=True),
+        [1 / 3, -4.75, 7.5], [0.1 + 0.2, 50.0 * math.cos(math.pi / 2.0), 7.5],
+        pytest.approx([math.nan, 50.0 * math.cos(math.pi / 2.0), 1.0], nan_ok=True),
     ]  # fmt: skip
     found = Findings(9)
     confirmed = confirm(io.BytesIO(COMPUTED), "linuxcnc", start, rapids, certain, found)
-    assert (confirmed, found.violations) == (5, [])
+    assert (confirmed, found.violations) == (7, [])
     # a variable that one of the readers takes for another is noticed
-    for row in certain[1:4]:
+    for row in certain[1:6]:
         rapids.target[row] += 0.0001
     confirm(io.BytesIO(COMPUTED), "linuxcnc", start, rapids, certain, found)
-    assert len(found.violations) == 3
+    assert len(found.violations) == 5

@@ -262,7 +262,7 @@ SIEMENS_HEAD = b"G710 G40 G90 G94 G17 G64\nG1 X0 Y0 Z0 F200\n"
     ("reason", "before", "after", "options"),
     [
         (Reason.BLOCK_DELETE, b"/G0 X30\n", b"G0 X30\n", {}),
-        (Reason.EXPRESSION, b"#1=[90/7]\nG0 X#1\n", b"G0 X30\n", {}),
+        (Reason.EXPRESSION, b"#1=#5003\nG0 X#1\n", b"#1=[90/7]\nG0 X#1\n", {}),
         (Reason.FRAME_CHANGE, b"G0 G54 X30\n", b"G54\nG0 X30\n", {}),
         (Reason.CUTTER_COMPENSATION, b"G41 D1\nG0 X30\n", b"G40\nG0 X30\n", {}),
         (Reason.FEED_SCALED, b"M52\nG0 X30\n", b"M52\nM52 P0\nG0 X30\n", {}),

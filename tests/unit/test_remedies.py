@@ -131,8 +131,8 @@ CASES = [
         KNOWN + "G0 X[#3000 + 77]\nM2\n", KNOWN + "#3000 = 1\nG0 X[#3000 + 77]\nM2\n",
     ),
     Case(
-        Reason.EXPRESSION, "six decimals", LINUXCNC,
-        KNOWN + "G0 X[77 / 3]\nM2\n", KNOWN + "G0 X[77 / 4]\nM2\n",
+        Reason.EXPRESSION, "to any number", LINUXCNC,
+        KNOWN + "G0 X[#3000 + 77 / 3]\nM2\n", KNOWN + "#3000 = 1\nG0 X[#3000 + 77 / 3]\nM2\n",
     ),
     Case(
         Reason.EXPRESSION, "whole increments", FANUC,

@@ -101,6 +101,23 @@ def test_a_stream_written_by_hand_is_accepted():
     assert (found.rapids, found.rewritten) == (2, 1)
 
 
+@pytest.mark.parametrize(
+    ("end", "wrong"),
+    [
+        ("0.9999996666666666", None),
+        ("0.9999996666666666200740", None),  # the same double
+        ("0.9999996666666667", Kind.END),
+        ("0.999999667", Kind.END),
+        ("0.99999966", Kind.END),
+    ],
+)
+def test_a_computed_end_is_the_very_number_that_is_computed(end, wrong):
+    original = ORIGINAL.replace("G0 Z1. M8", "#1=2.999999\nG0 Z[#1/3] M8")
+    points = f"{LEAD}{stream(way=2.999999 / 3)}G0 Z{end}\nF600\n"
+    processed = original.replace("G0 Z[#1/3] M8\n", f"G0  M8\n{points}")
+    assert {v.kind for v in judge(processed, original).violations} == {wrong} - {None}
+
+
 DAMAGE = {
     "F larger by 1e-6": (line(9), with_feed(9, lambda f: f + 60e-6), Kind.FEED),
     "F smaller by 1e-6": (line(9), with_feed(9, lambda f: f - 60e-6), Kind.FEED),

@@ -13,7 +13,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import HARMLESS, Dialect
 from gcodejerk.nc.dialects.gcodes import G80
 from gcodejerk.nc.interpreter.modal import NAN
-from gcodejerk.nc.interpreter.variables import before_block, word_value, written_out
+from gcodejerk.nc.interpreter.variables import before_block, word_value
 from gcodejerk.nc.text.block import Block, Name, Word
 
 _LENGTHS = frozenset("XYZABCUVWR")
@@ -149,9 +149,7 @@ class _Sorter:
         known = before_block(self._block, self._variables, rules)
         inch = self._inch and not _states_units(self._block, self._dialect)
         value = word_value(word, known, rules, inch)
-        # A position of whole increments can be written as a number; a quotient can not.
-        exact = rules.exact and not written_out(value)
-        codes.expression = codes.expression or exact or value != value
+        codes.expression = codes.expression or value != value
         return value
 
     def g_code(self, word: Word, value: float) -> None:

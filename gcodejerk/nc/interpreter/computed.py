@@ -21,9 +21,9 @@ from gcodejerk.nc.interpreter.variables import (
     assign,
     assigned_values,
     is_own,
+    number_text,
     reads_feed,
     word_value,
-    written_out,
 )
 from gcodejerk.nc.text.block import Block, Word
 from gcodejerk.nc.text.lexer import read_lines
@@ -114,8 +114,11 @@ class Computed:
     def _spell(self, word: Word, inch: bool) -> bytes:
         """A word with its number; empty where that is not certain."""
         value = word_value(word, self._state.variables, self._rules, inch)
-        number = written_out(value)
-        return f"{word.letter}{number}".encode() if number else b""
+        if value != value:
+            return b""
+        number = number_text(value)
+        # Without its point it may be another one.
+        return word.letter.encode() + (number if b"." in number else number + b".")
 
     def __len__(self) -> int:
         return len(self._spelled)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
 from functools import lru_cache
 
 from gcodejerk.nc.dialects.arithmetic import Arithmetic
@@ -21,8 +22,8 @@ from gcodejerk.nc.text.cursor import LARGEST
 
 _INCREMENT_DECIMALS = (3, 4)
 """Of the least increment: 0.001 mm or degrees, 0.0001 inch."""
-_DECIMALS = 6
-"""Of a computed number where the control rounds none."""
+_SMALLEST = 1e-60
+"""Of computed positions: what is less, and not 0, nobody writes out."""
 _POSITIONS = frozenset("XYZABCUVWIJKR")
 _SHARED = re.compile(r"R[0-9]+")
 """R parameters of Siemens, which all programs of a control have in common."""
@@ -210,7 +211,7 @@ def word_value(word: Word, variables: Mapping[str, float], rules: Arithmetic, in
         return NAN
     if word.letter in _POSITIONS:
         if rules.exact:
-            return value
+            return value if value == 0.0 or abs(value) > _SMALLEST else NAN
         decimals = _INCREMENT_DECIMALS[inch and word.letter in LINEAR | set("IJKR")]
         return _if_short(value, decimals)
     if word.letter in "FS":
@@ -221,10 +222,17 @@ def word_value(word: Word, variables: Mapping[str, float], rules: Arithmetic, in
     return NAN if abs(value - whole) < 1e-3 else value
 
 
-def written_out(value: float) -> str:
-    """Write a computed number with some decimals; empty where that is another one, or none."""
-    text = f"{value:.{_DECIMALS}f}"
-    return text if float(text) == value else ""
+def number_text(value: float) -> bytes:
+    """A number with all its digits, and without an exponent.
+
+    Examples
+    --------
+    >>> number_text(3.0), number_text(0.1), number_text(-0.0), number_text(1e-7)
+    (b'3', b'0.1', b'0', b'0.0000001')
+    """
+    if value == int(value):
+        return b"%d" % int(value)
+    return format(Decimal(repr(value)), "f").encode()
 
 
 def _if_short(value: float, decimals: int) -> float:

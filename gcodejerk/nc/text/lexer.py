@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.text.joints import BLANK, CR, END, LETTERS, OPEN, STAR, find_joints
-from gcodejerk.nc.text.numbers import AROUND, LONGEST, parse_numbers
+from gcodejerk.nc.text.numbers import AROUND, parse_numbers
 from gcodejerk.nc.text.respelling import respelled
 from gcodejerk.nc.text.words import BIT, COMMENT, DOT, SIGN, Joints, Lines
 
@@ -28,8 +28,6 @@ Places = NDArray[np.int64]
 _PAD = AROUND
 _WHOLE_DIGITS = 9
 """Digits in front of the point up to which a number is surely not beyond any machine."""
-_SHORT = (LONGEST + 1) // 2 - 1
-"""Digits between joints up to which no number is too long, since a number has two such at most."""
 _IN_FRONT = 5
 """Digits in front of the point that make a long number one to be looked at."""
 _BITS = len(BIT)
@@ -170,13 +168,7 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
         es = np.flatnonzero(kind == ord("E"))
         bad[es] |= text.take(place.take(es) - 1) != ord(" ")
 
-    wide = np.flatnonzero(width > _SHORT + 1)
-    if len(wide):
-        part = (kind >= LETTERS) | sign
-        long = part & (width > _WHOLE_DIGITS + 1)
-        both = width + np.append(width[1:], 0)  # a number with its point, and its letter
-        long |= part & _next(dot) & (both > LONGEST + 1)
-        bad |= long
+    bad |= ((kind >= LETTERS) | sign) & (width > _WHOLE_DIGITS + 1)
     if dialect.text.digits:
         bad |= _many_digits(joints, width, dialect.text.number_digits or dialect.text.digits)
     if dialect.whole_numbers == "machine":

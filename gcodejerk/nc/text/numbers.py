@@ -2,7 +2,8 @@
 
 Rule: the result is the double nearest to the decimal, as `float()` gives it. A number of up to 15
 digits is an integer below 2**53 divided by a power of ten up to 10**22, both exact, so the one
-rounding of the division is the correct one. Whether there is such a number is not looked at here.
+rounding of the division is the correct one; `float()` itself reads longer ones. Whether there is a
+number at all is not looked at here.
 
 Eight characters are loaded as one 64-bit integer, the first in its lowest byte, and worked on
 together (D. Lemire, "Quickly parsing eight digits", 2018, for the final three multiplications).
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 U64 = NDArray[np.uint64]
 
 LONGEST = 15
-"""Characters of a number, sign apart, that are read here."""
+"""Characters of a number, sign apart, that are read together with those of others."""
 AROUND = 16
 """Bytes that stand in front of the first number, and behind the last one."""
 
@@ -91,13 +92,18 @@ def parse_numbers(
     source : ndarray of uint8
         At least `AROUND` bytes stand in front of the first number and behind the last one.
     begin, end : ndarray of int64, shape (n,)
-        Spans that hold a sign or none, and then up to `LONGEST` digits, with a dot among them or
-        without one. What comes of any other has no meaning.
+        Spans that hold a sign or none, and then digits, with a dot among them or without one. What
+        comes of any other of up to `LONGEST` characters has no meaning.
 
     Returns
     -------
     ndarray, shape (n,)
         The numbers. [-]
+
+    Raises
+    ------
+    ValueError
+        A longer one is no number.
 
     Examples
     --------
@@ -124,4 +130,6 @@ def parse_numbers(
         scale[long] = np.where(before != 0, _scale(before) * 1e8, scale[long])
     value /= scale
     value.view(np.uint64)[...] ^= negative.astype(np.uint64) << np.uint64(63)
+    for k in long[count[long] > LONGEST].tolist():
+        value[k] = float(source[begin[k] : end[k]].tobytes())
     return value

@@ -170,7 +170,7 @@ def feed_pattern(dialect: Dialect) -> bytes:
     return number % (digits + 1, FEED_DIGITS - 1, FEED_DECIMALS)
 
 
-_LONG = re.compile(rb"[A-Z][-+]?[0-9.]{25}")
+_LONG = re.compile(rb"[A-Z][-+]?[0.]*[1-9][0-9.]{24}")
 
 
 def too_long(line: bytes, block: bytes) -> str | None:

@@ -6,7 +6,7 @@ on its F words, and on what the paths say of the rapid; never on the place. This
 two streams are alike in all of that.
 
 Rule: the key holds everything that enters the judgement, to the last digit that is judged: points
-in units of their ninth decimal, F bit by bit. A stream is passed over only where one with the very
+in units of their tenth decimal, F bit by bit. A stream is passed over only where one with the very
 same key was found to be without fault; where anything is wrong, all are judged one by one.
 """
 
@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 from gcodejerk.axes import AXES
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.physics.aligned import Reported
-from gcodejerk.verification.physics.points import SUM_SCALE, Array, Index, Paths
+from gcodejerk.verification.physics.points import Array, Index, Paths
 
+ALIKE_SCALE = 1e10
+"""Units of positions in a mm or degree."""
 MOST = 200_000
 """Keys that are remembered: some 20 MB."""
 LAST_BITS = 12
@@ -123,8 +125,8 @@ class Alike:
 
 
 def _whole(distance: Array) -> Array:
-    """Distances in units of their ninth decimal, without minus zero."""
-    out: Array = np.rint(distance * SUM_SCALE) + 0.0
+    """Distances in units of their tenth decimal, without minus zero."""
+    out: Array = np.rint(distance * ALIKE_SCALE) + 0.0
     return out
 
 

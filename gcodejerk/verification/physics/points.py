@@ -8,7 +8,7 @@ in mm, with the written step as the only tolerance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -31,8 +31,10 @@ TINY = 1e-9
 """Rounding of float64 in positions. [mm] or [deg]"""
 FINEST = 1e-3
 """An axis that moves a few steps may be written this much finer. [steps]"""
-SUM_SCALE = 1e10
-"""Increments are summed in units of their tenth decimal: none is written with more."""
+SUM_SCALE = 1e12
+"""Increments are summed in units of their twelfth decimal: none is written with more."""
+SUMMED = 2e-11
+"""What sums of float64 are certain to. [mm] or [deg]"""
 _NUMBERS_ONLY = bytes(c if c in b"0123456789.+-" else 32 for c in range(256))
 LINEAR = np.array([axis not in "ABC" for axis in AXES])
 
@@ -123,7 +125,9 @@ class Reader:
         """Compare axes and end with the words of the block, exactly; whether the axes are right."""
         if stream.own_end and not int(self.rapids.words[stream.rapid]) & ~self.known:
             return True
-        wanted = self._wanted(stream.rapid, block)
+        incremental = bool(self.rapids.incremental[stream.rapid])
+        reached = stream.sums() if incremental else stream.ends
+        wanted = self._wanted(stream.rapid, block, reached)
         line = stream.line + len(stream.lead) + stream.text.count(b"\n") + len(stream.rest) - 1
         used = set(stream.letters).union(*stream.rest, *stream.lead) - {"F"}
         if not used <= set(wanted):
@@ -135,8 +139,6 @@ class Reader:
         if int(self.rapids.words[stream.rapid]) & ~self.known:
             self._complain(Kind.AXES, stream, line, "an axis that the machine does not have")
             return False
-        incremental = bool(self.rapids.incremental[stream.rapid])
-        reached = stream.sums() if incremental else stream.ends
         for axis, number in wanted.items():
             if axis not in reached and self._stands(stream.rapid, axis):
                 continue
@@ -146,16 +148,19 @@ class Reader:
                 self._complain(Kind.END, stream, line, problem)
         return True
 
-    def _wanted(self, i: int, block: bytes) -> dict[str, Decimal]:
+    def _wanted(self, i: int, block: bytes, reached: Mapping[str, Decimal]) -> dict[str, Decimal]:
         """What the words of the block say of each axis, as written."""
+        increments = bool(self.rapids.incremental[i])
+        exact = self.dialect.arithmetic.exact
         wanted = {}
         for word in parse_block(block, self.dialect).words:
             axis = self.dialect.increments.get(word.letter)
             scaled = word.whole and word.value and self.dialect.whole_numbers == "machine"
             if axis is not None:
                 wanted[axis] = self._programmed(i, axis, incremental=False)
+            elif word.letter in AXES and word.value is None and exact:
+                wanted[word.letter] = self._computed(i, word.letter, reached.get(word.letter))
             elif word.letter in AXES and (scaled or word.value is None or word.function):
-                increments = bool(self.rapids.incremental[i])
                 wanted[word.letter] = self._programmed(i, word.letter, increments)
             elif word.letter in AXES:
                 text = b"".join(word.text[1:].split()).removeprefix(b"=")
@@ -164,13 +169,28 @@ class Reader:
 
     def _programmed(self, i: int, axis: str, incremental: bool) -> Decimal:
         """Where an axis ends, or how far it goes, in the program's unit, to six decimals."""
+        value = self._way(i, axis, incremental) / self._unit(i, axis)
+        return Decimal(repr(round(value, 6)))
+
+    def _computed(self, i: int, axis: str, reached: Decimal | None) -> Decimal:
+        """The same of a control that rounds no number: what is written, if it says just that."""
+        incremental, unit = bool(self.rapids.incremental[i]), self._unit(i, axis)
+        value = self._way(i, axis, incremental)
+        if reached is not None:
+            way = float(reached) * unit
+            if way == value or (incremental and abs(way - value) < SUMMED):
+                return reached
+        return Decimal(repr(value / unit))
+
+    def _way(self, i: int, axis: str, incremental: bool) -> float:
+        """Where an axis ends, or how far it goes. [mm] or [deg]."""
         k = AXES.index(axis)
-        value = self.rapids.target[i, k] - (self.rapids.start[i, k] if incremental else 0.0)
-        if self.rapids.inch[i] and LINEAR[k]:
-            value /= MM_PER_INCH
-        if self.rapids.diameter[i] and axis == "X":
-            value *= 2.0
-        return Decimal(repr(round(float(value), 6)))
+        return float(self.rapids.target[i, k] - (self.rapids.start[i, k] if incremental else 0.0))
+
+    def _unit(self, i: int, axis: str) -> float:
+        """What 1 means of an axis in the program. [mm] or [deg]."""
+        unit = MM_PER_INCH if self.rapids.inch[i] and LINEAR[AXES.index(axis)] else 1.0
+        return 0.5 * unit if self.rapids.diameter[i] and axis == "X" else unit
 
     def _stands(self, i: int, axis: str) -> bool:
         k = AXES.index(axis)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from decimal import Decimal
 from functools import cache
 
 from gcodejerk.nc.dialects.arithmetic import Arithmetic
@@ -36,6 +37,8 @@ _HASH_SET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
 _HASH_NAME = re.compile(rb"<[^<>]*>")
 _PLAIN = (b"+", b"-", b"*", b"/")
 """All that is computed where no control rounds: the rest has rules of its own there."""
+_SMOOTH = frozenset(("ABS", "ACOS", "ASIN", "ATAN", "COS", "EXP", "LN", "SIN", "SQRT", "TAN"))
+"""What no last digit decides: all that is computed where no control rounds."""
 _NAMED_SET = re.compile(
     rb"(?<![A-Z0-9_$\]])(R[0-9]+|(?:R|[A-Z_][A-Z_][A-Z0-9_]*)[ \t]*\[[ \t]*[0-9]+[ \t]*\]"
     rb"|[A-Z_][A-Z_][A-Z0-9_]*)"
@@ -63,6 +66,8 @@ class Computer:
     def __init__(self, dialect: Dialect) -> None:
         self.dialect, self.rules = dialect, dialect.arithmetic
         self.named = self.rules.brackets == "()"
+        functions = self.rules.functions
+        self.functions = functions & _SMOOTH if self.rules.exact else functions
         self.kinds: dict[str, str] = {}
         """Types of the variables that have names."""
 
@@ -131,7 +136,7 @@ class Computer:
         if name == "NOT" and self.named:
             number, at = self._operand(text, match.end(), variables)
             return float(number == 0.0) if number == number else NAN, at
-        if name in self.rules.functions and not self.rules.exact:
+        if name in self.functions:
             return self._function(name, text, match.end(), variables)
         if not self.named:
             raise _UnknownError
@@ -282,8 +287,7 @@ class Computer:
         if not abs(number) < 1e9:
             return b"#"
         if self.rules.exact:
-            spelled = b"%.6f" % number
-            return spelled if float(spelled) == number else b"#"
+            return format(Decimal(repr(number)), "f").encode()
         decimals = 6
         if _FINE.match(letter):
             decimals = 4 if inch and letter not in b"ABC" else 3
