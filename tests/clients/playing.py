@@ -102,6 +102,7 @@ G0 X-20
 G92.1
 T1 M6
 G0 X200 Y20 Z5 (behind a tool change)
+G0 X[500/3] Y[50*COS[70]] Z[20/7]
 G61
 G0 X100 Y20
 G64
@@ -117,7 +118,8 @@ G0 Z4.7
 G4 P0.2
 M2
 """
-"""Rapids of 0.2 to 300 mm, one to three axes, G20, G91, chained, behind M3, M6, G4, G92, arcs."""
+"""Rapids of 0.2 to 300 mm, one to three axes, G20, G91, chained, computed; behind M3, M6, G4, G92,
+arcs."""
 
 
 def settings_of(machine, factor=1.0, **others):

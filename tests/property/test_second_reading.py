@@ -312,7 +312,7 @@ def test_what_is_no_rapid_is_never_taken_for_one(name, dialect):
         b"o100 sub\nG0 X5.\nG0 X6.\no100 endsub\n",
         b"o100 while [#1 LT 5]\nG90 G21 G0 X5.\nG0 X6.\no100 endwhile\n",
         b"#1=#7\nG0 X#1\nG0 X6.\n",
-        b"G0 X[1/3]\nG0 X6.\n",
+        b"G0 X[2 ** 0.5]\nG0 X6.\n",
         b"o100 call\nG0 X6.\n",
         b"M98 P5\nG0 X6.\n",
         b"o7\nG0 X6.\n",

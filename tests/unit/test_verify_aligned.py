@@ -15,6 +15,7 @@ import pytest
 
 from gcodejerk.machine import Machine
 from gcodejerk.verification import Kind, verify, verify_files
+from gcodejerk.verification.physics.points import sum_up
 
 TEXT = """
 controller: linuxcnc
@@ -275,3 +276,13 @@ def test_stops_of_the_block_follow_the_stream():
     assert judge(good, original).violations == ()
     for wrong in ("", "M1\n", "M0\nM0\n"):
         assert kinds(good.replace("M0\n", wrong), original)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("far", [999_999_999.0, 1e200, -1e200])
+def test_increments_beyond_any_machine_are_far_off(far):
+    increments = np.array([[np.nan], [0.25], [far], [0.125]])
+    at = sum_up(increments, np.array([0]), np.array([4]))[:, 0]
+    assert at[:2].tolist() == [0.0, 0.25]
+    assert np.abs(at[2:]).min() > 1e6
+    assert np.sign(at[2:]).tolist() == [np.sign(far)] * 2

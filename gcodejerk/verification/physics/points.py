@@ -33,6 +33,8 @@ FINEST = 1e-3
 """An axis that moves a few steps may be written this much finer. [steps]"""
 SUM_SCALE = 1e12
 """Increments are summed in units of their twelfth decimal: none is written with more."""
+LARGEST_SUM = 4e18
+"""In these units: an increment of 4 km is as wrong as any longer one."""
 SUMMED = 2e-11
 """What sums of float64 are certain to. [mm] or [deg]"""
 _NUMBERS_ONLY = bytes(c if c in b"0123456789.+-" else 32 for c in range(256))
@@ -291,7 +293,8 @@ def sum_up(increments: Array, begin: Index, end: Index) -> Array:
 
     Summed as whole numbers of the tenth decimal: rounding must not grow with the number of points.
     """
-    whole = np.rint(np.nan_to_num(increments) * SUM_SCALE).astype(np.int64)
+    scaled = np.nan_to_num(increments) * SUM_SCALE
+    whole = np.rint(np.clip(scaled, -LARGEST_SUM, LARGEST_SUM)).astype(np.int64)
     total = np.cumsum(whole, axis=0)
     return (total - np.repeat(total[begin], end - begin, axis=0)) / SUM_SCALE
 
