@@ -288,7 +288,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.NOT_BETTER: Explanation(
         "the controller's own rapid shakes no more than anything that can be written, over the "
-        "whole `design.band`; or its axes excite no mode",
+        "whole `design.band`, or by less than a tenth, and settles sooner; or its axes excite no "
+        "mode",
         "nothing needs to be done; where the drives can do more, a higher `limit.acceleration` "
         "may gain",
     ),

@@ -33,6 +33,7 @@ from gcodejerk.planning.independent_axes import in_the_middle
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.refusals import limit_error, time_error
+from gcodejerk.planning.settling import settled
 from gcodejerk.planning.sharing import joint_optima
 from gcodejerk.planning.task import Task, worst_at_arrival, worst_in_band
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
@@ -42,11 +43,12 @@ PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 """All profiles that can be planned; those of `SHAPERS` add time and are for comparison."""
 LEAST_GAIN = 0.02
 """Share of today's residual that a profile has to win: less is not worth the blocks."""
+SMALL_GAIN = 0.1
+"""The same where the machine settles later than today, as a mean over the band."""
 ROUNDED = 1.1
 """What rounding may make of the tolerance that `shortest` promises."""
 MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
-
 
 GIVEN_T1 = "condition3"
 """The profile whose T1 may be given."""
@@ -336,6 +338,7 @@ class _Planner:
                         worst, reference,
                     )  # fmt: skip
                 useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
+            useless |= self._later(profiles, worst, reference)
             self._rule_out_profiles(useless, Reason.NOT_BETTER)
             self.judged = worst, reference
         elif not np.isfinite(worst).all():
@@ -399,6 +402,16 @@ class _Planner:
         noise = np.full(len(noise), TIE) if self.profile == "optimal" else noise
         better: NDArray[np.bool_] = worst < (1.0 - LEAST_GAIN) * reference - noise
         return better
+
+    def _later(self, profiles: Profiles, worst: Array, reference: Array) -> NDArray[np.bool_]:
+        """Profiles of moves that gain little, and settle later than today's."""
+        little = np.isfinite(worst) & (worst > (1.0 - SMALL_GAIN) * reference)
+        if little.any():
+            move = np.unique(self.move[little], return_inverse=True)[1].astype(np.int64)
+            what = (self.modes, self.machine, move, self.share[little])
+            today, planned = (settled(*what, p.take(little)) for p in (self.conventional, profiles))
+            little[little] = (planned > today + self.interval)[move]
+        return little
 
     def _rule_out_profiles(self, where: NDArray[np.bool_], why: Reason) -> None:
         """Give a reason to the moves of these profiles."""

@@ -11,13 +11,14 @@ are; what is not known is counted, never taken for zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
-from gcodejerk.motion import Profiles
+from gcodejerk.machine import Machine
+from gcodejerk.motion import Profiles, profiles_response
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.arrival import arrival_response
@@ -38,6 +39,8 @@ KNOWN = tuple(
 NOTHING = tuple(REASONS.index(reason) for reason in (Reason.NO_MOTION, Reason.AFTER_END))
 """Reasons of blocks that do not move."""
 HALVINGS = 60
+WITHIN = 21
+"""Frequencies of a band, its ends included, of which a mean is taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,6 +225,45 @@ def settling_times(residual: Array, modes: Modes, tolerance: float) -> Array:
             else:
                 time = _together(D, rate[index], tolerance)
         out = np.maximum(out, np.where(np.isnan(D).any(axis=1), np.nan, time))
+    return out
+
+
+def settled(
+    modes: Modes, machine: Machine, move: NDArray[np.int64], share: Array, profiles: Profiles
+) -> Array:
+    """When moves have settled, as a mean over the band, in which all frequencies are off alike.
+
+    Parameters
+    ----------
+    modes : Modes
+        The machine's.
+    machine : Machine
+        It says how wide the band is, and what counts as settled.
+    move : ndarray of int, shape (l,)
+        The move of each profile, counted from 0, ascending.
+    share : ndarray, shape (l, 9)
+        Displacement of each axis that the profile carries. [mm] or [deg]
+    profiles : Profiles
+        l unit profiles; those of a move begin together.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Counted from the beginning of the move; infinite where it never settles. [s]
+    """
+    first = np.searchsorted(move, np.arange(int(move.max(initial=-1)) + 1))
+    arrival = np.maximum.reduceat(profiles.total, first)
+    left = (arrival[move] - profiles.total)[:, np.newaxis]
+    weights = share @ modes.participation.T
+    waiting = np.zeros(len(first))
+    band, tolerance = machine.design.band, machine.design.tolerance
+    relative = np.linspace(1.0 - band, 1.0 + band, WITHIN if band else 1)
+    for factor in relative.tolist():
+        off = replace(modes, poles=modes.poles * factor)
+        response = profiles_response(profiles, off.poles) * np.exp(off.poles * left) * weights
+        residual = np.abs(np.add.reduceat(response, first, axis=0)) / off.poles.imag
+        waiting += settling_times(residual, off, tolerance)
+    out: Array = arrival + waiting / len(relative)
     return out
 
 

@@ -4,10 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
+from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
+from gcodejerk.planning.plan import SMALL_GAIN, plan_moves
 from gcodejerk.planning.plans import Modes
-from gcodejerk.planning.settling import settling_times
+from gcodejerk.planning.settling import settled, settling_times
+from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.report.records import summary_of
 from gcodejerk.report.tables import summary_line, whole_line
 from gcodejerk.rewrite.pipeline import process
@@ -144,3 +148,72 @@ def test_what_stays_leaves_what_its_stream_would_have_replaced(positioning):
     worst = left.rest.residual[1].max()
     assert worst == pytest.approx(done.conventional_residual[1].max(), rel=0.02)
     assert left.rest.time[1] == pytest.approx(done.plans.conventional_time[1])
+
+
+def integrated(profiles, row, pole, rest):
+    """What an oscillator keeps of a unit profile when that has rested for a while."""
+    omega, zeta = abs(pole), -pole.real / abs(pole)
+    system = np.zeros((4, 4))
+    system[0, 1], system[1], system[2, 3] = 1.0, (-(omega**2), -2.0 * zeta * omega, -1.0, 0.0), 1.0
+    state = np.zeros(4)
+    own = slice(profiles.first[row], profiles.first[row + 1])
+    segments = (profiles.duration[own], profiles.acceleration[own], profiles.jerk[own])
+    for duration, acceleration, jerk in [*zip(*segments, strict=True), (rest, 0.0, 0.0)]:
+        state[2:] = acceleration, jerk
+        state = expm(system * duration) @ state
+    return state[:2]
+
+
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+def test_settled_is_the_mean_of_what_is_integrated_over_the_band(positioning):
+    design = dataclasses.replace(VMC.design, band=0.05, tolerance=0.002)
+    machine = dataclasses.replace(VMC, positioning=positioning, design=design)
+    displacement = np.zeros((3, len(AXES)))
+    displacement[:, :3] = [[30.0, -7.0, 0.0], [0.0, 0.0, 12.0], [2.0, 55.0, -4.0]]
+    plans = plan_moves(displacement, machine, "conventional", as_today=True)
+    modes, band = plans.modes, design.band
+    found = settled(modes, machine, plans.move, plans.share, plans.profiles)
+    assert len(plans.move) == (3 if positioning == "linear" else 6)
+    for move in range(3):
+        rows = np.flatnonzero(plans.move == move)
+        arrival = plans.profiles.total[rows].max()
+        late = []
+        for factor in np.linspace(1.0 - band, 1.0 + band, 21):
+            off = dataclasses.replace(modes, poles=modes.poles * factor)
+            residual = []
+            for pole, participation in zip(off.poles, modes.participation, strict=True):
+                state = sum(
+                    integrated(plans.profiles, row, pole, arrival - plans.profiles.total[row])
+                    * (plans.share[row] @ participation)
+                    for row in rows
+                )
+                damped = (state[1] - pole.real * state[0]) / abs(pole.imag)
+                residual.append(np.hypot(state[0], damped))
+            late.append(followed(np.array(residual), off, 0.002, step=1e-4, longest=4.0))
+        assert found[move] == pytest.approx(arrival + np.mean(late), abs=2e-4)
+
+
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+def test_a_rapid_that_gains_little_and_settles_later_stays(positioning):
+    machine = dataclasses.replace(VMC, positioning=positioning, controller="mach")
+    displacement = np.zeros((150, len(AXES)))
+    displacement[:, AXES.index("Z")] = np.geomspace(1.0, 60.0, len(displacement))
+    queued = np.zeros(len(displacement), dtype=bool)
+    deaf = dataclasses.replace(machine.design, tolerance=1.0)  # to which all is settled at once
+    plans, every = (
+        plan_moves(displacement, dataclasses.replace(machine, design=design), lone=queued)
+        for design in (machine.design, deaf)
+    )
+    stays = every.planned & ~plans.planned
+    assert stays.any()
+    assert {REASONS[k] for k in plans.reason[stays]} == {Reason.NOT_BETTER}
+    share = every.worst_in_band / every.most_in_band
+    assert share[stays].min() > 1.0 - SMALL_GAIN
+    what = (every.modes, machine, np.arange(len(every.share)), every.share)
+    today, planned = (settled(*what, own) for own in (every.conventional, every.profiles))
+    later = np.zeros(len(displacement), dtype=bool)
+    later[every.move] = planned > today + machine.interval
+    assert (later & (share > 1.0 - SMALL_GAIN))[every.planned].tolist() == stays[
+        every.planned
+    ].tolist()
+    assert (later & ~stays)[every.planned].any(), "a large gain is worth the waiting"
