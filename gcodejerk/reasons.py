@@ -55,6 +55,7 @@ class Reason(enum.StrEnum):
     LIMITS = "limits cannot be met"
     NOT_PLAYED = "the control would not play it as planned"
     NOT_BETTER = "no profile within the limits is better"
+    LATER = "gains little and would settle later"
     CONTROL_SET = "kept, the control is set instead"
 
 
@@ -288,10 +289,16 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.NOT_BETTER: Explanation(
         "the controller's own rapid shakes no more than anything that can be written, over the "
-        "whole `design.band`, or by less than a tenth, and settles sooner; or its axes excite no "
-        "mode",
+        "whole `design.band`; or its axes excite no mode",
         "nothing needs to be done; where the drives can do more, a higher `limit.acceleration` "
         "may gain",
+    ),
+    Reason.LATER: Explanation(
+        "at worst over `design.band` it would leave less than today, but by less than a tenth; and "
+        "as a mean over the band it would be later until no mode keeps more than "
+        "`design.tolerance`",
+        "nothing needs to be done; a coarser `design.tolerance`, where that is settled enough, may "
+        "have it rewritten",
     ),
     Reason.CONTROL_SET: Explanation(
         "`--as parameters`: lines of the program set the control's own law for this rapid",

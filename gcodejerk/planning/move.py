@@ -197,7 +197,7 @@ def plan_move(
     why = None if plans.reason[0] == CERTAIN else REASONS[plans.reason[0]]
     if why is Reason.NOT_BETTER and not Modes.of(machine).modes:
         why = Reason.NO_MODE
-    if why in (Reason.LIMITS, Reason.NOT_BETTER, Reason.NO_MODE):
+    if why in (Reason.LIMITS, Reason.NOT_BETTER, Reason.LATER, Reason.NO_MODE):
         plans = plan_moves(row, machine, "conventional", as_today=True)
         # No stream is written: what is left is what the controller leaves.
         batches = [replace(b, residual=b.conventional_residual) for b in _streams(plans)]

@@ -338,8 +338,9 @@ class _Planner:
                         worst, reference,
                     )  # fmt: skip
                 useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
-            useless |= self._later(profiles, worst, reference)
             self._rule_out_profiles(useless, Reason.NOT_BETTER)
+            little = np.isfinite(worst) & ~useless & (worst > (1.0 - SMALL_GAIN) * reference)
+            self._rule_out_profiles(self._later(profiles, little), Reason.LATER)
             self.judged = worst, reference
         elif not np.isfinite(worst).all():
             row = int(np.nonzero(~np.isfinite(worst))[0][0])
@@ -403,15 +404,15 @@ class _Planner:
         better: NDArray[np.bool_] = worst < (1.0 - LEAST_GAIN) * reference - noise
         return better
 
-    def _later(self, profiles: Profiles, worst: Array, reference: Array) -> NDArray[np.bool_]:
-        """Profiles of moves that gain little, and settle later than today's."""
-        little = np.isfinite(worst) & (worst > (1.0 - SMALL_GAIN) * reference)
-        if little.any():
-            move = np.unique(self.move[little], return_inverse=True)[1].astype(np.int64)
-            what = (self.modes, self.machine, move, self.share[little])
-            today, planned = (settled(*what, p.take(little)) for p in (self.conventional, profiles))
-            little[little] = (planned > today + self.interval)[move]
-        return little
+    def _later(self, profiles: Profiles, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of some profiles, all of their moves, settle later than today's."""
+        out = some.copy()
+        if some.any():
+            move = np.unique(self.move[some], return_inverse=True)[1].astype(np.int64)
+            what = (self.modes, self.machine, move, self.share[some])
+            today, planned = (settled(*what, p.take(some)) for p in (self.conventional, profiles))
+            out[some] = (planned > today + self.interval)[move]
+        return out
 
     def _rule_out_profiles(self, where: NDArray[np.bool_], why: Reason) -> None:
         """Give a reason to the moves of these profiles."""

@@ -31,8 +31,8 @@ KNOWN = tuple(
     REASONS.index(reason)
     for reason in (
         Reason.BLOCK_DELETE, Reason.MIXED_AXES, Reason.OTHER_WORDS, Reason.FEED_UNKNOWN,
-        Reason.TOO_SHORT, Reason.TOO_LONG, Reason.LIMITS, Reason.NOT_BETTER, Reason.NO_MODE,
-        Reason.NO_BLENDING, Reason.CONTROL_SET, Reason.NOT_PLAYED,
+        Reason.TOO_SHORT, Reason.TOO_LONG, Reason.LIMITS, Reason.NOT_BETTER, Reason.LATER,
+        Reason.NO_MODE, Reason.NO_BLENDING, Reason.CONTROL_SET, Reason.NOT_PLAYED,
     )
 )  # fmt: skip
 """Reasons of rapids that run once, on a straight line from their start to their end."""

@@ -53,6 +53,11 @@ SOLVED = ("optimal", "shortest")
 NEEDS_SOLVER = "needs gcodejerk[science]"
 HELD = 1e-6
 """A limit that is passed by less than this share is kept."""
+STAYS = {
+    Reason.NOT_BETTER: "no better profile within the limits: the rapid stays as it is",
+    Reason.LATER: "gains little and would settle later: the rapid stays as it is",
+}
+"""Reasons for which the rapid is today's, and what is said of it."""
 QUANTITIES = ("velocity", "acceleration", "jerk")
 
 
@@ -312,12 +317,13 @@ class _Field:
                 refused.append(error)
                 self.absent[name] = error.problem
                 continue
-            if plans.reason[0] == REASONS.index(Reason.NOT_BETTER):
+            why = None if plans.reason[0] == CERTAIN else REASONS[plans.reason[0]]
+            if why in STAYS:
                 self.profiles[name] = self.conventional
-                self.notes[name] = "no better profile within the limits: the rapid stays as it is"
+                self.notes[name] = STAYS[why]
                 continue
-            if plans.reason[0] != CERTAIN:
-                self.absent[name] = str(REASONS[plans.reason[0]])
+            if why is not None:
+                self.absent[name] = str(why)
                 continue
             self.profiles[name] = plans.profiles
             self.notes[name] = self._note(plans, name)

@@ -72,7 +72,7 @@ def test_no_jerk_limited_rapid_takes_an_interval_longer(interval):
     plans = plan_moves(moves(*({"Z": x} for x in lengths)), machine)
     planned = plans.planned
     # What today's rapid leaves still already stays as it is.
-    assert set(reasons(plans)) <= {None, Reason.NOT_BETTER}
+    assert set(reasons(plans)) <= {None, Reason.NOT_BETTER, Reason.LATER}
     assert planned.mean() > 0.95
     longer = (plans.counts * interval - plans.conventional_time)[planned]
     assert longer.min() >= -1e-8
@@ -489,7 +489,7 @@ def test_a_rapid_within_the_limits_is_never_made_longer(profile, extension):
     rows = moves(*({"X": x} for x in np.geomspace(1e-5, 1.0, 120)))
     assert plan_moves(rows, machine, "conventional").planned.all()
     plans = plan_moves(rows, machine, profile)
-    assert set(reasons(plans)) <= {None, Reason.NOT_BETTER}
+    assert set(reasons(plans)) <= {None, Reason.NOT_BETTER, Reason.LATER}
     usual = np.ceil(plans.conventional_time / 0.001 - 1e-6)
     assert (plans.counts == usual)[plans.planned].all()
     assert reasons(plans)[0] == Reason.NOT_BETTER

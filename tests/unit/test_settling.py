@@ -206,7 +206,7 @@ def test_a_rapid_that_gains_little_and_settles_later_stays(positioning):
     )
     stays = every.planned & ~plans.planned
     assert stays.any()
-    assert {REASONS[k] for k in plans.reason[stays]} == {Reason.NOT_BETTER}
+    assert {REASONS[k] for k in plans.reason[stays]} == {Reason.LATER}
     share = every.worst_in_band / every.most_in_band
     assert share[stays].min() > 1.0 - SMALL_GAIN
     what = (every.modes, machine, np.arange(len(every.share)), every.share)
