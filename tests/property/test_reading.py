@@ -2,6 +2,7 @@
 
 import io
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from gcodejerk.axes import AXES
 from gcodejerk.errors import ProgramError
 from gcodejerk.nc import CERTAIN, DIALECTS, Start, parse_block, read_program, trace
 from gcodejerk.nc.dialects.dialect import LINEAR
+from gcodejerk.nc.text.gaps import closed_up
 from gcodejerk.nc.text.numbers import AROUND, parse_numbers
 from gcodejerk.start import RapidFeed
 from gcodejerk.testing.programs import differences, programs
@@ -361,6 +363,15 @@ def test_quick_and_careful_reading_agree_where_blanks_stand_in_front_of_numbers(
     lines = ["G21 G90 G94 G17 G40", "G0 X0. Y0. Z0.", "G1 X1. F100."]
     lines += [line for run, odd in parts for line in (*run, *odd)]
     assert differences("\n".join([*lines, ""]).encode(), Start(), dialect) == []
+
+
+GAP = re.compile(rb"([A-Za-z])([ \t]+)([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))")
+
+
+@settings(QUICK, max_examples=500)
+@given(st.lists(st.sampled_from(b"XYg  \t..-+0159\n\r(;#[\xc4"), max_size=60).map(bytes))
+def test_blanks_in_front_of_numbers_are_put_behind_them(text):
+    assert closed_up(text) == GAP.sub(rb"\1\3\2", text)
 
 
 @pytest.mark.parametrize("dialect", ["linuxcnc", "grbl", "mach", "rs274"])

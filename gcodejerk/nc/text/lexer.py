@@ -11,12 +11,11 @@ where its value decides.
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gcodejerk.nc.dialects.dialect import Dialect
+from gcodejerk.nc.text.gaps import closed_up
 from gcodejerk.nc.text.joints import BLANK, CR, END, LETTERS, OPEN, STAR, find_joints
 from gcodejerk.nc.text.numbers import AROUND, parse_numbers
 from gcodejerk.nc.text.respelling import respelled
@@ -31,8 +30,6 @@ _WHOLE_DIGITS = 9
 _IN_FRONT = 5
 """Digits in front of the point that make a long number one to be looked at."""
 _BITS = len(BIT)
-_GAP = re.compile(rb"([A-Za-z])([ \t]+)([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))")
-"""Blanks in front of a number, which may as well stand behind it."""
 
 
 def _weights() -> NDArray[np.int64]:
@@ -69,7 +66,7 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     text = b"\n" * _PAD + data + (b"" if complete else b"\n") + b"\n" + b"0" * AROUND
     joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
     if dialect.text.blanks == "anywhere" and _has_gaps(joint, kind):
-        text = _GAP.sub(rb"\1\3\2", text)
+        text = closed_up(text)
         joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
     joints = Joints(np.frombuffer(text, dtype=np.uint8), joint, kind)
     width = np.diff(joint, append=joint[-1])
