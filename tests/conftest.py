@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import tempfile
 import zlib
 from collections import Counter
@@ -16,6 +17,9 @@ except ImportError:  # an older one, which draws from no module's constants
 # As many processes as cores run tests: threads of their linear algebra would wait for each other.
 # Set before numpy is imported here, and for the commands that tests start.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# What a shell starts in the background ignores interrupts, and so would the commands of the tests.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 USUAL = 60
 """Examples of a property test that does not say how many."""

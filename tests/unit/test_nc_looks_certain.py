@@ -388,6 +388,22 @@ def test_a_feed_motion_without_f_may_leave_the_feed_mode_as_it_was():
     assert read_program(io.BytesIO(text), dialect="grbl").rapids.feed_mode[-1] == 0
 
 
+@pytest.mark.parametrize(
+    ("front", "known"),
+    [("", True), ("G94", True), ("G93", False), ("G999", False), ("G93\nG94", True)],
+)
+@pytest.mark.parametrize("fast", [True, False])
+def test_only_where_g93_may_be_in_force_a_feed_motion_without_f_may_be_refused(front, known, fast):
+    """By grbl, which begins in G94; of other mills nobody knows what they begin in."""
+    text = f"{front}\nG21 G90 G17 G40 G54\nG0 X0. Y0. Z0.\nG1 X1. F9.\nG1 X2.\nG0 X3.\n".encode()
+    rapids = read_program(io.BytesIO(text), dialect="any-mill", fast=fast).rapids
+    assert math.isnan(rapids.start[-1, 0]) != known
+    found = Findings(9)
+    moved = replace(rapids, start=rapids.start + 1.0)  # what nobody confirms, nobody contradicts
+    assert confirm(io.BytesIO(text), "any-mill", Start(), moved, [len(rapids) - 1], found) == 0
+    assert any("X starts at" in each.problem for each in found.violations) == known
+
+
 @pytest.mark.parametrize("front", [b"", b"G1 A5\nG1 A6\nG1 A7\nG1 A8\n"])
 def test_an_arc_that_may_be_refused_leaves_an_axis_that_turns_unknown_in_any_unit(front):
     text = b"F100\nG0 A0\n" + front + b"G2 A5 I3 Y1\n"

@@ -212,6 +212,9 @@ def test_assumed_distance_and_feed_modes_are_found():
     distance, feed = read(b"G21 G0 X1\nX2\nM2\n").findings
     assert (distance.line, "G90 is assumed" in distance.message) == (2, True)
     assert (feed.line, "G94 is assumed" in feed.message) == (2, True)
+    # Of what a mill of Fanuc's begins in nothing is assumed, and the rapid is left alone for it.
+    told = read_program(io.BytesIO(b"G90 G21 G0 X0.\nX1.\nG1 X2. F9.\n"), dialect="fanuc").findings
+    assert not [each for each in told if "is assumed" in each.message]
 
 
 @pytest.mark.parametrize("fast", [True, False])

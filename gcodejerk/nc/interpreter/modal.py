@@ -86,10 +86,9 @@ class Loss:
 
 
 FIELDS = (
-    *(
-        Field(name, "mode")
-        for name in ("motion", "plane", "distance", "arc_distance", "feed_mode", "unit")
-    ),
+    *(Field(name, "mode") for name in ("motion", "plane", "distance", "arc_distance", "unit")),
+    Field("feed_mode", "mode", together="feed_mode"),
+    Field("inverse", "mode", False, together="feed_mode"),
     *(Field(name, "mode") for name in ("feed_unit", "compensation", "retract", "system")),
     Field("path", "mode", together="path"),
     *(Field(name, "number", NAN, together="path") for name in ("path_p", "path_q")),
@@ -121,7 +120,7 @@ FIELDS = (
 )
 """What a state holds."""
 BY_NAME = {field.name: field for field in FIELDS}
-_NO_GROUP = ("feed_whole", "cycle", "modal_cycle", "system_stated", "added")
+_NO_GROUP = ("inverse", "feed_whole", "cycle", "modal_cycle", "system_stated", "added")
 MODES = tuple(f.name for f in FIELDS if f.kind == "mode" and f.name not in _NO_GROUP)
 """Fields that hold one modal group each."""
 _FRAME = ("g5x", "g92", "tool")
@@ -159,6 +158,8 @@ class State:
     distance: int | None
     arc_distance: int | None
     feed_mode: int | None
+    inverse: bool | None
+    """G93 is in force, where a control begins in G94: not all of the dialect's may do so."""
     unit: float | None
     """mm per unit of length."""
     feed_unit: float | None
@@ -237,10 +238,8 @@ class State:
 
     def __init__(self) -> None:
         for field in FIELDS:
-            if field.kind in _HOLDERS:
-                setattr(self, field.name, [NAN] * len(AXES) if field.kind == "axes" else {})
-            else:
-                setattr(self, field.name, field.start)
+            held: Any = [NAN] * len(AXES) if field.kind == "axes" else {}
+            setattr(self, field.name, held if field.kind in _HOLDERS else field.start)
 
     def copy(self) -> State:
         """Make an independent copy."""

@@ -104,6 +104,7 @@ class Phases(Effects):
         if mode != state.feed_mode:
             state.put("feed", NAN)
         state.put("feed_mode", mode)
+        state.put("inverse", None if mode is None else mode == 93)
         state.put("feed_mode_stated", True)
 
     def _feed(self, codes: Codes, step: Step) -> None:

@@ -46,10 +46,14 @@ def refused_by_some(codes: Codes, state: State, dialect: Dialect) -> str:
 
 
 def _lacks_time(codes: Codes, state: State, dialect: Dialect) -> bool:
-    """Whether a feed motion is stated without F in G93, or in a mode that may be that."""
+    """Whether a feed motion is stated without F in G93, or in a mode that may be that.
+
+    Who refuses it begins in G94.
+    """
     mode = dialect.feed_modes.get(codes.g.get("feed mode", -1), state.feed_mode)
     feeds = codes.g.get("motion", G80) not in (dialect.rapid, G80)
-    return mode in (93, None) and feeds and "F" not in codes.values
+    inverse = mode == 93 or (mode is None and state.inverse is not False)
+    return inverse and feeds and "F" not in codes.values
 
 
 def _axes_taken(codes: Codes, state: State, dialect: Dialect, takes: bool) -> str:

@@ -214,7 +214,7 @@ class Runner:
         fixed = "distance" in state.fixed
         if not (fixed or state.distance_stated) and self.asked_distance is None:
             self.asked_distance = number
-        fixed = "feed_mode" in state.fixed
+        fixed = "feed_mode" in state.fixed or state.feed_mode is None  # of that nothing is assumed
         if not (fixed or state.feed_mode_stated) and self.asked_feed_mode is None:
             self.asked_feed_mode = number
 

@@ -127,7 +127,8 @@ def sure_lines(
     sure = sure & (~is_arc | (letters & np.uint32(turning(state)) == 0))
     if state.feed_mode in (93, None):
         feeding = AXIS_BITS if state.feed_mode == 93 else 0
-        feeding |= BIT["G"] if dialect.refuses.bare_inverse else 0
+        refused = dialect.refuses.bare_inverse and state.inverse is not False
+        feeding |= BIT["G"] if refused else 0
         sure = sure & ((motion == 0) | (letters & feeding == 0) | (letters & BIT["F"] != 0))
     if not dialect.modal_motion:
         sure = sure & ((letters & BIT["G"] != 0) | (letters & ~np.uint32(BIT["N"]) == 0))

@@ -248,7 +248,7 @@ class Circling(Drilling):
         if not rules.bare_inverse or "F" in block.values or g.get("motion", G80) in (0, G80):
             return False
         mode = self.mode_of(g["feed mode"]) if "feed mode" in g else self.feed_mode
-        return mode in (93, None)
+        return mode == 93 or (mode is None and self.inverse is not False)
 
     def _doubts_taken(self, block: Sorted, *, taken: bool) -> bool:
         """The same of axis words that no motion takes; `taken`: one like G28 has them."""

@@ -30,7 +30,7 @@ KINDS = {
     **dict.fromkeys(("feed", "level", "r"), "number"),
     **dict.fromkeys(("p", "q"), "tolerance"),
     **dict.fromkeys(("doubt", "turns", "habits", "strayed", "rewritten", "exact"), "ever"),
-    **dict.fromkeys(("feed_mode", "path", "unit", "feed_unit", "diameter"), "mode"),
+    **dict.fromkeys(("feed_mode", "inverse", "path", "unit", "feed_unit", "diameter"), "mode"),
     **dict.fromkeys(("selected", "told", "added"), "mode"),
     **dict.fromkeys(("cycle", "modal", "feed_whole", "spindle"), "mode"),
     **dict.fromkeys(("dialect", "facts", "fixed", "dark", "burns"), "given"),
@@ -100,6 +100,7 @@ class Known:
         self.g: dict[str, int | None] = dict(modes)
         """Modal group -> code in force."""
         self.feed_mode: int | None = self.mode_of(modes.get("feed mode"))
+        self.inverse: bool | None = False  # G93, on controls that begin in G94
         self.path: int | None = dialect.paths.get(modes.get("path", -1), 0)
         self.p = self.q = self.feed = NAN
         self.exact = False
@@ -118,10 +119,9 @@ class Known:
         """Rapids have to stay G0 while M3 or M4 is on."""
         self.diameter: bool | None = facts.diameter
         self.turns = facts.diameter
-        size = len(AXES)
-        self.at, self.meant = [NAN] * size, [NAN] * size
+        self.at, self.meant, self.system = ([NAN] * len(AXES) for _ in range(3))
         told = bool(facts.positions or facts.offsets)
-        self.system, self.g92, self.tool = [NAN] * size, [0.0 if told else NAN] * size, [NAN] * size
+        self.g92 = [0.0 if told else NAN] * len(AXES)
         self.tool = list(self.g92)
         self.systems = {_system(name): values for name, values in facts.offsets.items()}
         self.lengths = dict(facts.tool_lengths)
@@ -218,7 +218,7 @@ class Known:
         self.meant = [NAN] * len(AXES)
         self.g = {**dict.fromkeys(self.g), **self.fixed}
         if "feed mode" not in self.fixed:
-            self.feed_mode = None
+            self.feed_mode = self.inverse = None
         if "path" not in self.fixed:
             self.path = None
         self.p = self.q = self.feed = self.level = self.r = NAN

@@ -219,6 +219,7 @@ class Tracker(Circling):
             if mode != self.feed_mode:
                 self.feed = NAN
             self.feed_mode = mode
+            self.inverse = None if mode is None else mode == 93
         taken = "words" in kinds or (self.dialect.one_command and not g)
         if "F" in values and taken and self.may_be_feed(block):
             self.feed = NAN
