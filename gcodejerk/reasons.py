@@ -295,8 +295,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     ),
     Reason.LATER: Explanation(
         "at worst over `design.band` it would leave less than today, but by less than a tenth; and "
-        "as a mean over the band it would be later until no mode keeps more than "
-        "`design.tolerance`",
+        "as a mean over the band it would be later, by a larger share, until no mode keeps more "
+        "than `design.tolerance`",
         "nothing needs to be done; a coarser `design.tolerance`, where that is settled enough, may "
         "have it rewritten",
     ),

@@ -44,12 +44,11 @@ PROFILES = ("conventional", *DESIGNS, "shortest", *SHAPERS)
 LEAST_GAIN = 0.02
 """Share of today's residual that a profile has to win: less is not worth the blocks."""
 SMALL_GAIN = 0.1
-"""The same where the machine settles later than today, as a mean over the band."""
+"""The same where the machine settles later by a larger share, as a mean over the band."""
 ROUNDED = 1.1
 """What rounding may make of the tolerance that `shortest` promises."""
 MOST_INTERVALS = 100_000
 """Of one stream. A number without its decimal point would ask for more than fits into memory."""
-
 GIVEN_T1 = "condition3"
 """The profile whose T1 may be given."""
 
@@ -339,8 +338,9 @@ class _Planner:
                     )  # fmt: skip
                 useless = np.isfinite(worst) & ~self._worthwhile(worst, reference)
             self._rule_out_profiles(useless, Reason.NOT_BETTER)
-            little = np.isfinite(worst) & ~useless & (worst > (1.0 - SMALL_GAIN) * reference)
-            self._rule_out_profiles(self._later(profiles, little), Reason.LATER)
+            kept = np.divide(worst, reference, out=np.ones(len(worst)), where=reference > 0.0)
+            little = np.isfinite(worst) & ~useless & (kept > 1.0 - SMALL_GAIN)
+            self._rule_out_profiles(self._later(profiles, little, kept), Reason.LATER)
             self.judged = worst, reference
         elif not np.isfinite(worst).all():
             row = int(np.nonzero(~np.isfinite(worst))[0][0])
@@ -404,15 +404,15 @@ class _Planner:
         better: NDArray[np.bool_] = worst < (1.0 - LEAST_GAIN) * reference - noise
         return better
 
-    def _later(self, profiles: Profiles, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which of some profiles, all of their moves, settle later than today's."""
-        out = some.copy()
+    def _later(self, profiles: Profiles, some: NDArray[np.bool_], kept: Array) -> NDArray[np.bool_]:
+        """Which of some settle later than today by a larger share than the one that they gain."""
+        later = np.zeros(len(some), dtype=bool)
         if some.any():
             move = np.unique(self.move[some], return_inverse=True)[1].astype(np.int64)
             what = (self.modes, self.machine, move, self.share[some])
             today, planned = (settled(*what, p.take(some)) for p in (self.conventional, profiles))
-            out[some] = (planned > today + self.interval)[move]
-        return out
+            later[some] = planned[move] * kept[some] > today[move]
+        return later
 
     def _rule_out_profiles(self, where: NDArray[np.bool_], why: Reason) -> None:
         """Give a reason to the moves of these profiles."""

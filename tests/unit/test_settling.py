@@ -212,7 +212,7 @@ def test_a_rapid_that_gains_little_and_settles_later_stays(positioning):
     what = (every.modes, machine, np.arange(len(every.share)), every.share)
     today, planned = (settled(*what, own) for own in (every.conventional, every.profiles))
     later = np.zeros(len(displacement), dtype=bool)
-    later[every.move] = planned > today + machine.interval
+    later[every.move] = planned / today > 1.0 / share[every.move]
     assert (later & (share > 1.0 - SMALL_GAIN))[every.planned].tolist() == stays[
         every.planned
     ].tolist()
