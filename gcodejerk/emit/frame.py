@@ -311,7 +311,8 @@ def computed_end(rapids: Rapids, move: int, axis: str, incremental: bool) -> Dec
     end = way / scale
     short = round(end, 6)
     if incremental:
-        return Decimal(repr(short if abs(end - short) < NO_DIGIT else round(end, 12)))
+        same = abs(end - short) * scale < NO_DIGIT
+        return Decimal(repr(short if same else round(end, 12)))
     near = (short, end, math.nextafter(end, math.inf), math.nextafter(end, -math.inf))
     return Decimal(repr(next((number for number in near if number * scale == way), end)))
 

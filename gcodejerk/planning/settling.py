@@ -20,10 +20,11 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
 from gcodejerk.motion import Profiles, profiles_response
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.search.rows import parts
 from gcodejerk.nc import Rapids
 from gcodejerk.planning.arrival import arrival_response
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length, same_rows
-from gcodejerk.planning.task import Task
+from gcodejerk.planning.task import AT_ONCE, Task
 from gcodejerk.reasons import REASONS, Reason
 from gcodejerk.storage import Growing, column, windows
 
@@ -239,31 +240,30 @@ def settled(
         The machine's.
     machine : Machine
         It says how wide the band is, and what counts as settled.
-    move : ndarray of int, shape (l,)
-        The move of each profile, counted from 0, ascending.
-    share : ndarray, shape (l, 9)
-        Displacement of each axis that the profile carries. [mm] or [deg]
-    profiles : Profiles
-        l unit profiles; those of a move begin together.
+    move, share, profiles
+        As `planning.task.worst_at_arrival` takes them; l profiles of n moves.
 
     Returns
     -------
     ndarray, shape (n,)
         Counted from the beginning of the move; infinite where it never settles. [s]
     """
-    first = np.searchsorted(move, np.arange(int(move.max(initial=-1)) + 1))
-    arrival = np.maximum.reduceat(profiles.total, first)
-    left = (arrival[move] - profiles.total)[:, np.newaxis]
-    weights = share @ modes.participation.T
-    waiting = np.zeros(len(first))
     band, tolerance = machine.design.band, machine.design.tolerance
     relative = np.linspace(1.0 - band, 1.0 + band, WITHIN if band else 1)
-    for factor in relative.tolist():
-        off = replace(modes, poles=modes.poles * factor)
-        response = profiles_response(profiles, off.poles) * np.exp(off.poles * left) * weights
-        residual = np.abs(np.add.reduceat(response, first, axis=0)) / off.poles.imag
-        waiting += settling_times(residual, off, tolerance)
-    out: Array = arrival + waiting / len(relative)
+    out = np.zeros(int(move.max(initial=-1)) + 1)
+    for part in parts(len(out), len(modes.poles), AT_ONCE):
+        rows = np.flatnonzero((move >= part.start) & (move < part.stop))
+        own, first = profiles.take(rows), np.flatnonzero(np.diff(move[rows], prepend=-1))
+        out[part] = np.maximum.reduceat(own.total, first)
+        left = (out[move[rows]] - own.total)[:, np.newaxis]
+        weights = share[rows] @ modes.participation.T
+        waiting = np.zeros(len(first))
+        for factor in relative.tolist():
+            off = replace(modes, poles=modes.poles * factor)
+            response = profiles_response(own, off.poles) * np.exp(off.poles * left) * weights
+            residual = np.abs(np.add.reduceat(response, first, axis=0)) / off.poles.imag
+            waiting += settling_times(residual, off, tolerance)
+        out[part] += waiting / len(relative)
     return out
 
 

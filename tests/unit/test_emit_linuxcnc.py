@@ -446,3 +446,11 @@ def test_axes_that_move_alike_but_for_a_last_bit_have_one_leading_axis():
     result = process(data, Machine.load(find_machine("vmc")), controller="linuxcnc")
     assert result.planned == 1
     assert result.verification.ok
+
+
+@pytest.mark.parametrize("unit", ["G20", "G21"])
+@pytest.mark.parametrize("last", ["0.0000000000004", "0.000000000005", "0.00000000002", "1/3"])
+def test_increments_that_are_computed_are_written_as_they_are_proven(unit, last):
+    program = f"{unit} G90 G94 G64 F250\nG0 X0\nG91\nG0 X[1+{last}]\nM2\n".encode()
+    result = process(program, MACHINE, dialect="linuxcnc")
+    assert result.planned == 1

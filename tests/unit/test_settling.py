@@ -165,7 +165,9 @@ def integrated(profiles, row, pole, rest):
 
 
 @pytest.mark.parametrize("positioning", ["linear", "independent"])
-def test_settled_is_the_mean_of_what_is_integrated_over_the_band(positioning):
+@pytest.mark.parametrize("at_once", [1, 1 << 18])
+def test_settled_is_the_mean_of_what_is_integrated_over_the_band(positioning, at_once, monkeypatch):
+    monkeypatch.setattr("gcodejerk.planning.settling.AT_ONCE", at_once)
     design = dataclasses.replace(VMC.design, band=0.05, tolerance=0.002)
     machine = dataclasses.replace(VMC, positioning=positioning, design=design)
     displacement = np.zeros((3, len(AXES)))

@@ -4,7 +4,8 @@ A line is scanned into operands and operators; these are put into the order in w
 worked off on a stack. What comes out stands in the place of the expression, so that the reading of
 words knows nothing of variables.
 
-Rule: a number is known to its last digit or not at all (NaN). What is not listed here is not known.
+Rule: a number is known to the last digit that counts or not at all (NaN). What is not listed here
+is not known.
 """
 
 from __future__ import annotations
