@@ -19,7 +19,7 @@ from gcodejerk.nc.flow.o_words import Passes
 from gcodejerk.nc.flow.structures import Collector, Node
 from gcodejerk.nc.flow.subprograms import Calls
 from gcodejerk.nc.interpreter.beams import darkness
-from gcodejerk.nc.interpreter.computed import Computed, Form, form_of
+from gcodejerk.nc.interpreter.computed import Computed, Form, Forms
 from gcodejerk.nc.interpreter.left_on import LeftOn
 from gcodejerk.nc.interpreter.modal import FIELDS, GROUP_FIELDS, MODES, State
 from gcodejerk.nc.interpreter.rapids import USES_FEED, RapidLog, Rapids
@@ -64,8 +64,7 @@ class Reader:
         """A line that is not blank has been read."""
         self._structure = Collector()
         self._parsed: dict[bytes, Block] = {}
-        self._forms: dict[bytes, Form | None] = {}
-        """The same lines, as runs hold them."""
+        self._forms = Forms(dialect, self._block)
         self._by_hand, self._patience = 0, FEWEST_COMPUTED
         """Up to this line no numbers are computed ahead; and for how many lines then."""
         self._targets: frozenset[int] | None = None
@@ -134,7 +133,7 @@ class Reader:
         if text.endswith(b"\r"):
             text = text[:-1]
             terminator = 2 if terminator else 3
-        block = self._parsed.get(text) or self._parse(text)
+        block = self._block(text)
         line = Line(text, begin, number, terminator, block)
         if self._structure:
             self._collect(line)
@@ -150,13 +149,14 @@ class Reader:
                 self.insert_at = line.end
             self.started = self.started or bool(block.comments)
 
-    def _parse(self, text: bytes) -> Block:
+    def _block(self, text: bytes) -> Block:
         """Take a line apart, and remember it: in programs by variables many are the same."""
+        if block := self._parsed.get(text):
+            return block
         block = parse_line(text, self.dialect)
         if len(text) <= SHORT:
             if len(self._parsed) >= REMEMBERED:
                 self._parsed.clear()
-                self._forms.clear()
             self._parsed[text] = block
         return block
 
@@ -222,12 +222,12 @@ class Reader:
         if len(said) < FEWEST_COMPUTED:
             self._by_hand = number + seen
             return first
-        computed = Computed([form for _, form in said], self.state, self.dialect)
+        computed = Computed([(form, typed) for _, form, typed in said], self.state, self.dialect)
         spelled = computed.lines(lines, first)
         last = len(spelled)
         if spelled.careful.any():
             last = int(np.argmax(spelled.careful))
-            self._remember(said[last][0], None)
+            self._forms.set_apart(said[last][0])
         stop = self.read_run(spelled, 0, last, (number, place[1])) if last else 0
         computed.take_back(stop)
         if stop < FEWEST_COMPUTED:
@@ -240,35 +240,22 @@ class Reader:
 
     def _computable(
         self, data: bytes, lines: Lines, first: int
-    ) -> tuple[list[tuple[bytes, Form]], int]:
+    ) -> tuple[list[tuple[bytes, Form, list[bytes]]], int]:
         """Lines that a run may hold, up to where many plain ones follow; and how many were seen."""
         last = min(first + MOST_COMPUTED, len(lines))
         places = zip(lines.begin[first:last].tolist(), lines.end[first:last].tolist(), strict=True)
-        said: list[tuple[bytes, Form]] = []
+        said: list[tuple[bytes, Form, list[bytes]]] = []
         plain = 0
         for begin, end in places:
             text = data[begin:end]
-            form = self._form(text)
+            form, typed = self._forms.of(text)
             if form is None:
                 return said, len(said) + 1
-            said.append((text, form))
+            said.append((text, form, typed))
             plain = 0 if form.computes else plain + 1
             if plain == SHORT_RUN:
                 return said[:-plain], len(said)
         return said, len(said)
-
-    def _form(self, text: bytes) -> Form | None:
-        """What a run may make of a line, as it is remembered."""
-        if text in self._forms:
-            return self._forms[text]
-        form = form_of(self._parsed.get(text) or self._parse(text), self.dialect)
-        self._remember(text, form)
-        return form
-
-    def _remember(self, text: bytes, form: Form | None) -> None:
-        """The same lines are remembered as those that were taken apart."""
-        if len(text) <= SHORT:
-            self._forms[text] = form
 
     def _run(self, line: Line, first: bool = False) -> None:
         """Execute a line of the main program."""

@@ -1,6 +1,7 @@
 """Promises of reading, over drawn programs and over drawn bytes."""
 
 import io
+import itertools
 import math
 import re
 
@@ -137,6 +138,48 @@ def test_quick_and_careful_reading_agree_of_programs_by_variables(dialect, sure,
     end = data.draw(st.sampled_from(["\n", "\r\n"]))
     start = Start(decimal_point=data.draw(st.sampled_from([None, "calculator"])))
     assert differences(f"{end.join(lines)}{end}".encode(), start, dialect) == []
+
+
+# Lines of which those of a shape differ in typed numbers alone, and numbers for them: what a
+# control makes of a line may depend on how large one is, on its digits, on what stands beside it.
+SHAPES = [
+    *("G0 X[{}*#1+#2] Y[#2-{}]", "G1 X-{} Y[-{}*#1] F100.", "N{} G0 X[{}+#1]", "X[#1*{}] Z-{}"),
+    *("G2 X[{}*#1] Y[#2/{}] I[-{}*#1] J[{}]", "G0 Z[{}]", "#1=[{}*2.]", "#2=[#1-{}]", "Y[[{}+#2]]"),
+]
+ODD_SHAPES = [
+    *("G0 X[#[{}]]", "X[2**{}]", "X[{} {}]", "G0 X[{}{}]", "X[{}.{}]", "Z[50*SIN[{}]*{}]", "F[{}]"),
+    *(
+        "G0 X[#1-{}] (-{})",
+        "G-{} X[#1]",
+        "Y0X[-{}]",
+        "Y-{}X[{}*#1]",
+        "X1E[{}]",
+        "M-{} X[{}*#1]",
+        "T-{}",
+    ),
+    *("X[#1 MOD {}]", "X[#1 EQ {}]", "N{}X[{}]G0", "X{} Y[{}]", "G0 X[ATAN[{}]/[{}]]", "/{} X[{}]"),
+    *("G1 X[{}*#<a-{}>]", "G0 X[{}+#<\0{}>]", "X-{}\0 Y[{}*#1]", "n{} x[{}*#1]", "S[{}]", "T-{}"),
+]
+TYPED = [
+    *("0", "1", "2.5", "5.", ".5", "0.125", "00.5", "12.345", "1.0000000001", "123456789", "0.1"),
+    *("12345678.5", "999999999", "99999999999", "0.1234567890123456789", "0.00001", "1.2.3", "-3"),
+]
+
+
+@settings(QUICK, max_examples=100)
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc", "haas", "mach", "any-mill", "centroid"])
+@given(data=st.data())
+def test_quick_and_careful_reading_agree_of_lines_of_one_shape(dialect, data):
+    run = st.lists(st.sampled_from(SHAPES), min_size=8, max_size=40)
+    odd = st.lists(st.sampled_from(ODD_SHAPES), max_size=2)
+    parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
+    shapes = [line for run, odd in parts for line in (*run, *odd)]
+    few = data.draw(st.sampled_from([TYPED, TYPED[:6]]))
+    numbers = data.draw(st.lists(st.sampled_from(few), min_size=20, max_size=60))
+    typed = itertools.cycle(numbers)
+    lines = [shape.format(*itertools.islice(typed, shape.count("{}"))) for shape in shapes]
+    text = "\n".join([*begun(dialect), *lines, *data.draw(st.permutations(lines)), ""])
+    assert differences(text.encode(), Start(), dialect) == []
 
 
 PLAIN = [

@@ -87,7 +87,7 @@ NEVER = {
 """What the picture alone would allow, or what matters enough to be said twice."""
 SECOND_READER = (
     *("reading", "sorting", "known", "coding", "drilling", "circling", "tracking"),
-    *("operating", "computing", "routes", "walking", "klartext", "straight", "limiting"),
+    *("operating", "worth", "computing", "routes", "walking", "klartext", "straight", "limiting"),
     *("lengths", "parameters", "labelled", "stepping", "joining", "ahead", "unread"),
 )
 """Modules of `verification` that read programs without the help of `nc`, but for its tables."""

@@ -10,6 +10,7 @@ import pytest
 from gcodejerk.nc import DIALECTS, Start, read_program
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.second_reading import agreement
+from gcodejerk.verification.second_reading.ahead import Ahead
 from gcodejerk.verification.second_reading.reading import Text
 from gcodejerk.verification.second_reading.straight import PlainLines, Straight, follow
 from gcodejerk.verification.second_reading.walking import Stepper
@@ -173,3 +174,56 @@ def test_columns_of_a_run_are_as_long_as_its_lines(rapids):
     run, end = plain.take(PROGRAM, at, tracker)
     assert end == len(PROGRAM)
     assert all(len(getattr(run, f.name)) == 120 for f in fields(Straight) if f.name != "feeds")
+
+
+COMPUTED = [
+    *("G1 X[%.3f*#10+#6] Y[%.2f*#10]", "G2 X[%.3f*#10] Y[%.2f+#7] I[#11] J[-%.1f*#10]"),
+    *("N7 G1 Z[-%.3f*#11+#8] F[#20*%.1f]", "Y[#7+%.1f]", "X[%.2f-#6]", "G3 X#6 Y#7 R[%.1f*#11]"),
+    *("", "#7=[%.1f*#10]", "G1 X-%.2f Y[%.2f]", "G01 X[#[%d]]", "Z5.", "; said", "(text)"),
+]
+ODD_COMPUTED = [
+    *("G0 X[%.2f*#10]", "G0 Z#8", "X[#99*%.1f]", "G91", "G90", "#[#7]=%.1f", "#6=#99", "M3 S[#20]"),
+    *("G1 X[1/0]", "G1 X[#6] X[#7]", "G1 F[0*%.1f] X[#6]", "/X[%.1f*#10]", "G20", "G21", "G1 A#6"),
+    *("X[%.1f*#10] (py,1)", "X[#6] (py, b=1)", "G1 X[ROUND[%.3f]]", "X[#6]" + 300 * " " + "Y1."),
+    *("G41 D1", "G40", "M98 P1", "G53 G1 X[#6]", "G1 X[%.1f] Y[", "#6=[%.1f] G1 X#6", "G28 X[#6]"),
+]
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "fanuc", "haas", "mach"])
+def test_feed_moves_whose_numbers_are_computed_do_what_they_do_one_by_one(name):
+    rng, taken = random.Random(name), 0
+    for odd in ODD_COMPUTED:
+        lines = ["G21 G90 G94 G17 G40 G49 G80", "G0 X0. Y0. Z5.", rng.choice(("F100.", ""))]
+        lines += ["#6=5.", "#7=2.5", "#8=0.", "#10=0.375", "#11=2.", "#20=100.", "#99=#5221"]
+        for _ in range(4):
+            lines += [*rng.choices(COMPUTED, k=rng.choice((2, 12))), odd]
+        data = "\n".join([*(filled(form, rng) for form in lines), ""]).encode()
+        stepper, plain, tracker = readers(name)
+        at = 0
+        while at < len(data):
+            before = tracker.copy()
+            run = Ahead(stepper, tracker, plain, None).take_run(data, at)
+            ends = run[1] if run else data.index(b"\n", at) + 1
+            if run:
+                tracker.run(run[0])
+                taken += run[0].lines
+            for bare in data[at:ends].splitlines():
+                seen = stepper.step(before, bare)
+                assert not (run and seen.sure), bare
+            if run:
+                assert run[0].lines == data.count(b"\n", at, ends)
+                assert {k: repr(v) for k, v in vars(before).items()} == {
+                    k: repr(v) for k, v in vars(tracker).items()
+                }
+            tracker, at = before, ends
+    assert taken > 100
+
+
+@pytest.mark.parametrize("line", ["G1 X[#6+1] (py,1)", "G1 X[#6+1]" + 300 * " " + "(long)"])
+def test_a_computed_line_that_is_cut_or_runs_python_is_not_understood(line):
+    stepper, _, tracker = readers("linuxcnc")
+    for known in ("G21 G90 G94 G17 G40", "#6=5.", "G0 X0. Y0. Z5.", "G1 X[#6+1] F9. (text)"):
+        stepper.step(tracker, known.encode())
+    assert tracker.at[:3] == [6.0, 0.0, 5.0]
+    stepper.step(tracker, line.encode())
+    assert np.isnan(tracker.at[:3]).all()

@@ -39,11 +39,11 @@ COMPARISONS = frozenset(("EQ", "NE", "GT", "GE", "LT", "LE", "==", "<>", ">", ">
 
 def apply(operator: str, a: float, b: float, rules: Arithmetic) -> float:
     """Compute a binary operation."""
-    if math.isnan(a) or math.isnan(b):
+    if a != a or b != b:
         return NAN
     if operator in COMPARISONS:
         return _compare(operator, a, b, rules)
-    a, b = (0.0 if x == VACANT else x for x in (a, b))
+    a, b = 0.0 if a == VACANT else a, 0.0 if b == VACANT else b
     if operator in _LOGIC:
         return _logic(operator, a, b) if rules.bits else float(_LOGIC[operator](a != 0.0, b != 0.0))
     if operator in ("MOD", "DIV"):

@@ -232,7 +232,8 @@ def number_text(value: float) -> bytes:
     """
     if value == int(value):
         return b"%d" % int(value)
-    return format(Decimal(repr(value)), "f").encode()
+    text = repr(value)
+    return (format(Decimal(text), "f") if "e" in text else text).encode()
 
 
 def _if_short(value: float, decimals: int) -> float:

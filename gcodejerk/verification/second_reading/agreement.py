@@ -238,7 +238,7 @@ def _from_above(
                 line = lines[following] if following < len(lines) else math.inf
                 continue
             motion = tracker.g.get("motion")
-            run = tracker.take_run(text, data, at)
+            run = tracker.take_run(text, data, at) or ahead.take_run(data, at)
             if run is not None:
                 against = None if motion is None else "it moves with feed"
                 tracker.run(run[0])

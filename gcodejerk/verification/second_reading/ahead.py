@@ -2,7 +2,8 @@
 
 Plain lines are taken as they stand (`straight`). Where lines compute their numbers, those that
 follow are spelled with these numbers first, as `stepping` would spell each of them; what is then a
-plain line is taken as one. Lines that only set variables, or say nothing, have no place among them.
+plain line is taken as one, and so are runs of feed moves. Lines that only set variables, or say
+nothing, have no place among them.
 
 Rule: nothing is taken of which the two readings do not agree in every rapid: such lines are
 followed one by one, and the first that differs is named.
@@ -12,11 +13,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcodejerk.verification.second_reading.reading import Run
 from gcodejerk.verification.second_reading.stepping import Stepper
 from gcodejerk.verification.second_reading.straight import FEWEST, PlainLines, Straight, follow
 from gcodejerk.verification.second_reading.tracking import Tracker
@@ -29,6 +31,8 @@ MOST = 1 << 10
 """Lines that are spelled at a time."""
 _RAPID = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?G0?0(?![0-9.])")
 """How plain lines begin that are taken together."""
+_FEED = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?G0?[23](?![0-9.])")
+"""How lines begin that are none of them."""
 PATIENCE = 1 << 10
 """After lines that could not be taken, so many bytes are followed line by line; then twice as
 many."""
@@ -58,10 +62,11 @@ class Ahead:
         self._stepper, self._tracker, self._plain, self._agrees = stepper, tracker, plain, agrees
         self._silent: dict[bytes, bool] = {}
         self._by_hand, self._patience = 0, PATIENCE
+        self._feeds_by_hand = 0
 
     def begin(self) -> None:
         """Other data follow."""
-        self._by_hand = 0
+        self._by_hand = self._feeds_by_hand = 0
 
     def take(self, data: bytes, at: int, number: int) -> tuple[int, int] | None:
         """Take the lines that begin here, as many as can be.
@@ -102,7 +107,7 @@ class Ahead:
             return None
         if not stepper.computes(_line(data, at)[0]):
             return None
-        spelled = self._spelled(data, at)
+        spelled = self._spelled(data, at, _FEED)
         if len(spelled.lines) < FEWEST:
             self._by_hand = spelled.behind[1]
             return None
@@ -118,20 +123,57 @@ class Ahead:
             return None
         self._patience = PATIENCE
         follow(tracker, run)
-        whole = len(run) == len(spelled.lines)
-        for before, settings in spelled.settings:
-            if whole or before <= len(run):
-                _set(tracker.variables, settings)
-        count, end = spelled.behind if whole else spelled.places[len(run)]
+        count, end = self._leave(spelled, len(run))
         return number + count, end
 
-    def _spelled(self, data: bytes, at: int) -> _Spelled:
-        """Spell the lines from a place on, up to one that says more than plain ones do."""
+    def take_run(self, data: bytes, at: int) -> tuple[Run, int] | None:
+        """Take feed moves whose numbers are computed, if a run of them begins here.
+
+        Parameters
+        ----------
+        data : bytes
+            Whole lines.
+        at : int
+            Begin of one of them.
+
+        Returns
+        -------
+        tuple, or None
+            The run, which is still to be followed, and where the line behind it begins.
+        """
+        tracker, stepper = self._tracker, self._stepper
+        if at < self._feeds_by_hand or stepper.computer.named:
+            return None
+        if not (tracker.may_run and stepper.computes(_line(data, at)[0])):
+            return None
+        spelled, text = self._spelled(data, at, _RAPID), stepper.text
+        tried = text.tried
+        taken = tracker.take_run(text, b"\n".join([*spelled.lines, b""]), 0)
+        text.tried = tried
+        if taken is None:
+            self._feeds_by_hand = spelled.behind[1]
+            return None
+        run = taken[0]
+        count, end = self._leave(spelled, run.lines)
+        return replace(run, lines=count), end
+
+    def _leave(self, spelled: _Spelled, used: int) -> tuple[int, int]:
+        """Set what is set among so many lines; how many that were as they stand, and their end."""
+        whole = used == len(spelled.lines)
+        for before, settings in spelled.settings:
+            if whole or before <= used:
+                _set(self._tracker.variables, settings)
+        return spelled.behind if whole else spelled.places[used]
+
+    def _spelled(self, data: bytes, at: int, others: re.Pattern[bytes]) -> _Spelled:
+        """Spell lines from a place on, up to one that says more than plain ones, or others."""
         stepper, computer, out = self._stepper, self._stepper.computer, _Spelled()
         variables, inch = dict(self._tracker.variables), self._tracker.inch
         count = 0
         while count < MOST and at < len(data):
             bare, end = _line(data, at)
+            if others.match(bare) or (stepper.computes(bare) and stepper.text.is_lost(bare)):
+                break
             text = bare
             settings: dict[str, float] | None = None
             if stepper.computes(bare):

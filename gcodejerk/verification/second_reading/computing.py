@@ -1,45 +1,40 @@
 """Numbers that a program computes, for the second reading: written into its lines, then read.
 
-A line is scanned into operands and operators; these are put into the order in which they act, and
-worked off on a stack. What comes out stands in the place of the expression, so that the reading of
-words knows nothing of variables.
+What an expression is worth (`worth`) stands in its place, so that the reading of words knows
+nothing of variables. This module owns where expressions stand in a line, what variables it sets,
+and how a number is spelled. Lines that differ in typed numbers alone are taken apart once.
 
-Rule: a number is known to the last digit that counts or not at all (NaN). What is not listed here
-is not known.
+Rule: a number is known to the last digit that counts or not at all (NaN).
 """
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
-from functools import cache
 
 from gcodejerk.nc.dialects.arithmetic import Arithmetic
 from gcodejerk.nc.dialects.dialect import Dialect
-from gcodejerk.verification.second_reading.operating import (
-    VACANT,
-    angle_of,
-    binary,
-    computed,
-    typed,
-)
+from gcodejerk.verification.second_reading.operating import typed
 from gcodejerk.verification.second_reading.reading import NAN
+from gcodejerk.verification.second_reading.worth import (
+    BLANK,
+    OPEN,
+    Expressions,
+    Steps,
+    UnknownError,
+    name_of,
+)
 
-_MOST = 400
-"""Operands and operators of an expression."""
-_BLANK = re.compile(rb"[ \t]*")
-_NUMBER = re.compile(rb"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:EX[-+]?[0-9]{1,3})?")
-_NAME = re.compile(rb"[$A-Z_][A-Z0-9_]*")
-_SIGN = re.compile(rb"[-+]")
 _HASH_WORD = re.compile(rb"(?<![A-Z])([A-FH-LP-Z])[ \t]*(?=[-+]?[ \t]*[#\[])")
 _NAMED_WORD = re.compile(rb"(?<![A-Z0-9_$])([A-FH-LP-Z])[ \t]*=[ \t]*(?:(IC|AC)[ \t]*\()?")
 _HASH_SET = re.compile(rb"#[ \t]*([0-9]+|<[^<>]*>)[ \t]*=")
-_HASH_NAME = re.compile(rb"<[^<>]*>")
-_PLAIN = (b"+", b"-", b"*", b"/")
-"""All that is computed where no control rounds: the rest has rules of its own there."""
-_SMOOTH = frozenset(("ABS", "ACOS", "ASIN", "ATAN", "COS", "EXP", "LN", "SIN", "SQRT", "TAN"))
-"""What no last digit decides: all that is computed where no control rounds."""
+_TYPED = re.compile(rb"((?<=[\[+\-*/])(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)|(?<=^N)[0-9]+)")
+"""Numbers that are typed, in expressions and behind signs: none says which variable is meant."""
+_REMEMBERED = 1 << 10
+"""Lines that are remembered taken apart, without their typed numbers."""
 _NAMED_SET = re.compile(
     rb"(?<![A-Z0-9_$\]])(R[0-9]+|(?:R|[A-Z_][A-Z_][A-Z0-9_]*)[ \t]*\[[ \t]*[0-9]+[ \t]*\]"
     rb"|[A-Z_][A-Z_][A-Z0-9_]*)"
@@ -53,12 +48,32 @@ _LISTS = re.compile(rb"=[ \t]*(?:SET|REP)[ \t]*\(")
 _COMPUTED = re.compile(
     rb"(?<![A-Z0-9_$])(?:R|[A-Z_][A-Z_][A-Z0-9_]*)[ \t]*\[[^\]]*[^0-9 \t\]][^\]]*\][ \t]*=(?!=)"
 )
+_LITERAL = re.compile(rb"[-+]?[0-9.]+")
 _FINE = re.compile(rb"[XYZABCUVWIJKR]")
 _EDGE = 1e-9
 
 
-class _UnknownError(Exception):
-    """What stands here is no expression that is known."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Word:
+    """A word with an expression, and the text in front of it."""
+
+    front: bytes
+    letter: bytes
+    steps: Steps
+    how: bytes | None
+    """``IC`` or ``AC``."""
+    raw: bytes
+    """The expression as it is written."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Apart:
+    """A line taken apart."""
+
+    words: list[_Word]
+    rest: bytes
+    kept: list[int]
+    """Typed numbers, left open, that belong to no expression."""
 
 
 class Computer:
@@ -67,8 +82,8 @@ class Computer:
     def __init__(self, dialect: Dialect) -> None:
         self.dialect, self.rules = dialect, dialect.arithmetic
         self.named = self.rules.brackets == "()"
-        functions = self.rules.functions
-        self.functions = functions & _SMOOTH if self.rules.exact else functions
+        self.expressions = Expressions(self.rules)
+        self._lines: dict[bytes, _Apart] = {}
         self.kinds: dict[str, str] = {}
         """Types of the variables that have names."""
 
@@ -81,128 +96,16 @@ class Computer:
 
     def value(self, text: bytes, variables: Mapping[str, float]) -> float:
         """Compute a whole text."""
+        number, end = self._computed(text, 0, variables)
+        return number if BLANK.match(text, end).end() == len(text) else NAN  # type: ignore[union-attr]
+
+    def _computed(self, text: bytes, at: int, variables: Mapping[str, float]) -> tuple[float, int]:
+        """Compute what begins here, and say where it ends; here, and NaN, where it is not known."""
         try:
-            number, end = self.scan(text, 0, variables)
-        except (_UnknownError, ArithmeticError, ValueError):
-            return NAN
-        return number if _BLANK.match(text, end).end() == len(text) else NAN  # type: ignore[union-attr]
-
-    def scan(self, text: bytes, at: int, variables: Mapping[str, float]) -> tuple[float, int]:
-        """Compute what begins here, and say where it ends."""
-        numbers: list[float] = []
-        waiting: list[bytes] = []
-        ranks = _ranks(self.rules.levels)
-        pattern = _operators(self.rules.levels)
-        for _ in range(_MOST):
-            number, at = self._operand(text, at, variables)
-            numbers.append(number)
-            start = _BLANK.match(text, at).end()  # type: ignore[union-attr]
-            match = pattern.match(text, start)
-            if match is None:
-                while waiting:
-                    self._work(waiting.pop(), numbers)
-                return numbers[0], at
-            operator = match[0]
-            if self.rules.exact and operator not in _PLAIN:
-                raise _UnknownError
-            while waiting and ranks[waiting[-1]] >= ranks[operator]:
-                if ranks[operator] == 0 and ranks[waiting[-1]] == 0 and _is_comparison(operator):
-                    raise _UnknownError
-                self._work(waiting.pop(), numbers)
-            waiting.append(operator)
-            at = match.end()
-        raise _UnknownError
-
-    def _operand(self, text: bytes, at: int, variables: Mapping[str, float]) -> tuple[float, int]:
-        """One operand with its sign."""
-        at = _BLANK.match(text, at).end()  # type: ignore[union-attr]
-        if match := _SIGN.match(text, at):
-            number, at = self._operand(text, match.end(), variables)
-            return (-number if match[0] == b"-" else number), at
-        if match := _NUMBER.match(text, at):
-            spelled = match[0].replace(b"EX", b"E")
-            if b"E" in spelled and not self.named:
-                raise _UnknownError
-            return float(spelled), match.end()
-        opens, closes = self.rules.brackets.encode()[:1], self.rules.brackets.encode()[1:]
-        if text[at : at + 1] == opens:
-            number, at = self.scan(text, at + 1, variables)
-            return number, self._closed(text, at, closes)
-        if text[at : at + 1] == b"#" and not self.named:
-            return self._hash(text, at + 1, variables)
-        match = _NAME.match(text, at)
-        if match is None:
-            raise _UnknownError
-        name = match[0].decode()
-        if name == "NOT" and self.named:
-            number, at = self._operand(text, match.end(), variables)
-            return float(number == 0.0) if number == number else NAN, at
-        if name in self.functions:
-            return self._function(name, text, match.end(), variables)
-        if not self.named:
-            raise _UnknownError
-        return self._variable(name, text, match.end(), variables)
-
-    def _closed(self, text: bytes, at: int, closes: bytes) -> int:
-        at = _BLANK.match(text, at).end()  # type: ignore[union-attr]
-        if text[at : at + 1] != closes:
-            raise _UnknownError
-        return at + 1
-
-    def _hash(self, text: bytes, at: int, variables: Mapping[str, float]) -> tuple[float, int]:
-        """``#5``, ``##5``, ``#[#1+2]``."""
-        at = _BLANK.match(text, at).end()  # type: ignore[union-attr]
-        if name := _HASH_NAME.match(text, at) if self.rules.exact else None:
-            return variables.get(_key(name[0]), NAN), name.end()
-        number, at = self._operand(text, at, variables)
-        if not (number == number and abs(number) < 1e6 and number.is_integer()):
+            steps, end = self.expressions.read(text, at)
+        except UnknownError:
             return NAN, at
-        if number == 0.0 and self.rules.vacant:
-            return VACANT, at
-        return variables.get(str(int(number)), NAN), at
-
-    def _variable(
-        self, name: str, text: bytes, at: int, variables: Mapping[str, float]
-    ) -> tuple[float, int]:
-        """``R5``, ``R[5]``, ``DEPTH``, ``DEPTH[2]``."""
-        if name in ("TRUE", "FALSE"):
-            return float(name == "TRUE"), at
-        if name[:1] == "R" and name[1:].isdigit():
-            name = f"R{int(name[1:])}"
-        behind = _BLANK.match(text, at).end()  # type: ignore[union-attr]
-        if text[behind : behind + 1] == b"[":
-            index, at = self.scan(text, behind + 1, variables)
-            at = self._closed(text, at, b"]")
-            whole = index == index and index >= 0.0 and index.is_integer()
-            name = (f"R{int(index)}" if name == "R" else f"{name}[{int(index)}]") if whole else ""
-        elif text[behind : behind + 1] == b"(":
-            raise _UnknownError
-        return variables.get(name, NAN), at
-
-    def _function(
-        self, name: str, text: bytes, at: int, variables: Mapping[str, float]
-    ) -> tuple[float, int]:
-        opens, closes = self.rules.brackets.encode()[:1], self.rules.brackets.encode()[1:]
-        at = _BLANK.match(text, at).end()  # type: ignore[union-attr]
-        if text[at : at + 1] != opens:
-            raise _UnknownError
-        first, at = self.scan(text, at + 1, variables)
-        if name == "ATAN2":
-            at = self._closed(text, at, b",")
-            second, at = self.scan(text, at, variables)
-            return angle_of(first, second), self._closed(text, at, closes)
-        at = self._closed(text, at, closes)
-        if name == "ATAN":
-            at = self._closed(text, at, b"/")
-            second, at = self._operand(text, at, variables)
-            angle = angle_of(first, second)
-            return (angle if angle >= 0.0 else NAN), at
-        return computed(name, 0.0 if first == VACANT else first), at
-
-    def _work(self, operator: bytes, numbers: list[float]) -> None:
-        """Work one operator off."""
-        b, a = numbers.pop(), numbers.pop()
-        numbers.append(NAN if a != a or b != b else binary(operator.decode(), a, b))
+        return self.expressions.worth(steps, variables), end
 
     # --- lines ---
 
@@ -227,37 +130,75 @@ class Computer:
         relative : dict of str to str
             Address -> ``IC`` or ``AC``, where ``X=IC(5)`` stood.
         """
-        relative: dict[str, str] = {}
-        word = _NAMED_WORD if self.named else _HASH_WORD
         if self.named and _DEF.fullmatch(text.strip()):
-            return text, relative
+            return text, {}
         text = self._packed(text)
         variables = self._before(text, variables)
         if self.named:
             text = self._without_settings(_TURN.sub(b"RPL ", _RADIUS.sub(b" ", text)))
-        out, at = [], 0
-        while match := word.search(text, at):
+            return self._filled(self._apart(text), variables, inch, [])
+        numbers: list[bytes] = []
+        if not any(mark in text for mark in (b"<", b"=", OPEN)):
+            parts = _TYPED.split(text)
+            text, numbers = OPEN.join(parts[::2]), parts[1::2]
+        apart = self._lines.get(text)
+        if apart is None:
+            if len(self._lines) >= _REMEMBERED:
+                self._lines.clear()
+            apart = self._lines[text] = self._apart(text)
+        return self._filled(apart, variables, inch, numbers)
+
+    def _apart(self, text: bytes) -> _Apart:
+        """Take a line apart."""
+        pattern = _NAMED_WORD if self.named else _HASH_WORD
+        words: list[_Word] = []
+        at = behind = 0
+        while match := pattern.search(text, behind):
             how = match[2] if self.named else None
+            behind = match.end()
             try:
-                number, end = self.scan(text, match.end(), variables)
+                steps, end = self.expressions.read(text, behind)
                 if how:
-                    end = self._closed(text, end, b")")
-            except (_UnknownError, ArithmeticError, ValueError):
-                out.append(text[at : match.end()])
-                at = match.end()
+                    end = self.expressions.closed(text, end, b")")
+            except UnknownError:
                 continue
-            letter = match[1]
+            words.append(_Word(text[at : match.start()], match[1], steps, how, text[behind:end]))
+            at = behind = end
+        rest, kept, count = text[at:], list[int](), 0
+        for word in words:
+            kept += range(count, count + word.front.count(OPEN))
+            count += word.front.count(OPEN) + word.raw.count(OPEN)
+        return _Apart(words, rest, [*kept, *range(count, count + rest.count(OPEN))])
+
+    def _filled(
+        self, apart: _Apart, variables: Mapping[str, float], inch: bool, numbers: Sequence[bytes]
+    ) -> tuple[bytes, dict[str, str]]:
+        """A line put together again, with numbers in the place of what is computed."""
+        relative: dict[str, str] = {}
+        values = [float(number) for number in numbers]
+        out: list[bytes] = []
+        ends = b" " if self.named else b"\0"
+        for word in apart.words:
+            letter, how, raw = word.letter, word.how, word.raw
             if how:
                 relative[letter.decode()] = how.decode()
-            raw = text[match.end() : end]
-            plain = self.named and how is None and re.fullmatch(rb"[-+]?[0-9.]+", raw)
-            rounds = b"ROUND" in raw and not self.named
-            number = raw if plain else self._number(letter, NAN if rounds else number, inch)  # type: ignore[assignment]
-            centre = how and letter in (b"I", b"J", b"K")
-            ends = b" " if self.named else b"\0"
-            out.append(text[at : match.start()] + (b" " if centre else letter + number + ends))  # type: ignore[operator]
-            at = end
-        return b"".join(out) + text[at:], relative
+            if how and letter in (b"I", b"J", b"K"):
+                out += [word.front, b" "]
+                continue
+            if self.named and how is None and _LITERAL.fullmatch(raw):
+                number = raw
+            elif b"ROUND" in raw and not self.named:
+                number = b"#"
+            else:
+                worth = self.expressions.worth(word.steps, variables, values)
+                number = self._number(letter, worth, inch)
+            out += [word.front, letter, number, ends]
+        text = b"".join([*out, apart.rest])
+        if apart.kept:
+            parts = text.split(OPEN)
+            typed = [numbers[k] for k in apart.kept]
+            text = b"".join(itertools.chain.from_iterable(zip(parts, [*typed, b""], strict=True)))
+        return text, relative
 
     def _packed(self, text: bytes) -> bytes:
         """A line without its blanks, where these may stand within numbers."""
@@ -273,12 +214,10 @@ class Computer:
         """Take out what sets variables."""
         out, at = [], 0
         while match := _NAMED_SET.search(text, at):
-            key = _key(match[1])
+            key = name_of(match[1])
             known = self._is_variable(key)
-            try:
-                end = self.scan(text, match.end(), {})[1] if known else match.end()
-            except (_UnknownError, ArithmeticError, ValueError):
-                known, end = False, match.end()
+            end = self._computed(text, match.end(), {})[1] if known else match.end()
+            known = known and end > match.end()
             out.append(text[at : match.start() if known else end])
             at = end
         return b" ".join([*out, text[at:]]) if out else text
@@ -288,7 +227,8 @@ class Computer:
         if not abs(number) < 1e9:
             return b"#"
         if self.rules.exact:
-            return format(Decimal(repr(number)), "f").encode()
+            text = repr(number)
+            return (format(Decimal(text), "f") if "e" in text else text).encode()
         decimals = 6
         if _FINE.match(letter):
             decimals = 4 if inch and letter not in b"ABC" else 3
@@ -300,7 +240,7 @@ class Computer:
         pattern = _NAMED_SET if self.named else _HASH_SET
         if self.rules.together or b"=" not in text:
             return variables
-        targets = {_key(name) for name in pattern.findall(text)}
+        targets = {name_of(name) for name in pattern.findall(text)}
         return {name: v for name, v in variables.items() if name not in targets}
 
     def settings(self, text: bytes, variables: Mapping[str, float]) -> dict[str, float] | None:
@@ -322,13 +262,10 @@ class Computer:
         found: dict[str, float] = {}
         known = dict(variables)
         for match in pattern.finditer(text):
-            key = _key(match[1])
+            key = name_of(match[1])
             if self.named and not self._is_variable(key):
                 continue
-            try:
-                number, _ = self.scan(text, match.end(), known)
-            except (_UnknownError, ArithmeticError, ValueError):
-                number = NAN
+            number, _ = self._computed(text, match.end(), known)
             number = typed(self.kinds.get(key.partition("[")[0], "REAL"), number)
             system = self.rules.system and key.isdigit() and int(key) >= self.rules.system
             again = key in found
@@ -349,13 +286,13 @@ class Computer:
             key, at, number = match[1].decode(), match.end(), 0.0
             self.kinds[key] = kind
             if match[3]:
-                try:
-                    number, at = self.scan(text, at, variables)
-                except (_UnknownError, ArithmeticError, ValueError):
+                begin = at
+                number, at = self._computed(text, at, variables)
+                if at == begin:
                     found[key] = NAN
                     break
             found[key] = NAN if match[2] else typed(kind, number)
-            at = _BLANK.match(text, at).end()  # type: ignore[union-attr]
+            at = BLANK.match(text, at).end()  # type: ignore[union-attr]
             if text[at : at + 1] != b",":
                 break
             at += 1
@@ -373,41 +310,3 @@ def is_local(name: str, rules: Arithmetic) -> bool:
     if rules.q_parameters:
         return name.startswith("QL")
     return rules.brackets == "()" and not (name[:1] == "R" and name[1:].isdigit())
-
-
-def _key(text: bytes) -> str:
-    """Name of a variable as it is written."""
-    name = text.translate(None, b" \t").decode("latin-1")
-    if name.startswith("R["):
-        name = name.translate({0x5B: None, 0x5D: None})
-    elif name.endswith("]"):
-        base, _, index = name.partition("[")
-        return f"{base}[{int(index[:-1])}]"
-    if name.isdigit():
-        return str(int(name))
-    return f"R{int(name[1:])}" if name[:1] == "R" and name[1:].isdigit() else name
-
-
-@cache
-def _ranks(levels: tuple[tuple[str, ...], ...]) -> dict[bytes, int]:
-    """How each operator binds; 0 least."""
-    return {
-        name.encode(): len(levels) - 1 - level
-        for level, names in enumerate(levels)
-        for name in names
-    }
-
-
-@cache
-def _operators(levels: tuple[tuple[str, ...], ...]) -> re.Pattern[bytes]:
-    """Any operator; one that is a word ends where the next word begins."""
-    names = sorted(_ranks(levels), key=len, reverse=True)
-    # where blanks separate words, one that is glued to a letter is another word
-    parts = [
-        re.escape(n) + (rb"(?![A-Z_])" if n.isalpha() and b"==" in names else b"") for n in names
-    ]
-    return re.compile(b"|".join(parts) or rb"(?!)")
-
-
-def _is_comparison(operator: bytes) -> bool:
-    return operator in (b"EQ", b"NE", b"GT", b"GE", b"LT", b"LE") or operator[:1] in b"=<>"

@@ -6,6 +6,7 @@ Rule: where the last digit decides, and where a control's parameter does, nothin
 from __future__ import annotations
 
 import math
+import operator as operators
 from collections.abc import Callable
 
 from gcodejerk.verification.second_reading.reading import NAN
@@ -64,7 +65,10 @@ def binary(operator: str, a: float, b: float) -> float:
     vacant = VACANT in (a, b)
     if vacant and operator in ("EQ", "NE"):
         return float((a == b) is (operator == "EQ"))
-    a, b = (0.0 if z == VACANT else z for z in (a, b))
+    a, b = 0.0 if a == VACANT else a, 0.0 if b == VACANT else b
+    if operator in _SIMPLE:
+        number = _SIMPLE[operator](a, b)
+        return number if math.isfinite(number) else NAN
     if operator in _COMPARED:
         near = abs(a - b) <= 1e-6 * max(abs(a), abs(b))
         if near and a != b and not (operator[0] in "=<>" and math.isclose(a, b, rel_tol=1e-12)):
@@ -73,13 +77,7 @@ def binary(operator: str, a: float, b: float) -> float:
         return float(_COMPARED[operator](difference))
     if operator in ("AND", "OR", "XOR", "MOD", "DIV"):
         return _whole(operator, a, b)
-    simple = {"+": a + b, "-": a - b, "*": a * b}
-    if operator in simple:
-        number = simple[operator]
-    elif operator == "/":
-        number = a / b
-    else:
-        number = math.pow(a, b)
+    number = math.pow(a, b)
     return number if math.isfinite(number) else NAN
 
 
@@ -94,6 +92,12 @@ def _whole(operator: str, a: float, b: float) -> float:
     return float(a % b if operator == "MOD" else a // b)
 
 
+_SIMPLE: dict[str, Callable[[float, float], float]] = {
+    "+": operators.add,
+    "-": operators.sub,
+    "*": operators.mul,
+    "/": operators.truediv,
+}
 _COMPARED: dict[str, Callable[[float], bool]] = {
     **dict.fromkeys(("EQ", "=="), lambda d: d == 0.0),
     **dict.fromkeys(("NE", "<>"), lambda d: d != 0.0),

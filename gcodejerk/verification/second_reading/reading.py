@@ -255,7 +255,7 @@ class Text:
             line.words, line.relative, line.deleted = said.words, said.relative, said.deleted
             line.effects, line.understood = said.effects, said.understood
             return
-        line.understood = not (is_cut(text, self.dialect) or self._acts(text))
+        line.understood = not self.is_lost(text)
         if not line.understood:
             return
         text = unsaid(text, self.dialect)
@@ -283,10 +283,10 @@ class Text:
                 text = _SPINDLE.sub(b"\0", text)
             self._words(text.replace(b"\0", b" "), line)
 
-    def _acts(self, text: bytes) -> bool:
-        """Whether a comment of a line is, or may be, a command."""
+    def is_lost(self, text: bytes) -> bool:
+        """Whether a line is cut, or a comment of it is, or may be, a command."""
         runs_python = self.python is not None and self.python.search(text) is not None
-        return runs_python or (self.dialect.text.live_comments and _runs(text))
+        return runs_python or _runs(text, self.dialect) or is_cut(text, self.dialect)
 
     def _misspelled(self, text: bytes, beside: bool) -> bool:
         """Whether the control may see other words than stand here; `beside` parentheses."""
@@ -425,9 +425,9 @@ class Text:
         return _NAME.sub(take, text)
 
 
-def _runs(text: bytes) -> bool:
+def _runs(text: bytes, dialect: Dialect) -> bool:
     """Whether a comment of a line begins with a word and a comma, and is no text to be shown."""
-    words = re.findall(rb"\([ \t]*([A-Za-z_]+)[ \t]*,", text)
+    words = re.findall(rb"\([ \t]*([A-Za-z_]+)[ \t]*,", text) if dialect.text.live_comments else []
     return any(word.upper() not in (b"MSG", b"PRINT", b"DEBUG") for word in words)
 
 

@@ -45,7 +45,7 @@ class Stepper:
                 if b"Q" in bare.upper()
                 else (tracker.follow(text.read(bare, not tracker.begun)))
             )
-        if not self.computes(bare):
+        if not self.computes(bare) or text.is_lost(bare):
             return tracker.follow(text.read(bare, not tracker.begun))
         upper = self.upper(bare)
         settings = self.computer.settings(upper, variables)
