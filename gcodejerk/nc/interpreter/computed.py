@@ -179,6 +179,8 @@ class Forms:
             if form is None or shared is not None:
                 self._remember(shape, shared)
                 return shared, typed
+            if len(self._unlike) >= REMEMBERED:
+                self._unlike.clear()
             self._unlike.add(shape)
         self._remember(text, form)
         return form, []
@@ -192,7 +194,6 @@ class Forms:
             return
         if len(self._forms) >= REMEMBERED:
             self._forms.clear()
-            self._unlike.clear()
         self._forms[said] = form
 
 
