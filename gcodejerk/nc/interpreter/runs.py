@@ -202,6 +202,8 @@ def run_plain(
     rapid = np.flatnonzero(fast)
     feeds = run.history("F", rapid)
     events[feeds.words.line] = GIVES_FEED
+    matters = dialect.whole_numbers == "machine"
+    whole = np.append(bool(state.feed_whole), feeds.words.whole() & matters)
     start, target, turned, feed = run.told(feeds, rapid)
     row = rapid + first
     said = letters.take(rapid)
@@ -216,8 +218,7 @@ def run_plain(
         words=named.take(rapid),
         turned=turned,
         feed=NAN if dialect.feed_lost else feed,
-        # F without a decimal point would have made its line odd.
-        feed_whole=feeds.behind == 0 if state.feed_whole else False,
+        feed_whole=whole.take(feeds.behind),
         reason=reasons(state, said, start, target, dialect),
         fed=np.isin(rapid, fed, assume_unique=True),
     )
@@ -233,7 +234,7 @@ def run_plain(
         feeding = (named != 0) & (motion != 0)
         log.habits |= bool((feeding & (letters & BIT["S"] != 0)).any())
     state.motion = _motion_behind(letters, motion, state, dialect)
-    state.feed_whole = bool(state.feed_whole) and not len(feeds.words.line)
+    state.feed_whole = bool(whole[-1])
     return Taken.of(last, row + place[0], columns["reason"], state)
 
 

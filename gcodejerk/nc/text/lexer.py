@@ -200,16 +200,15 @@ def _many_digits(joints: Joints, width: Places, most: int) -> Flags:
 def _whole(joints: Joints) -> Flags:
     """Which words hold a number whose meaning hangs on a decimal point that it lacks.
 
-    And F0, which is restored as it was written.
+    Not F, which means the same and is restored as it was written; but F0 is odd.
     """
     kind = joints.kind
-    pointed = _next(kind == DOT)
-    pointed |= _next(kind == SIGN) & _next(pointed)
-    word = np.flatnonzero((kind >= LETTERS) & ~pointed)
+    word = np.flatnonzero(kind >= LETTERS)
     word = word[~np.isin(kind.take(word), np.frombuffer(b"GNS", dtype=np.uint8))]
+    word = word[joints.pointless(word)]
     value = parse_numbers(joints.text, *joints.numbers(word))
     bad = np.zeros(len(kind), dtype=np.bool_)
-    bad[word[(value != 0.0) | (kind.take(word) == ord("F"))]] = True
+    bad[word[(value != 0.0) != (kind.take(word) == ord("F"))]] = True
     return bad
 
 

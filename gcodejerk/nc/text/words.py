@@ -43,6 +43,13 @@ class Joints:
         after += self.kind.take(after) == DOT
         return self.place.take(word) + 1, self.place.take(after)
 
+    def pointless(self, word: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether the numbers behind these joints have no decimal point."""
+        after = word + 1
+        after += self.kind.take(after) == SIGN
+        whole: NDArray[np.bool_] = self.kind.take(after) != DOT
+        return whole
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Words:
@@ -57,6 +64,10 @@ class Words:
     def values(self) -> NDArray[np.float64]:
         """Read the numbers of all of them, in the program's own unit."""
         return read_words([(self, slice(None))])[0]
+
+    def whole(self) -> NDArray[np.bool_]:
+        """Whether they are written without a decimal point."""
+        return self.joints.pointless(self.joint)
 
     def codes(self) -> NDArray[np.uint8]:
         """The codes of G words, which on plain lines are 0 to 3, without a point."""
