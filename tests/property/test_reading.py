@@ -204,6 +204,7 @@ ODD = [
     *("(expr, a=5)", "(_do ,1)", "(print, 1)", "X5. (expr, 1)", "F0", "F0.", "G1 F0", "F80", "C5."),
     *("X1. X2.", "G1 X2.Z3. Z4.", "U1.", "A-0", "G91", "G90", "G20", "M98 P1", "GOTO 5", "/X1."),
     *("E5.", "S5", "$1=2", "T1", "D1", "H1", "x1.", "X 1.5", "X1 .5", "G01", "G1.0", "X1E2"),
+    *("G54", "G55", "G92 X5. Y1.", "G52 Z2.", "G92.1", "TRANS X5", "ATRANS Y1", "G54 G91", "G53"),
     *("L X+5 FMAX", "5 L X+5", "*5", "N1X1.", "M220 S50", "M117 hello", "//x", "G17", "R2", "S"),
 ]
 """What some controls take for a command, a word of their own, or a mistake."""
@@ -219,6 +220,19 @@ def test_quick_and_careful_reading_agree_in_every_dialect(dialect, data):
     lines += [line for run, odd in parts for line in (*run, *odd)]
     start = Start(decimal_point=data.draw(st.sampled_from([None, "calculator"])))
     assert differences("\n".join([*lines, ""]).encode(), start, dialect) == []
+
+
+SHIFTS = ["G54", "G54\nG55", "G92 X5. Y1.", "G52 X1.", "TRANS X5 Y2", "G54\nG65 P1", "M98 P7", ""]
+
+
+@pytest.mark.parametrize("dialect", sorted(DIALECTS))
+@pytest.mark.parametrize("shift", SHIFTS)
+def test_quick_and_careful_reading_agree_behind_a_shift_of_the_frame(dialect, shift):
+    begin = ["G21 G90 G94 G17 G40", "G0 X0. Y0. Z0.", "G1 X1. F100.", shift, "G0 Z5."]
+    told = 30 * ["G0 X1.5", "G1 X2.5 F90."]
+    by = ["G91", *30 * ["G0 X1. Y-1.", "G1 Z-1."], "G90", *30 * ["G0 Y1.5", "X2."]]
+    for lines in ((*begin, *told, *by), (*begin, *by, *told), (*begin, "G53 G0 Z0", *by)):
+        assert differences("\n".join([*lines, ""]).encode(), Start(), dialect) == []
 
 
 @QUICK

@@ -102,6 +102,20 @@ def test_lines_taken_at_once_do_what_they_do_one_by_one(name):
     assert taken > 100
 
 
+def test_plain_lines_behind_a_shift_of_the_frame_tell_where_their_axes_are():
+    begin = ["G71 G90 G94 G17 G40 G64", "G0 X0. Y0. Z5.", "G1 X1. F100.", "TRANS X5 Y2 Z1"]
+    data = b"G0 X2.5\nG1 Z3.\n" * 8
+    stepper, plain, tracker = readers("siemens")
+    for line in begin:
+        stepper.step(tracker, line.encode())
+    before = tracker.untold.copy()
+    assert before.keys() >= {"X", "Y", "Z"}
+    run, end = plain.take(data, 0, tracker)
+    assert (end, len(run)) == (len(data), 16)
+    follow(tracker, run)
+    assert before.keys() - tracker.untold.keys() == {"X", "Z"}
+
+
 PROGRAM = b"G21 G90 G94 G17 G40 G64\nG0 X0 Y0 Z5\nF100\n" + b"".join(
     b"G0 X%d.5 Y%d\nG1 Z-3\nG0 Z5\n" % (k, k % 3) for k in range(40)
 )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.dialect import ARC_CENTRES, LEFT_OVER, LINEAR, PLANES, Dialect
-from gcodejerk.nc.dialects.gcodes import G40
+from gcodejerk.nc.dialects.gcodes import G40, G90, G91
 from gcodejerk.nc.interpreter.arcs import doubtful
 from gcodejerk.nc.interpreter.eligibility import barred, why_compensated
 from gcodejerk.nc.interpreter.limits import beyond_path
@@ -85,8 +85,14 @@ def can_run(state: State, dialect: Dialect) -> bool:
         and state.cycle is None
         and state.bars.get(LEFT_OVER, False) is False
         and not any(on is not False for on in state.transforms.values())
-        and not any(on is not False for on in state.shifted.values())
+        # An increment may travel the shift of its axis, or not; absolute words say where it is.
+        and (state.distance != G91 or not is_shifted(state))
     )
+
+
+def is_shifted(state: State) -> bool:
+    """Whether the frame of an axis was shifted, and no absolute word has told its place since."""
+    return any(on is not False for on in state.shifted.values())
 
 
 def _plain_state(state: State, dialect: Dialect) -> bool:
@@ -235,6 +241,9 @@ def run_plain(
         log.habits |= bool((feeding & (letters & BIT["S"] != 0)).any())
     state.motion = _motion_behind(letters, motion, state, dialect)
     state.feed_whole = bool(whole[-1])
+    if state.shifted and state.distance == G90:
+        told = {AXES[axis] for axis in axes_of(int(np.bitwise_or.reduce(named)))}
+        state.shifted = {a: on if a not in told else False for a, on in state.shifted.items()}
     return Taken.of(last, row + place[0], columns["reason"], state)
 
 

@@ -27,6 +27,7 @@ from gcodejerk.nc.interpreter.runs import (
     CENTRES,
     Taken,
     can_run,
+    is_shifted,
     reasons,
     sure_lines,
 )
@@ -38,7 +39,7 @@ _NOBODY_KNOWS = -1
 
 def can_run_unfed(state: State, dialect: Dialect) -> bool:
     """Whether the state is one that such runs are computed in."""
-    plain = state.distance == G90 and state.compensation == G40
+    plain = state.distance == G90 and state.compensation == G40 and not is_shifted(state)
     return plain and (can_run(state, dialect) or _without_motion(state, dialect))
 
 

@@ -217,6 +217,10 @@ def follow(tracker: Tracker, run: Straight) -> None:
     """Stand where plain lines end."""
     tracker.begun = tracker.started = True
     tracker.at[: len(PLAIN_AXES)] = run.end[-1].tolist()
+    named = int(np.bitwise_or.reduce(run.axes))
+    for k, axis in enumerate(PLAIN_AXES):
+        if named >> k & 1:
+            tracker.untold.pop(axis, None)
     tracker.g["motion"] = 0 if run.rapid[-1] else G1
     if run.feeds:
         tracker.feed, tracker.feed_whole = float(run.feed[-1]), bool(run.whole[-1])
