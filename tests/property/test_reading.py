@@ -200,6 +200,8 @@ PLAIN = [
     *("G1 X3. F80", "X3.5 F120", "G0 Z2. F70"),
     *("G0 X12.345678901234567 Y.00000000000000000125", "G1 X-0.3333333333333333148296 F100."),
 ]
+WHOLE = ["X5 Y-7", "G1 Z3 F80", "N8 G0 X1 Y2", "G2 X3 Y1 I1 J0", "F0", "G0 X0 Z4"]
+"""Taken at once where the owner says what a number without a decimal point is."""
 ODD = [
     *("(expr, a=5)", "(_do ,1)", "(print, 1)", "X5. (expr, 1)", "F0", "F0.", "G1 F0", "F80", "C5."),
     *("X1. X2.", "G1 X2.Z3. Z4.", "U1.", "A-0", "G91", "G90", "G20", "M98 P1", "GOTO 5", "/X1."),
@@ -213,12 +215,14 @@ ODD = [
 @settings(QUICK, max_examples=150)
 @given(st.sampled_from(sorted(DIALECTS)), st.data())
 def test_quick_and_careful_reading_agree_in_every_dialect(dialect, data):
-    run = st.lists(st.sampled_from(PLAIN), min_size=8, max_size=40)
-    odd = st.lists(st.sampled_from(ODD), max_size=2)
+    point = data.draw(st.sampled_from([None, "calculator", "increment"]))
+    plain = [*PLAIN, *WHOLE[: 6 * (point == "calculator")]]
+    run = st.lists(st.sampled_from(plain), min_size=8, max_size=40)
+    odd = st.lists(st.sampled_from([*ODD, *WHOLE]), max_size=2)
     parts = data.draw(st.lists(st.tuples(run, odd), min_size=1, max_size=4))
     lines = ["G21 G90 G94 G17 G40", "G0 X0. Y0. Z0.", "G1 X1. F100."]
     lines += [line for run, odd in parts for line in (*run, *odd)]
-    start = Start(decimal_point=data.draw(st.sampled_from([None, "calculator"])))
+    start = Start(decimal_point=point)
     assert differences("\n".join([*lines, ""]).encode(), start, dialect) == []
 
 

@@ -194,6 +194,8 @@ class Dialect:
     """Address of increments -> its axis, for example U -> X."""
     whole_numbers: Literal["units", "machine"] = "units"
     """Is X100 100 mm? It is; or a parameter of the machine decides."""
+    calculator: bool = False
+    """And the owner of the machine says that it is (`set_up`)."""
     diameter_codes: bool = False
     """A program may state whether X is a diameter."""
     diameter_fixed: bool = False
@@ -333,10 +335,13 @@ class Dialect:
         ----------
         start : Start
             Codes that are harmless, M codes that run before the motion of their block, or behind
-            it, the axes that there are, and whether F matters to a rapid. Of M codes that do more
-            than switch a spindle, coolant or auxiliaries, nothing is believed.
+            it, the axes that there are, whether F matters to a rapid, and what a number without a
+            decimal point is. Of M codes that do more than switch a spindle, coolant or auxiliaries,
+            nothing is believed.
         """
         dialect = self.with_harmless(start.harmless)
+        if self.whole_numbers == "machine" and start.decimal_point == "calculator":
+            dialect = replace(dialect, calculator=True)
         if lacking := self.refuses.axes - start.limits.keys():
             dialect = replace(dialect, letters="".join(a for a in self.letters if a not in lacking))
         if not start.restores and start.rapid_feed is None:

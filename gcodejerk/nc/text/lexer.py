@@ -169,7 +169,7 @@ def _doubtful_numbers(joints: Joints, width: Places, dialect: Dialect) -> Flags:
     if dialect.text.digits:
         bad |= _many_digits(joints, width, dialect.text.number_digits or dialect.text.digits)
     if dialect.whole_numbers == "machine":
-        bad |= _whole(joints)
+        bad |= _whole(joints, dialect)
     return bad
 
 
@@ -197,13 +197,13 @@ def _many_digits(joints: Joints, width: Places, most: int) -> Flags:
     return bad
 
 
-def _whole(joints: Joints) -> Flags:
+def _whole(joints: Joints, dialect: Dialect) -> Flags:
     """Which words hold a number whose meaning hangs on a decimal point that it lacks.
 
     Not F, which means the same and is restored as it was written; but F0 is odd.
     """
     kind = joints.kind
-    word = np.flatnonzero(kind >= LETTERS)
+    word = np.flatnonzero(kind == ord("F") if dialect.calculator else kind >= LETTERS)
     word = word[~np.isin(kind.take(word), np.frombuffer(b"GNS", dtype=np.uint8))]
     word = word[joints.pointless(word)]
     value = parse_numbers(joints.text, *joints.numbers(word))
