@@ -11,6 +11,7 @@ from gcodejerk.nc import DIALECTS, Start, read_program
 from gcodejerk.verification.findings import Findings
 from gcodejerk.verification.second_reading import agreement
 from gcodejerk.verification.second_reading.ahead import Ahead
+from gcodejerk.verification.second_reading.computing import Computer
 from gcodejerk.verification.second_reading.reading import Text
 from gcodejerk.verification.second_reading.straight import PlainLines, Straight, follow
 from gcodejerk.verification.second_reading.walking import Stepper
@@ -241,3 +242,23 @@ def test_a_computed_line_that_is_cut_or_runs_python_is_not_understood(line):
     assert tracker.at[:3] == [6.0, 0.0, 5.0]
     stepper.step(tracker, line.encode())
     assert np.isnan(tracker.at[:3]).all()
+
+
+@pytest.mark.parametrize("run", [["G1 X[#1+1]"] * 4, ["G0 X[#1+1]", *["G1 Y[#1]"] * 8]])
+@pytest.mark.parametrize("often", [1, 100])
+def test_what_is_looked_at_ahead_is_soon_taken(monkeypatch, run, often):
+    looked = []
+    spelled = Computer.spelled
+
+    def counted(self, text, variables, inch):
+        looked.append(text)
+        return spelled(self, text, variables, inch)
+
+    monkeypatch.setattr(Computer, "spelled", counted)
+    lines = ["G21 G90 G94 G17 G40 G64", "G0 X0 Y0 Z5", "F100", "#1=5"]
+    for _ in range(3000 // (often * len(run) + 1)):
+        lines += [*run * often, "M8"]
+    rapids = read_program(io.BytesIO("\n".join([*lines, "G0 Z9", ""]).encode())).rapids
+    monkeypatch.setattr(f"{__name__}.PROGRAM", "\n".join([*lines, "G0 Z9", ""]).encode())
+    assert not compared(rapids)[1]
+    assert len(looked) < 5 * len(lines)

@@ -27,8 +27,8 @@ Numbers = NDArray[np.int64]
 Agrees = Callable[[Straight, Numbers, Tracker], bool]
 """Whether the two readings agree in plain lines, which stand at these places, in this state."""
 
-MOST = 1 << 10
-"""Lines that are spelled at a time."""
+MOST, AT_FIRST = 1 << 10, 16
+"""Lines that are spelled at a time at most; then twice as many as were taken."""
 _RAPID = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?G0?0(?![0-9.])")
 """How plain lines begin that are taken together."""
 _FEED = re.compile(rb"[ \t]*(?:N[0-9]+[ \t]*)?G0?[23](?![0-9.])")
@@ -63,6 +63,7 @@ class Ahead:
         self._silent: dict[bytes, bool] = {}
         self._by_hand, self._patience = 0, PATIENCE
         self._feeds_by_hand = 0
+        self._reach = AT_FIRST
 
     def begin(self) -> None:
         """Other data follow."""
@@ -159,6 +160,7 @@ class Ahead:
 
     def _leave(self, spelled: _Spelled, used: int) -> tuple[int, int]:
         """Set what is set among so many lines; how many that were as they stand, and their end."""
+        self._reach = min(max(2 * used, AT_FIRST), MOST)
         whole = used == len(spelled.lines)
         for before, settings in spelled.settings:
             if whole or before <= used:
@@ -170,7 +172,7 @@ class Ahead:
         stepper, computer, out = self._stepper, self._stepper.computer, _Spelled()
         variables, inch = dict(self._tracker.variables), self._tracker.inch
         count = 0
-        while count < MOST and at < len(data):
+        while count < self._reach and at < len(data):
             bare, end = _line(data, at)
             if others.match(bare) or (stepper.computes(bare) and stepper.text.is_lost(bare)):
                 break
