@@ -174,11 +174,12 @@ class Ahead:
         count = 0
         while count < self._reach and at < len(data):
             bare, end = _line(data, at)
-            if others.match(bare) or (stepper.computes(bare) and stepper.text.is_lost(bare)):
+            computes = stepper.computes(bare)
+            if others.match(bare) or (computes and stepper.text.is_lost(bare)):
                 break
             text = bare
             settings: dict[str, float] | None = None
-            if stepper.computes(bare):
+            if computes:
                 upper = stepper.upper(bare)
                 settings = computer.settings(upper, variables)
                 if settings is None or (settings and not self._is_silent(bare)):

@@ -217,7 +217,7 @@ class Computer:
             key = name_of(match[1])
             known = self._is_variable(key)
             end = self._computed(text, match.end(), {})[1] if known else match.end()
-            known = known and end > match.end()
+            known = end > match.end()
             out.append(text[at : match.start() if known else end])
             at = end
         return b" ".join([*out, text[at:]]) if out else text
