@@ -3,8 +3,9 @@
     python tests/bench/bench_reading.py [--megabytes 10] [--memory]
 
 The finishing program is three-axis, modal words omitted, with a retract and an approach every 200
-lines; in Klartext each line has its number; the printed part is Marlin's, with extrusion. The last
-three are the finishing program without its feed mode, with blanks in its words, and with A for Y.
+lines; in Klartext each line has its number; the printed part is Marlin's, with extrusion. The
+others are the finishing program as posts and shops write it: without its feed mode, with an F in
+each line, in whole numbers, behind a work system, with blanks in its words, and with A for Y.
 The plain tracker does the least that finds the rapids: a regular expression over each line, G0 to
 G3 or FMAX, G90, G91 and the last X, Y, Z. `--memory` reads 100 MB in a fresh process and prints
 its largest resident size.
@@ -20,7 +21,7 @@ import tempfile
 import numpy as np
 from timing import best_of
 
-from gcodejerk.nc import CERTAIN, read_program
+from gcodejerk.nc import CERTAIN, Start, read_program
 
 
 def finishing_program(lines):
@@ -87,6 +88,22 @@ def without_feed_mode(lines):
     return finishing_program(lines).replace(b" G94", b"")
 
 
+def with_feeds(lines):
+    """The same with an F in each path, whole as most posts write it."""
+    return re.sub(rb"(Z[-0-9.]+)\nX", rb"\1 F1200\nX", finishing_program(lines))
+
+
+def whole_numbers(lines):
+    """The same in whole millimetres, where the machine file says that 5 is 5 mm."""
+    return re.sub(rb"([XYZ]-?[0-9]+)\.[0-9]*", rb"\1", finishing_program(lines))
+
+
+def behind_a_work_system(lines):
+    """The same for Siemens, behind a work system of which nobody says where it is."""
+    data = finishing_program(lines).replace(b"G21", b"G710 G64", 1)
+    return data.replace(b"\nG0 Z50.", b"\nG54\nG0 Z50.", 1)
+
+
 def with_blanks(lines):
     """The same with blanks in front of numbers, as dxf2gcode writes them."""
     return re.sub(rb"([XYZ])(?=[-0-9])", rb" \1  ", finishing_program(lines))
@@ -140,15 +157,20 @@ def main():
         "Klartext finishing": (klartext_program, "klartext"),
         "printed part": (printed_part, "marlin"),
         "no G94, for Fanuc": (without_feed_mode, "fanuc"),
+        "F in each line, Haas": (with_feeds, "haas"),
+        "whole numbers, Haas": (whole_numbers, "haas"),
+        "behind G54, Siemens": (behind_a_work_system, "siemens"),
         "blanks in front": (with_blanks, "linuxcnc"),
+        "blanks, for Fanuc": (with_blanks, "fanuc"),
         "a rotary axis": (with_a, "linuxcnc"),
     }
+    start = Start(decimal_point="calculator")
     for name, (make, dialect) in makers.items():
         data = make(lines)
         megabytes = len(data) / 1e6
 
         def read(data=data, dialect=dialect, fast=True):
-            return read_program(io.BytesIO(data), dialect=dialect, fast=fast)
+            return read_program(io.BytesIO(data), dialect=dialect, start=start, fast=fast)
 
         quick, program = best_of(read)
         plain, found = best_of(lambda data=data: plain_tracker(data))

@@ -448,7 +448,13 @@ def test_blanks_in_front_of_numbers_are_put_behind_them(text):
     assert closed_up(text) == GAP.sub(rb"\1\3\2", text)
 
 
-@pytest.mark.parametrize("dialect", ["linuxcnc", "grbl", "mach", "rs274"])
+@pytest.mark.parametrize(
+    "dialect",
+    [
+        *("linuxcnc", "grbl", "mach", "rs274", "fanuc", "haas", "fanuc-lathe-a", "any-mill"),
+        *("mitsubishi", "centroid", "uccnc", "heidenhain-iso"),
+    ],
+)
 def test_runs_are_taken_at_once_where_blanks_stand_in_front_of_numbers(dialect):
     lines = ["G21 G90 G94 G17 G40", *["G0 X  1.000 Y  5.500", "G1 X 2.5 F  90"] * 500, ""]
     assert read_program(io.BytesIO("\n".join(lines).encode()), dialect=dialect).steps < 60

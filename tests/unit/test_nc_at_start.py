@@ -91,8 +91,14 @@ def test_a_refusal_names_the_place_in_the_machine_file():
 
 @pytest.mark.parametrize("dialect", ["linuxcnc", "grbl", "fanuc", "uccnc", "syntec"])
 def test_codes_that_no_such_control_has_are_refused(dialect):
-    with pytest.raises(ProgramError, match=f"{dialect} refuses 'G21 G90 G77.7'"):
-        read_program(io.BytesIO(PROGRAM), dialect=dialect, start=at_start("G21 G90 G77.7"))
+    startup = "G21 G77.7 G90 M377.5"
+    with pytest.raises(ProgramError, match=f"{dialect} refuses G77.7, M377.5 of '{startup}'"):
+        read_program(io.BytesIO(PROGRAM), dialect=dialect, start=at_start(startup))
+
+
+def test_codes_that_cannot_stand_together_are_refused_as_a_whole():
+    with pytest.raises(ProgramError, match="linuxcnc refuses 'G90 G91'"):
+        read_program(io.BytesIO(PROGRAM), dialect="linuxcnc", start=at_start("G90 G91"))
 
 
 @pytest.mark.parametrize(

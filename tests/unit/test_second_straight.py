@@ -21,6 +21,11 @@ PLAIN = [
     "G01X%.2fY-%.2fF%d",
     *("N12 G0 X%.3f Y%.3f Z%.3f", "N13 G1 X%.2f", "G0X%.1f F%d.", "G1 X%.2f Y%.2f Z-%.2f F%d"),
 ]  # fmt: skip
+GAPS = ["G0 X %.3f Y\t%.3f", "G1 Z  -%.1f F%d.5", "X %.1fY  -%.2f ", "N12 G0 Z +.5 X %.2f"]
+"""Blanks in front of numbers."""
+ODD_GAPS = [
+    *("G0 X - %.1f", "G0 X %.1f 5", "G1 X 1 %.1f", "G 0 X%.1f", "G1 Z . 5", "F %d", "G0 X", "N 5"),
+]
 ODD = [
     *("G91", "G90", "(text)", "G20", "G21", "M3 S100", "M5", "G54", "G55", "G0", "F%d", ""),
     "G4 P1",
@@ -47,9 +52,9 @@ def filled(form, rng):
     return form % tuple(rng.uniform(1, 90) for _ in range(form.count("%")))
 
 
-def drawn(rng, odd, klartext=False):
+def drawn(rng, odd, klartext=False, gaps=False):
     lines = ["G90 G94 G17 G40 G49", "G21", "G0 X0. Y0. Z5.", "F100."]
-    plain_forms, odd_forms = PLAIN, ODD
+    plain_forms, odd_forms = (PLAIN + GAPS, ODD + ODD_GAPS) if gaps else (PLAIN, ODD)
     if klartext:
         lines = ["0 BEGIN PGM PART MM", "1 L X+0 Y+0 Z+5 R0 F100"]
         plain_forms, odd_forms = STATEMENTS, ODD_STATEMENTS
@@ -72,11 +77,12 @@ def same(a, b):
     return repr(a) == repr(b)
 
 
+@pytest.mark.parametrize("gaps", [False, True])
 @pytest.mark.parametrize("name", ["linuxcnc", "grbl", "fanuc", "haas", "mach", "klartext"])
-def test_lines_taken_at_once_do_what_they_do_one_by_one(name):
+def test_lines_taken_at_once_do_what_they_do_one_by_one(name, gaps):
     rng, taken = random.Random(name), 0
     for odd in (0.0, 0.1, 0.4):
-        data = drawn(rng, odd, name == "klartext")
+        data = drawn(rng, odd, name == "klartext", gaps)
         stepper, plain, tracker = readers(name)
         at = 0
         while at < len(data):

@@ -100,6 +100,12 @@ class Text:
         """Length of a line up to which none is too long."""
         return self.characters or self.line_limit
 
+    @property
+    def loose(self) -> bool:
+        """Blanks may stand between a letter and its number, whatever letter it is."""
+        odd = self.klartext or self.tight or self.adjoining or not self.padded
+        return self.blanks == "anywhere" or not odd
+
     def unsaid(self, text: bytes) -> bytes:
         """Cut a line where its message begins."""
         message = _MESSAGE.match(text) if self.messages else None

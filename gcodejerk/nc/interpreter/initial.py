@@ -113,8 +113,10 @@ def _run_startup(state: State, dialect: Dialect, start: Start) -> None:
     each = [Block(words=(word,)) for word in block.words]
     steps = [executor.run(line) for line in (each if dialect.one_command else [block])]
     if any(step.fault or step.unknown for step in steps):
+        unknown = _unknown_codes(block, dialect, start)
+        which = f"{', '.join(unknown)} of {taken!r}" if unknown else repr(taken)
         raise ProgramError(
-            f"program.startup: the dialect {dialect.name} refuses {taken!r}",
+            f"program.startup: the dialect {dialect.name} refuses {which}",
             "give codes that it has, and that may stand together; or state the dialect of the "
             "control that starts so (--dialect, or dialect in the machine file)",
             start.startup_at,
@@ -122,6 +124,13 @@ def _run_startup(state: State, dialect: Dialect, start: Start) -> None:
     state.feed_unit = state.unit  # what holds at the start is the control's own unit
     if "tool length" in _groups_of(block, dialect):
         state.tool = [0.0] * len(AXES)
+
+
+def _unknown_codes(block: Block, dialect: Dialect, start: Start) -> list[str]:
+    """List the codes of a block that the dialect does not have, each by itself, as written."""
+    each = [Block(words=(word,)) for word in block.words if word.letter in "GM"]
+    steps = [Executor(dialect_at_start(dialect), State(), start).run(one) for one in each]
+    return [step.unknown for step in steps if step.unknown]
 
 
 def _groups_of(block: Block, dialect: Dialect) -> set[str]:

@@ -1,8 +1,8 @@
 """The quick reading of a chunk: every plain line at once, as arrays.
 
 Rule: when in doubt a line is read with care. A plain line holds letters of a small vocabulary, each
-at most once and directly followed by a decimal number (or behind blanks, where blanks count
-nowhere), with blanks between words and comments anywhere; G0 to G3 are its only codes. Whatever
+at most once and directly followed by a decimal number (or behind blanks, where these do not
+matter), with blanks between words and comments anywhere; G0 to G3 are its only codes. Whatever
 else stands on a line makes it one for the careful `tokenizer`.
 
 Whether a line is plain shows in its `joints` and their distances: no number is read for that, but
@@ -65,7 +65,7 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     # A line feed stands in front of the first line, and one behind the last.
     text = b"\n" * _PAD + data + (b"" if complete else b"\n") + b"\n" + b"0" * AROUND
     joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
-    if dialect.text.blanks == "anywhere" and _has_gaps(joint, kind):
+    if dialect.text.loose and _has_gaps(joint, kind):
         text = closed_up(text)
         joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
     joints = Joints(np.frombuffer(text, dtype=np.uint8), joint, kind)

@@ -78,6 +78,8 @@ class PlainLines:
         number = _POINTED if decimals_matter else _NUMBER
         if dialect.text.digits:
             number = number.replace(b"[0-9]+", b"[0-9]{1,4}", 1)
+        if dialect.text.loose:
+            number = _BLANK + number
         group = _statement(number) if dialect.text.klartext else _blocks(number)
         self.pattern = re.compile(group + rb"{2,%d}" % MOST_LINES)
         self.possible = self._possible()
