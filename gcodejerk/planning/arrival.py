@@ -1,12 +1,15 @@
-"""What one move leaves when the last of its profiles has ended, at its modes and around them.
+"""What moves leave when the last of their profiles has ended, at their modes and around them.
 
-This module owns the exact residual of a profile that is no stream: of profiles that begin together
+This module owns the exact residual of profiles that are no streams: of those that begin together
 and may end at different times, as axes that position on their own do.
 """
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.motion import Profiles, grouped, profiles_response
 from gcodejerk.motion.profiles.profile import Array
@@ -14,8 +17,44 @@ from gcodejerk.motion.residual import Complex
 from gcodejerk.motion.search.objective import DENSE
 from gcodejerk.planning.plans import Modes
 
+Kind = TypeVar("Kind", np.float64, np.complex128)
 BANDS = (0.05, 0.10)
 """Relative errors of the frequencies for which the worst is looked for. [-]"""
+
+
+def each_at_arrival(profiles: Profiles, move: NDArray[np.int64], poles: Complex) -> Complex:
+    """Response of modes to each profile, when the last one of its move has ended.
+
+    Parameters
+    ----------
+    profiles : Profiles
+        l unit profiles; those of a move begin together, and the modes ring on after those that end
+        early.
+    move : ndarray of int, shape (l,)
+        The move of each: all from 0 on, rising.
+    poles : ndarray of complex, shape (m,)
+        [rad/s]
+
+    Returns
+    -------
+    ndarray of complex, shape (l, m)
+        Of a unit participation. [1/s]
+    """
+    total = profiles.total
+    arrival = np.maximum.reduceat(total, _first(move)) if len(move) else total
+    left = (arrival[move] - total)[:, np.newaxis]
+    response: Complex = profiles_response(profiles, poles) * np.exp(poles * left)
+    return response
+
+
+def summed(each: NDArray[Kind], move: NDArray[np.int64]) -> NDArray[Kind]:
+    """Sums over the profiles of each move, which are counted as in `each_at_arrival`."""
+    return np.add.reduceat(each, _first(move), axis=0) if len(move) else each
+
+
+def _first(move: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first profile of each move."""
+    return np.flatnonzero(np.diff(move, prepend=-1))
 
 
 def arrival_response(profiles: Profiles, weights: Array, poles: Complex) -> Complex:
@@ -24,7 +63,7 @@ def arrival_response(profiles: Profiles, weights: Array, poles: Complex) -> Comp
     Parameters
     ----------
     profiles : Profiles
-        l unit profiles that begin together; the modes ring on after those that end early.
+        l unit profiles that begin together.
     weights : ndarray, shape (l, m)
         Participation times displacement, with its sign. [mm]
     poles : ndarray of complex, shape (m,)
@@ -35,10 +74,8 @@ def arrival_response(profiles: Profiles, weights: Array, poles: Complex) -> Comp
     ndarray of complex, shape (m,)
         [mm/s]
     """
-    left = (profiles.total.max() - profiles.total)[:, np.newaxis]
-    response: Complex = (profiles_response(profiles, poles) * np.exp(poles * left) * weights).sum(
-        axis=0
-    )
+    move = np.zeros(len(weights), dtype=np.int64)
+    response: Complex = summed(each_at_arrival(profiles, move, poles) * weights, move)[0]
     return response
 
 

@@ -11,6 +11,7 @@ are; what is not known is counted, never taken for zero.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -18,11 +19,11 @@ from numpy.typing import NDArray
 
 from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine
-from gcodejerk.motion import Profiles, profiles_response
+from gcodejerk.motion import Profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.rows import parts
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.arrival import arrival_response
+from gcodejerk.planning.arrival import each_at_arrival, summed
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length, same_rows
 from gcodejerk.planning.task import AT_ONCE, Task
 from gcodejerk.reasons import REASONS, Reason
@@ -102,7 +103,10 @@ def left_alone(rapids: Rapids, plans: Plans) -> Left:
         residual = column(residual.shape, np.nan)
         time, length = column(len(plans), 0.0), column(len(plans), 0.0)
         first, like = same_rows(moved, rapids.lone[rows])
-        left, lasts = _today(plans, moved[first], rapids.lone[rows[first]])
+        left, lasts = column((len(first), len(modes.poles)), 0.0), column(len(first), 0.0)
+        for part in windows(len(first)):
+            some = first[part]
+            left[part], lasts[part] = _today(plans, moved[some], rapids.lone[rows[some]])
         for part in windows(len(rows)):
             residual[rows[part]], time[rows[part]] = left[like[part]], lasts[like[part]]
             length[rows[part]] = path_length(moved[part], plans.machine)
@@ -172,17 +176,23 @@ def todays_rapids(
 
 def _today(plans: Plans, moved: Array, lone: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Residual and time of the controller's own rapids."""
-    machine, modes = plans.machine, plans.modes
+    modes = plans.modes
     profiles, move, share = todays_rapids(plans, moved, lone)
-    weights = share @ modes.participation.T
     residual, time = np.zeros((len(moved), len(modes.poles))), np.zeros(len(moved))
-    for row in range(len(moved)):
-        own = np.flatnonzero(move == row) if machine.positioning != "linear" else np.array([row])
-        part = profiles.take(own)
-        response = arrival_response(part, weights[own], modes.poles)
-        residual[row] = np.abs(response) / modes.poles.imag
-        time[row] = float(part.total.max())
+    for part, rows in _parts(move, len(modes.poles)):
+        own, each = profiles.take(rows), move[rows] - part.start
+        weights = share[rows] @ modes.participation.T
+        response = summed(each_at_arrival(own, each, modes.poles) * weights, each)
+        residual[part] = np.abs(response) / modes.poles.imag
+        np.maximum.at(time[part], each, own.total)
     return residual, time
+
+
+def _parts(move: NDArray[np.int64], width: int) -> Iterator[tuple[slice, NDArray[np.int64]]]:
+    """Moves of which so many modes are looked at at once, and the profiles that they have."""
+    for part in parts(int(move.max(initial=-1)) + 1, width, AT_ONCE):
+        begin, end = np.searchsorted(move, (part.start, part.stop)).tolist()
+        yield part, np.arange(begin, end)
 
 
 def settling_times(residual: Array, modes: Modes, tolerance: float) -> Array:
@@ -251,18 +261,16 @@ def settled(
     band, tolerance = machine.design.band, machine.design.tolerance
     relative = np.linspace(1.0 - band, 1.0 + band, WITHIN if band else 1)
     out = np.zeros(int(move.max(initial=-1)) + 1)
-    for part in parts(len(out), len(modes.poles), AT_ONCE):
-        rows = np.flatnonzero((move >= part.start) & (move < part.stop))
-        own, first = profiles.take(rows), np.flatnonzero(np.diff(move[rows], prepend=-1))
-        out[part] = np.maximum.reduceat(own.total, first)
-        left = (out[move[rows]] - own.total)[:, np.newaxis]
+    for part, rows in _parts(move, len(modes.poles)):
+        own, each = profiles.take(rows), move[rows] - part.start
         weights = share[rows] @ modes.participation.T
-        waiting = np.zeros(len(first))
+        waiting = np.zeros(part.stop - part.start)
         for factor in relative.tolist():
             off = replace(modes, poles=modes.poles * factor)
-            response = profiles_response(own, off.poles) * np.exp(off.poles * left) * weights
-            residual = np.abs(np.add.reduceat(response, first, axis=0)) / off.poles.imag
+            response = summed(each_at_arrival(own, each, off.poles) * weights, each)
+            residual = np.abs(response) / off.poles.imag
             waiting += settling_times(residual, off, tolerance)
+        np.maximum.at(out[part], each, own.total)
         out[part] += waiting / len(relative)
     return out
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +26,11 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.objective import JUDGED, JUDGED_FEWEST
 from gcodejerk.motion.search.rows import parts
 from gcodejerk.motion.search.together import mixed_signs
+from gcodejerk.planning.arrival import each_at_arrival, summed
 from gcodejerk.planning.conventional import conventional_limits, todays_profiles, unit_limits
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import Modes
 from gcodejerk.spread import Spread, here
-
-Kind = TypeVar("Kind", np.complex128, np.float64)
 
 AT_ONCE = 1 << 18
 """Residuals, of moves at frequencies, that are judged at a time: some 12 MB."""
@@ -269,34 +267,27 @@ def worst_at_arrival(
     np.maximum.at(arrival, move, profiles.total)
     worst = np.zeros(len(arrival))
     every = Objective(modes.poles, modes.participation.T, modes.group)
-    octave = np.frexp(arrival)[1]
+    moves = np.flatnonzero(arrival)  # others have no profile
+    octave = np.frexp(arrival[moves])[1]
     for k in np.unique(octave):
         around = every.in_band(band, 2.0 ** float(k), JUDGED, JUDGED_FEWEST)
-        alike = np.nonzero(octave == k)[0]
+        alike = moves[octave == k]
         for part in parts(len(alike), len(around.poles), AT_ONCE):
             chosen = alike[part]
             index = np.nonzero(np.isin(move, chosen))[0]
-            left = arrival[move[index]] - profiles.total[index]
-            each = profiles_response(profiles.take(index), around.poles)
-            each *= np.exp(around.poles * left[:, np.newaxis]) * (share[index] @ around.weights)
             row = np.searchsorted(chosen, move[index])
-            largest = np.abs(_summed(each, row, len(chosen)))
+            each = each_at_arrival(profiles.take(index), row, around.poles)
+            each *= share[index] @ around.weights
+            largest = np.abs(summed(each, row))
             if off:
                 excites = 1.0 * (each != 0.0)
-                several = _summed(excites, row, len(chosen))
+                several = summed(excites, row)
                 place = np.arange(len(row)) - np.searchsorted(row, row)
                 for signs in mixed_signs(int(place.max(initial=0)) + 1):
                     sign = np.array(signs)[place, np.newaxis]
-                    scaled = np.abs(_summed(each * (1.0 + off * sign), row, len(chosen)))
-                    mixed = np.abs(_summed(excites * sign, row, len(chosen))) < several
+                    scaled = np.abs(summed(each * (1.0 + off * sign), row))
+                    mixed = np.abs(summed(excites * sign, row)) < several
                     largest = np.where(mixed, np.maximum(largest, scaled), largest)
             displacement = largest / around.poles.imag
             worst[chosen] = grouped(displacement, around.group).max(axis=1, initial=0.0)
     return worst
-
-
-def _summed(each: NDArray[Kind], row: NDArray[np.intp], count: int) -> NDArray[Kind]:
-    """Sums of rows that belong to each of so many."""
-    out = np.zeros((count, each.shape[1]), dtype=each.dtype)
-    np.add.at(out, row, each)
-    return out

@@ -164,6 +164,41 @@ def integrated(profiles, row, pole, rest):
     return state[:2]
 
 
+def kept(plans, rows, pole, participation):
+    """What a mode keeps of the profiles of a move, when the last of them has ended: integrated."""
+    total = plans.profiles.total[rows]
+    state = sum(
+        integrated(plans.profiles, row, pole, total.max() - plans.profiles.total[row])
+        * (plans.share[row] @ participation)
+        for row in rows
+    )
+    return np.hypot(state[0], (state[1] - pole.real * state[0]) / abs(pole.imag))
+
+
+@pytest.mark.parametrize("positioning", ["linear", "independent"])
+@pytest.mark.parametrize("at_once", [1, 1 << 18])
+def test_rapids_that_are_left_alone_leave_what_is_integrated(positioning, at_once, monkeypatch):
+    monkeypatch.setattr("gcodejerk.planning.settling.AT_ONCE", at_once)
+    design = dataclasses.replace(VMC.design, minimum_length=500.0)
+    machine = dataclasses.replace(VMC, positioning=positioning, design=design, controller="grbl")
+    program = b"G21 G90 G94 G17\nG0 X0 Y0 Z0\n"
+    program += b"G0 X30 Y-7\nG0 Z12\nG0 X30 Y-7\nG0 X-3 Y55 Z-4\nM2\n"
+    result = process(program, machine)
+    found, lone = result.rest, result.program.rapids.lone[[1, 2, 4]]
+    moved = np.zeros((3, len(AXES)))
+    moved[:, :3] = [[30.0, -7.0, 0.0], [0.0, 0.0, 12.0], [-33.0, 62.0, -16.0]]
+    plans = plan_moves(moved, machine, "conventional", as_today=True, lone=lone)
+    modes = plans.modes
+    assert found.unknown.tolist() == [True, False, False, False, False]
+    for rapid, move in ((1, 0), (2, 1), (4, 2)):
+        rows = np.flatnonzero(plans.move == move)
+        each = zip(modes.poles, modes.participation, strict=True)
+        wanted = [kept(plans, rows, *mode) for mode in each]
+        np.testing.assert_allclose(found.residual[rapid], wanted, atol=1e-9)
+        assert found.time[rapid] == pytest.approx(plans.profiles.total[rows].max())
+    assert found.time[3] == 0.0, "nothing moves"
+
+
 @pytest.mark.parametrize("positioning", ["linear", "independent"])
 @pytest.mark.parametrize("at_once", [1, 1 << 18])
 def test_settled_is_the_mean_of_what_is_integrated_over_the_band(positioning, at_once, monkeypatch):
@@ -183,14 +218,8 @@ def test_settled_is_the_mean_of_what_is_integrated_over_the_band(positioning, at
         for factor in np.linspace(1.0 - band, 1.0 + band, 21):
             off = dataclasses.replace(modes, poles=modes.poles * factor)
             residual = []
-            for pole, participation in zip(off.poles, modes.participation, strict=True):
-                state = sum(
-                    integrated(plans.profiles, row, pole, arrival - plans.profiles.total[row])
-                    * (plans.share[row] @ participation)
-                    for row in rows
-                )
-                damped = (state[1] - pole.real * state[0]) / abs(pole.imag)
-                residual.append(np.hypot(state[0], damped))
+            for mode in zip(off.poles, modes.participation, strict=True):
+                residual.append(kept(plans, rows, *mode))
             late.append(followed(np.array(residual), off, 0.002, step=1e-4, longest=4.0))
         assert found[move] == pytest.approx(arrival + np.mean(late), abs=2e-4)
 
