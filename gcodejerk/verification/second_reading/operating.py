@@ -34,14 +34,16 @@ def angle_of(y: float, x: float) -> float:
     return math.degrees(math.atan2(y, x))
 
 
-def computed(name: str, x: float) -> float:
-    """A function of one number; angles in degrees."""
+def computed(name: str, x: float, floor: bool) -> float:
+    """A function of one number; angles in degrees, and with `floor` FIX and FUP down and up."""
     if x != x:
         return NAN
     if name in ("FIX", "FUP", "ROUND", "TRUNC"):
         edge = x + 0.5 if name == "ROUND" else x
         if abs(edge - round(edge)) < 1e-6 and not (name != "ROUND" and x == round(x)):
             return x + 0.5 if name == "ROUND" and x > 0.0 and (x + 0.5).is_integer() else NAN
+        if name in ("FIX", "FUP") and floor:
+            return float(math.floor(x) if name == "FIX" else math.ceil(x))
         away = math.copysign(math.ceil(abs(x)), x)
         return float({"ROUND": round(x), "FUP": away}.get(name, math.trunc(x)))
     if name in ("SIN", "COS", "TAN"):

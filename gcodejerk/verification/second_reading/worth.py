@@ -230,7 +230,7 @@ class Expressions:
                     push(-pop())
                 elif what == "function":
                     x = pop()
-                    push(computed(own, 0.0 if x == VACANT else x))
+                    push(computed(own, 0.0 if x == VACANT else x, self.rules.floor))
                 elif what == "not":
                     x = pop()
                     push(float(x == 0.0) if x == x else NAN)
