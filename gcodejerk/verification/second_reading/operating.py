@@ -39,13 +39,7 @@ def computed(name: str, x: float, floor: bool) -> float:
     if x != x:
         return NAN
     if name in ("FIX", "FUP", "ROUND", "TRUNC"):
-        edge = x + 0.5 if name == "ROUND" else x
-        if abs(edge - round(edge)) < 1e-6 and not (name != "ROUND" and x == round(x)):
-            return x + 0.5 if name == "ROUND" and x > 0.0 and (x + 0.5).is_integer() else NAN
-        if name in ("FIX", "FUP") and floor:
-            return float(math.floor(x) if name == "FIX" else math.ceil(x))
-        away = math.copysign(math.ceil(abs(x)), x)
-        return float({"ROUND": round(x), "FUP": away}.get(name, math.trunc(x)))
+        return _rounded(name, x, floor)
     if name in ("SIN", "COS", "TAN"):
         if abs(x) > 1e5:
             return NAN
@@ -60,6 +54,17 @@ def computed(name: str, x: float, floor: bool) -> float:
         return abs(x)
     simple = {"SQRT": math.sqrt, "LN": math.log, "EXP": math.exp}
     return float(simple[name](x)) if name in simple else NAN
+
+
+def _rounded(name: str, x: float, floor: bool) -> float:
+    """A whole number; NaN where the last digit decides which."""
+    edge = x + 0.5 if name == "ROUND" else x
+    if abs(edge - round(edge)) < 1e-6 and not (name != "ROUND" and x == round(x)):
+        return x + 0.5 if name == "ROUND" and x > 0.0 and (x + 0.5).is_integer() else NAN
+    if name in ("FIX", "FUP") and floor:
+        return float(math.floor(x) if name == "FIX" else math.ceil(x))
+    away = math.copysign(math.ceil(abs(x)), x)
+    return float({"ROUND": round(x), "FUP": away}.get(name, math.trunc(x)))
 
 
 def binary(operator: str, a: float, b: float) -> float:
