@@ -43,8 +43,8 @@ from gcodejerk.verification.table import TableReader, is_table
 
 MOST = 100
 """Violations that are collected, unless asked otherwise."""
-HAL_BYTES = 1 << 18
-"""The same where the points stand in another file: some hundred rapids."""
+HAL_BYTES = 1 << 16
+"""The same where the points stand in another file: one or two hundred rapids."""
 NAMES = ("<original>", "<processed>")
 BESIDE = ".streams"
 """Added to a program's name: its file of samples."""
