@@ -78,6 +78,18 @@ def test_lines_that_differ_in_more_than_typed_numbers_have_forms_of_their_own(on
     assert not second[1]
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(b"G#1 X5.", b"M#1 X[#2]", b"N#1 X5.", b"H#1 X[#2]", b"T[#1]", b"D#1 X#2", b"P[#1*2]"),
+        *(b"/G0 X#1", b"%", b"X#1 #2=5", b"G0 X[#1", b"X#1 X#2 #"),
+    ],
+)
+def test_what_says_more_than_a_plain_line_has_no_form(dialect, line):
+    block = parse_line(line, dialect)
+    assert form_of(block, dialect) is None
+
+
 def test_more_typed_numbers_than_there_are_names_for_are_no_shape(dialect):
     line = b"X[" + b"+".join([b"1.5"] * (computed.MOST_TYPED + 1)) + b"]"
     forms = Forms(dialect, lambda text: parse_line(text, dialect))
