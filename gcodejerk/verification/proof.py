@@ -43,8 +43,8 @@ from gcodejerk.verification.table import TableReader, is_table
 
 MOST = 100
 """Violations that are collected, unless asked otherwise."""
-HAL_BYTES = 1 << 16
-"""The same where the points stand in another file: one or two hundred rapids."""
+HAL_BYTES = 1 << 18
+"""The same where the points stand in another file: some hundred rapids."""
 NAMES = ("<original>", "<processed>")
 BESIDE = ".streams"
 """Added to a program's name: its file of samples."""
@@ -303,8 +303,7 @@ def _judge_pair(
     for streams in batches(checked(alignment, reader), HAL_BYTES):
         written = reader.paths(streams)
         check_line(written, machine, found)
-        played = samples.paths(streams, written)
-        if played is not None:
+        for played in samples.paths(streams, written):
             _check_lines(played, program, machine, found)
             if moves(played):
                 check_dynamics(played, machine, 1, found)

@@ -13,7 +13,7 @@ goes on by the mean of the speeds at its two ends.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import BinaryIO
 
@@ -40,6 +40,8 @@ _HEAD = re.compile(
 )
 _SAMPLE = re.compile(_NUMBER + rb"\n")
 LONGEST = 200
+AT_ONCE = 1 << 16
+"""Samples that are judged at a time, about: 5 MB of positions."""
 
 
 class SampleReader:
@@ -60,8 +62,8 @@ class SampleReader:
         original = None if stream is None else stream.original_line
         self.found.add(kind, line, original, problem)
 
-    def paths(self, streams: Sequence[Stream], written: Paths) -> Paths | None:
-        """The positions that are played for streams; None where any of them cannot be read.
+    def paths(self, streams: Sequence[Stream], written: Paths) -> Iterator[Paths]:
+        """The positions that are played for streams, as far as they can be read.
 
         Parameters
         ----------
@@ -69,12 +71,18 @@ class SampleReader:
             As the program has them, in its order.
         written : Paths
             Their points.
+
+        Yields
+        ------
+        Paths
+            Of some of the streams: those of so many samples that are judged at a time.
         """
         parts: list[Array] = []
+        first = held = 0
         for k, stream in enumerate(streams):
             samples = self._samples(stream)
             if samples is None:
-                return None
+                return
             way = written.displacement[k]
             points = written.position[written.begin[k] : written.end[k]]
             share: Array | None = samples
@@ -82,13 +90,20 @@ class SampleReader:
                 feed = written.feed[written.begin[k] : written.end[k]]
                 share = self._shares(stream, samples, points, feed * written.unit[k], way)
             if share is None:
-                return None
+                return
             off = abs(float(share[-1]) - 1.0) * float(np.linalg.norm(way))
             if off > (NEAR if self.adaptive else 0.0):
                 problem = f"the samples end {off:.3g} mm off the end of the rapid"
                 self.complain(stream, problem, Kind.END)
             from_start = np.concatenate([[0.0], share])
             parts.append(written.start[k] + from_start[:, np.newaxis] * way)
+            held += len(from_start)
+            if k + 1 == len(streams) or held > AT_ONCE:
+                yield self._played(written.take(np.arange(first, k + 1)), parts)
+                parts, first, held = [], k + 1, 0
+
+    def _played(self, written: Paths, parts: Sequence[Array]) -> Paths:
+        """Streams whose positions are those of the samples, in place of the points."""
         size = np.array([len(part) for part in parts], dtype=np.int64)
         end = np.cumsum(size)
         step = np.full(written.step.shape, STEP[self.adaptive])

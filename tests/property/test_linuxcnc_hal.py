@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import patch
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
@@ -12,7 +13,7 @@ from gcodejerk.errors import GcodejerkError
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.rewrite.pipeline import process
 from gcodejerk.testing.programs import programs
-from gcodejerk.verification import verify
+from gcodejerk.verification import samples, verify
 
 VMC = Machine.load(find_machine("vmc"))
 MACHINE = replace(
@@ -38,10 +39,13 @@ def test_every_pair_is_accepted_and_shortened_samples_are_not(form, data):
         result = process(program, MACHINE, form=form, verify=False)
     except GcodejerkError:
         return
-    found = verify(program, result.output, MACHINE, beside=result.beside)
-    assert found.violations == ()
-    assert found.rewritten == result.planned
-    if result.planned:
-        rows = result.beside.splitlines(keepends=True)
-        del rows[data.draw(st.integers(0, len(rows) - 1))]
-        assert not verify(program, result.output, MACHINE, beside=b"".join(rows)).ok
+    rows = result.beside.splitlines(keepends=True) if result.planned else []
+    gone = data.draw(st.integers(0, len(rows) - 1)) if rows else None
+    damaged = b"".join(row for k, row in enumerate(rows) if k != gone)
+    for at_once in (1, samples.AT_ONCE):  # rapid by rapid, and all together
+        with patch.object(samples, "AT_ONCE", at_once):
+            found = verify(program, result.output, MACHINE, beside=result.beside)
+            assert found.violations == ()
+            assert found.rewritten == result.planned
+            if rows:
+                assert not verify(program, result.output, MACHINE, beside=damaged).ok
