@@ -40,11 +40,15 @@ def each_at_arrival(profiles: Profiles, move: NDArray[np.int64], poles: Complex)
     ndarray of complex, shape (l, m)
         Of a unit participation. [1/s]
     """
-    total = profiles.total
-    arrival = np.maximum.reduceat(total, _first(move)) if len(move) else total
-    left = (arrival[move] - total)[:, np.newaxis]
+    left = (arrivals(profiles, move)[move] - profiles.total)[:, np.newaxis]
     response: Complex = profiles_response(profiles, poles) * np.exp(poles * left)
     return response
+
+
+def arrivals(profiles: Profiles, move: NDArray[np.int64]) -> Array:
+    """When the last profile of each move has ended [s]; moves as in `each_at_arrival`."""
+    total = profiles.total
+    return np.maximum.reduceat(total, _first(move)) if len(move) else total
 
 
 def summed(each: NDArray[Kind], move: NDArray[np.int64]) -> NDArray[Kind]:

@@ -23,7 +23,7 @@ from gcodejerk.motion import Profiles
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.rows import parts
 from gcodejerk.nc import Rapids
-from gcodejerk.planning.arrival import each_at_arrival, summed
+from gcodejerk.planning.arrival import arrivals, each_at_arrival, summed
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length, same_rows
 from gcodejerk.planning.task import AT_ONCE, Task
 from gcodejerk.reasons import REASONS, Reason
@@ -184,7 +184,7 @@ def _today(plans: Plans, moved: Array, lone: NDArray[np.bool_]) -> tuple[Array, 
         weights = share[rows] @ modes.participation.T
         response = summed(each_at_arrival(own, each, modes.poles) * weights, each)
         residual[part] = np.abs(response) / modes.poles.imag
-        np.maximum.at(time[part], each, own.total)
+        time[part] = arrivals(own, each)
     return residual, time
 
 
@@ -270,8 +270,7 @@ def settled(
             response = summed(each_at_arrival(own, each, off.poles) * weights, each)
             residual = np.abs(response) / off.poles.imag
             waiting += settling_times(residual, off, tolerance)
-        np.maximum.at(out[part], each, own.total)
-        out[part] += waiting / len(relative)
+        out[part] = arrivals(own, each) + waiting / len(relative)
     return out
 
 
