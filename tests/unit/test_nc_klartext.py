@@ -23,15 +23,15 @@ START = Start(spindle="mill")
 START_UNKNOWN = "start unknown"
 
 
-def program(*lines, unit="MM"):
+def program(*lines, unit="MM", head="L X+0 Y+0 Z+50 R0 F900"):
     """A program with numbered statements."""
-    said = ["BEGIN PGM PART " + unit, "L X+0 Y+0 Z+50 R0 F900", *lines, "END PGM PART " + unit]
+    said = ["BEGIN PGM PART " + unit, head, *lines, "END PGM PART " + unit]
     return "".join(f"{k} {line}\n" for k, line in enumerate(said)).encode()
 
 
-def reasons(*lines):
+def reasons(*lines, **head):
     """What each rapid is left alone for; None where it is certain, for both readers."""
-    data = program(*lines)
+    data = program(*lines, **head)
     rapids = read_program(io.BytesIO(data), dialect="klartext", start=START).rapids
     found = Findings(9)
     rows = np.flatnonzero(rapids.reason == CERTAIN)
@@ -105,6 +105,13 @@ def test_the_sample_of_another_editor_has_its_two_certain_rapids():
     rapids = read_program(io.BytesIO(path.read_bytes()), dialect="auto", start=START).rapids
     certain = rapids.line[rapids.reason == CERTAIN].tolist()
     assert certain == [11, 16]
+
+
+@pytest.mark.parametrize("head", ["L X+0 Y+0 Z+50 F900", "M5 M9"])
+def test_a_program_begins_without_cutter_compensation(head):
+    # posts that never write R0; selecting a program cancels RL and RR
+    here = reasons("L X+5 Y+5 Z+9 F900", "L X+6 FMAX", "L X+7 RR FMAX", "L X+8 FMAX", head=head)
+    assert here == [None, *["cutter compensation active"] * 2]
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,9 @@
 """Heidenhain iTNC 530, DIN/ISO (files ``.I``); Klartext is another language and is not read.
 
-Source: iTNC 530 ISO manual p. 211. Much of the table is general knowledge that no source here
-confirmed; it is used to leave rapids alone, not to rewrite them: cycles, datum shifts, polar moves
-and machine coordinates make everything behind them unknown. In the program's head G71 means mm.
+Sources: iTNC 530 ISO manual p. 211, and p. 183 (selecting a program, and calling one, cancel radius
+compensation). Much of the table is general knowledge that no source here confirmed; it is used to
+leave rapids alone, not to rewrite them: cycles, datum shifts, polar moves and machine coordinates
+make everything behind them unknown. In the program's head G71 means mm.
 
 TNC 360 ISO manual, list of G and M functions (p. 2): G38 stops the program, G43 and G44 lengthen
 and shorten a way along an axis; M91 and M92 make the words of their block machine coordinates, M99
@@ -72,7 +73,7 @@ HEIDENHAIN_ISO = Dialect(
             CYCLE_CALL: (99,),
         }
     ),
-    defaults={"feed mode": 940, "path": 640},
+    defaults={"feed mode": 940, "compensation": 400, "path": 640},
     names=dict.fromkeys(("D9", "D10", "D11", "D12"), "label"),
     arithmetic=Q_PARAMETERS,
     effects={

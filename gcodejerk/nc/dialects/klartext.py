@@ -8,7 +8,8 @@ in front of an axis makes its word an increment, MM and INCH of BEGIN PGM are G7
 Sources: the programs and the grammar of drunsinn/language-klartext (testprogramme; grammars/
 klartext.cson), which has the statements and how numbers, Q parameters and ``~`` are written; the
 sample of NC-PB/gEdit; iTNC 530 manual, conversational, p. 491 (numbers with a comma), p. 814 (FMAX
-goes straight, indirectly); TNC 407 manual p. 5-68 (a block with R0 FMAX and an M function); TNC 155
+goes straight, indirectly); iTNC 530 ISO manual p. 183 (selecting a program, and calling one, cancel
+radius compensation); TNC 407 manual p. 5-68 (a block with R0 FMAX and an M function); TNC 155
 manual, list of M functions (M3, M4, M8, M13 and M14 act at the beginning of their block, M0, M2,
 M5, M9 and M30 at its end; M99 calls a cycle); TNC 306 technical manual p. 4-99 (M89). What cycles
 are mere definitions is general knowledge: nothing but the modes is known behind one that moves.
@@ -89,7 +90,7 @@ KLARTEXT = Dialect(
         }
     ),
     # An I in front of the axis says that a word is an increment; no code does.
-    defaults={"distance": 900, "feed mode": 940, "path": 640},
+    defaults={"distance": 900, "feed mode": 940, "compensation": 400, "path": 640},
     names=NAMES,
     arithmetic=Q_PARAMETERS,
     letters="FSTXYZABCUVW",
