@@ -13,10 +13,12 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcodejerk.errors import PlanError
 from gcodejerk.motion import profiles_response
 from gcodejerk.motion.profiles.profile import Array
+from gcodejerk.motion.search.nulls import easily_still
 from gcodejerk.motion.search.socp import require_solver
 from gcodejerk.planning.designs import question_of
 from gcodejerk.planning.optima import Progress, answers, joint_answers
@@ -48,7 +50,7 @@ def bounds(task: Task) -> Array:
     PlanError
         scipy, clarabel or daqp is not installed.
     """
-    least = np.where(task.objective.weights.any(axis=1), np.nan, 0.0)
+    least = np.where(_still(task), 0.0, np.nan)
     rows = np.nonzero(np.isnan(least))[0]
     reference = task.objective.of(task.conventional)
     if task.band:
@@ -121,12 +123,25 @@ def known_limits(plans: Plans, progress: Progress | None = None, band: float = 0
     return gathered(least_residuals(plans.repeated(first), progress, band), like)
 
 
+def _still(task: Task) -> NDArray[np.bool_]:
+    """Moves that excite nothing; and without a band, most of those that can leave nothing."""
+    still = np.logical_not(task.objective.weights.any(axis=1))
+    if task.band == 0.0:
+        for index, _ in task.alike():
+            own = task.take(index)
+            poles = own.objective.excited().poles
+            if len(poles):
+                still[index] = easily_still(own.counts, *own.limits, poles, own.interval)
+    return still
+
+
 def _joint_bounds(plans: Plans, task: Task, sets: list[list[int]]) -> Array:
     """The least that profiles which begin together leave at the last arrival, for each set [mm]."""
     modes, nothing = plans.modes, NOTHING if task.band else NULL
     until, weights = plans.counts[plans.move], plans.share @ modes.participation.T
-    questions = []
-    for rows in sets:
+    still, questions = _still(task), []
+    asked = [k for k, rows in enumerate(sets) if not still[rows].all()]
+    for rows in (sets[k] for k in asked):
         # The measure of what is small: what today's profiles leave in the worst phase.
         own, last = task.take(np.array(rows)), int(until[rows[0]])
         decay = np.exp(np.multiply.outer((last - own.counts) * task.interval, modes.poles.real))
@@ -134,8 +149,11 @@ def _joint_bounds(plans: Plans, task: Task, sets: list[list[int]]) -> Array:
         each = np.abs(response * weights[rows]) * decay
         today = max(float(modes.grouped(each.sum(axis=0)).max()), float(np.finfo(float).tiny))
         questions.append(joint_question(task, rows, weights[rows], last, today, nothing * today))
-    least = np.full(len(sets), np.nan)
-    for k, found in enumerate(joint_answers(questions, task.progress)):
-        if found is not None:
-            least[k] = found[0].worst if found[0].worst > questions[k].allowed else 0.0
+    least = np.zeros(len(sets))
+    found = joint_answers(questions, task.progress)
+    for k, question, optima in zip(asked, questions, found, strict=True):
+        if optima is None:
+            least[k] = np.nan
+        elif optima[0].worst > question.allowed:
+            least[k] = optima[0].worst
     return least

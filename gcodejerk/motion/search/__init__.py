@@ -4,6 +4,7 @@
 than four; `conditions` chooses T1 for the other two families, `cascade` chooses boxes, and
 `optimal` every jerk of a `unit_move` on the command grid, by the cone programmes of `socp`
 (`together` of several moves), or by `cutting` planes: in which blocks, `knots` says, which
-frequencies they know, `looked_at`, and `guard` what those may keep that nobody named. All others
-are judged by the one `objective`, evaluate `candidates` by the thousand, and take moves in `rows`.
+frequencies they know, `looked_at`, and `guard` what those may keep that nobody named. That a move
+can be perfectly still, `nulls` shows of many at once. All others are judged by the one `objective`,
+evaluate `candidates` by the thousand, and take moves in `rows`.
 """
