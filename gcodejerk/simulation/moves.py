@@ -35,8 +35,6 @@ MOST_MOMENTS = 100_000
 PARTS = 40
 FINER = 60
 """Moments between two, where the last one above the tolerance is looked for."""
-FINER = 60
-"""Moments between two, where the last one above the tolerance is looked for."""
 TINY = 1e-6
 """Of the whole, what may be left out where no tolerance says it. [-]"""
 FRICTION_SPACING = 1e-3
@@ -137,9 +135,10 @@ class Watch:
         return Outcome(
             time=steps.end,
             lag=np.maximum(np.abs(lag).max(axis=1, initial=0.0), late),
-            lag_at_end=lag[:, -1],
+            # Copies: a program's outcomes are kept, all that was seen of each is not.
+            lag_at_end=lag[:, -1].copy(),
             lag_rms=_rms(lag, moving),
-            deviation_at_end=seen[count : 2 * count, -1],
+            deviation_at_end=seen[count : 2 * count, -1].copy(),
             residual=self._residual(steps),
             vibration=ringing.peak(),
             settling=None if behind is None else steps.end + behind,
@@ -193,9 +192,9 @@ class Watch:
         return Outcome(
             time=steps.end,
             lag=np.abs(lag).max(axis=1),
-            lag_at_end=lag[:, last],
+            lag_at_end=lag[:, last].copy(),
             lag_rms=np.sqrt((lag[:, : last + 1] ** 2).mean(axis=1)),
-            deviation_at_end=seen[count : 2 * count, last],
+            deviation_at_end=seen[count : 2 * count, last].copy(),
             residual=self._residual(steps),
             vibration=float(off[last:].max()),
             settling=settling if settled else None,

@@ -6,6 +6,7 @@ commands are alike are simulated once.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -149,7 +150,8 @@ def simulate_rapids(
     def outcome(steps: Steps) -> Outcome:
         # There and back are alike: a machine answers to either in the same way.
         first = steps.size.ravel()[np.argmax(steps.size.ravel() != 0.0)]
-        key = steps.time.tobytes() + (np.sign(first) * steps.size + 0.0).tobytes()
+        size = np.sign(first) * steps.size + 0.0
+        key = hashlib.blake2b(steps.time.tobytes() + size.tobytes(), digest_size=16).digest()
         if key not in known:
             known[key] = watch.outcome(steps)
         return known[key]

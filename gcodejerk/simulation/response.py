@@ -74,22 +74,30 @@ class Steps:
         times : ndarray, shape (k,)
             Rising. [s]
         """
-        out = np.zeros((4, len(times), self.size.shape[2]))
+        begins = self._states()
         done = np.searchsorted(self.time, times, side="right")
-        # Between two steps a polynomial: carried from step to step, not summed over all of them.
-        state, at = np.zeros((4, self.size.shape[2])), 0.0
-        begins = np.zeros((len(self.time) + 1, 4, self.size.shape[2]))
-        for k, (moment, size) in enumerate(zip(self.time, self.size, strict=True)):
-            state = _advanced(state, moment - at)
-            state[1:] += size
-            at = moment
-            begins[k + 1] = state
-        base = begins[done]
         since = times - np.concatenate([[0.0], self.time])[done]
-        out[:] = _advanced(base.transpose(1, 0, 2), since[:, np.newaxis])
+        out = _advanced(begins[:, done], since[:, np.newaxis])
         # Behind the last step it stands, whatever rounding makes of the sums.
         out[1:, done == len(self.time)] = 0.0
         return out
+
+    def _states(self) -> Array:
+        """Position to jerk behind each step, and before the first, shape (4, n + 1, a).
+
+        Between two steps each is a polynomial: carried from step to step, as sums of what is added.
+        """
+        states = np.zeros((4, len(self.time) + 1, self.size.shape[2]))
+        x, v, a, j = (state[1:] for state in states)
+        v_before, a_before, j_before = (state[:-1] for state in states[1:])
+        gap = np.diff(self.time, prepend=0.0)[:, np.newaxis]
+        steps_v, steps_a, steps_j = self.size.transpose(1, 0, 2)
+        np.cumsum(steps_j, axis=0, out=j)
+        np.cumsum(gap * j_before + steps_a, axis=0, out=a)
+        np.cumsum(gap * (a_before + gap * j_before / 2.0) + steps_v, axis=0, out=v)
+        moved = v_before + gap * (a_before / 2.0 + gap * j_before / 6.0)
+        np.cumsum(gap * moved, axis=0, out=x)
+        return states
 
 
 def _advanced(state: Array, time: Array | float) -> Array:
@@ -246,9 +254,9 @@ class Response:
         """What vibrates at some moments, shape (m, k)."""
         hit = np.einsum("nja,jma->nm", steps.size, self.struck)
         begins = np.zeros((len(steps.time) + 1, len(self.poles)), dtype=np.complex128)
-        gaps = np.diff(steps.time, prepend=0.0)
-        for k, gap in enumerate(gaps):
-            begins[k + 1] = begins[k] * np.exp(self.poles * gap) + hit[k]
+        decay = np.exp(np.multiply.outer(np.diff(steps.time, prepend=0.0), self.poles))
+        for k in range(len(decay)):
+            begins[k + 1] = begins[k] * decay[k] + hit[k]
         done = np.searchsorted(steps.time, times, side="right")
         since = times - np.concatenate([[0.0], steps.time])[done]
         out: Complex = begins[done].T * np.exp(np.outer(self.poles, since))

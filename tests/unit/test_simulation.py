@@ -3,7 +3,7 @@
 import io
 import json
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -228,6 +228,43 @@ def test_positions_in_a_table_are_followed_as_scipy_does_it():
     _, other, _ = lsim(system, places[:, 0], times)
     mine = Response(equations).watch(steps, times, [row])[0]
     assert mine == pytest.approx(other, abs=1e-9)
+
+
+def test_a_command_is_the_integral_of_its_steps():
+    rng = np.random.default_rng(8)
+    time = np.sort(rng.uniform(0.0, 0.2, 30))
+    steps = Steps(time, rng.normal(size=(30, 3, 2)) * [[[30.0], [2e3], [1e5]]], 0.25)
+    times = np.sort(np.append(rng.uniform(0.0, 0.25, 40), time[:3]))
+    # Each step acts on its own from its moment on.
+    since = np.maximum(times - time[:, np.newaxis], 0.0)[..., np.newaxis]
+    begun = (times >= time[:, np.newaxis])[..., np.newaxis]
+    v, a, j = (steps.size[:, np.newaxis, order] for order in range(3))
+    own = [
+        v * since + a * since**2 / 2 + j * since**3 / 6,
+        begun * v + a * since + j * since**2 / 2,
+        begun * a + j * since,
+        begun * j + 0 * since,
+    ]
+    expected = np.sum(own, axis=1)
+    expected[1:, times >= time[-1]] = 0.0  # behind the last step it stands
+    found = steps.command(times)
+    for order in range(4):
+        scale = np.abs(expected[order]).max()
+        np.testing.assert_allclose(found[order], expected[order], atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize("friction", [None, Friction(5.0, 8.0, 1.0)])
+def test_what_is_told_of_a_command_keeps_nothing_else_alive(friction):
+    # A program's outcomes are kept; what was seen at hundreds of moments of each is not.
+    machine = bench()
+    if friction is not None:
+        axis = machine.axis("Z")
+        servo = replace(axis.servo, friction=friction)
+        machine = replace(machine, axes=(replace(axis, servo=servo),))
+    outcome = Watch(equations_of(machine), 0.001).outcome(THREE)
+    for field in fields(outcome):
+        value = getattr(outcome, field.name)
+        assert not isinstance(value, np.ndarray) or value.base is None, field.name
 
 
 def test_two_poles_in_one_place_lose_no_digits():
