@@ -188,6 +188,8 @@ def test_a_line_keeps_its_words_with_their_places():
         ("M", 3.0, ""),
     ]  # fmt: skip
     assert [text[w.begin : w.end] for w in block.words if w.letter in "XZ"] == [b"X+10", b"IZ-3.5"]
+    assert block.comments == ((28, 32),)
+    assert parse_block(b"; go", "klartext").comments == ((0, 4),)
     assert parse_block(b"/ 80 M30", "klartext").block_delete
 
 

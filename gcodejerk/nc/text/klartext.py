@@ -24,7 +24,7 @@ _STATEMENTS = (
 _STATEMENT = re.compile(
     rb"(?:(CYCL)[ \t]+DEF[ \t]+([0-9]+)(?:\.[0-9]+)?(?![0-9])|(FN)[ \t]*([0-9]+)[ \t]*:|("
     + b"|".join(name.encode().replace(b" ", rb"[ \t]+") for name in _STATEMENTS)
-    + rb")(?![A-Za-z0-9_]))",
+    + rb")(?=[ \t;~]|$))",
     re.IGNORECASE,
 )
 _NUMBER = rb"[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)"
@@ -204,8 +204,10 @@ class _Line:
             self._assign(klartext_function(int(name[3:]), rest))
         if name == "TOOL CALL" and (tool := _TOOL.match(self.text, self.at, end)):
             self._word("T", _number(tool[1]), tool.start(), tool.end())
-        for match in re.finditer(rb"(?<![A-Za-z0-9])R([0LR])(?![A-Za-z0-9.,+-])", rest):
-            self._word("G", _SIDES[match[1]], self.at + match.start(), self.at + match.end())
+        for match in _RADIUS.finditer(rest):
+            if rest[match.start() - 1 : match.start()] in (b" ", b"\t"):
+                side = _SIDES[match[1].upper()]
+                self._word("G", side, self.at + match.start(), self.at + match.end())
         for match in _M.finditer(rest) if name != "TOOL CALL" else ():
             if rest[match.start() - 1 : match.start()] in (b" ", b"\t"):
                 self._function(match)

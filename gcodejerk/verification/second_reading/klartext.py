@@ -11,7 +11,7 @@ import re
 
 from gcodejerk.nc.dialects.dialect import Dialect, Effect
 
-_FRONT = re.compile(r"\s*(?P<skip>/)?\s*(?P<number>\d+)?(?P<late>\s*/)?(?:\s+|$)?(?P<rest>.*)")
+_FRONT = re.compile(r"\s*(?P<skip>/)?\s*(?:\d+(?:\s+|$))?(?P<late>/)?\s*(?P<rest>.*)")
 _CYCLE = re.compile(r"CYCL\s+DEF\s+(\d+)(?:\.\d+)?(?!\d)")
 _FUNCTION = re.compile(r"FN\s*(\d+)\s*:")
 _LINE = re.compile(r"L(?:\s+(.*))?")
@@ -24,6 +24,7 @@ _PIECE = re.compile(
 _AWAY = re.compile(
     rf"L(\s+R0)?(\s+FMAX)?\s+M140\s+MB\s*(MAX|{_PLAIN})(\s+F(MAX|{_PLAIN}))?", re.ASCII
 )
+_FUNCTIONS = re.compile(r"(?=STOP\b|M\s*\d)(?P<stop>STOP\b)?(?:\s*M\s*\d{1,3})*(?!\S)")
 _PARAMETER = re.compile(r"Q[LRS]?\d+\s*=")
 _SIDE = re.compile(r"(?<![A-Z0-9])R([0LR])(?![A-Z0-9.,+-])")
 _OTHER_M = re.compile(r"(?<=\s)M\s*(\d{1,3})")
@@ -98,8 +99,8 @@ def _straight(found: Statement, words: str) -> Statement:
         match = _PIECE.fullmatch(piece)
         if match is None:
             return found.fail()
-        what = match["axis"] or ("R" if match["side"] else "F" if match["feed"] else piece)
-        if what in seen:
+        what = match["axis"] or ("R" if match["side"] else "F" if match["feed"] else "")
+        if what and what in seen:
             return found.fail()
         seen.add(what)
         if match["axis"]:
@@ -138,13 +139,14 @@ def _named(found: Statement, said: str, dialect: Dialect, *, goes_on: bool) -> S
         found.put("G", 70.0 if unit == "INCH" else 71.0)
     elif name == "END PGM":
         found.put("M", 30.0)
-    elif name == "STOP" or re.fullmatch(r"(?:M\s*\d{1,3}\s*)+", said):
-        if name == "STOP":
+    elif functions := _FUNCTIONS.fullmatch(said):
+        if functions["stop"]:
             found.put("M", 0.0)
-        numbers = [int(number) for number in re.findall(r"M\s*(\d{1,3})", said)]
-        for number in numbers:
-            if number or name != "STOP":
+        for number in map(int, re.findall(r"M\s*(\d{1,3})", said)):
+            if number or not functions["stop"]:  # STOP M0 is one stop
                 _function(found, number)
+    elif _FUNCTIONS.match(said):
+        return found.fail()
     else:
         _other(found, name, said, dialect)
     return found
