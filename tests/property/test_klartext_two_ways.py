@@ -140,6 +140,8 @@ def test_what_is_no_statement_may_be_anything(line):
         (b"L M140 MB MAX", "", "cycle"),
         (b"CYCL DEF 7.1 X+5", "", "frames"),
         (b"APPR LT X+1 Y+1 LEN5 RL F90", "G41.0", "label"),
+        (b'TOOL CALL "DRL-XM3-5R0" Z S900', "", "cycle"),
+        (b"CYCL DEF 14.0 CONTOUR XRL", "", ""),
         (b"Q5 = Q1 + 2", "", ""),
         (b"; L X+9", "", ""),
     ],

@@ -369,6 +369,23 @@ def test_siemens_words_with_names():
     assert end(b"DIAMOF\nG0 X10\n", "siemens", turned)[0] == 10.0
 
 
+@pytest.mark.parametrize(
+    ("word", "reason"),
+    [
+        ("X=IC(5)", None),
+        ("X=AC(5)", None),
+        ("A=IC(5)", "other words of the block cannot keep their order"),
+        ("A=AC(5)", "a rotary axis may turn another way"),
+        ("A=DC(5)", "start unknown"),
+        ("X=ACN(5)", "start unknown"),
+    ],
+)
+def test_siemens_words_that_are_increments_or_ways_round(word, reason):
+    start = replace(SIEMENS, startup="G17 G710 G40 G90 G64 G94")
+    axes = replace(start, positions=dict.fromkeys(AXES, 1.0))
+    assert reasons(f"F100\nG0 {word}\nG1 X9\n".encode(), "siemens", axes) == [reason]
+
+
 def test_positions_behind_mcall_are_holes():
     program = b"G90\nG0 X1 Z5\nMCALL CYCLE81(10,0,2,-5)\nX5\nX6\nMCALL\nG0 X7 Z9\nX8\n"
     assert reasons(program, "siemens", SIEMENS) == [

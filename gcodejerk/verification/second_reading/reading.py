@@ -59,7 +59,7 @@ _O_WORD = re.compile(rb"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?[O:][ \t]*(<[^<>]*>|[0-9]+
 _FILE_NAME = re.compile(rb"(?:\$[\w-]*|[A-Z_][\w-]*)\.[A-Z]{1,5}%?")
 _CHECKSUM = re.compile(rb"\*[ \t]*[0-9]{1,3}[ \t]*$")
 _NAME = re.compile(rb"([A-Z_][A-Z_][A-Z0-9_]*)([ \t]*\((?:[^()\"]|\"[^\"]*\")*\))?")
-_PARAMETER = re.compile(rb"R[0-9]+[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;]*")
+_PARAMETER = re.compile(rb"R[0-9]*[ \t]*=[^ \t;]*|R[ \t]*\[[^\]]*\][ \t]*=[^ \t;]*")
 _PADDED = re.compile(rb"(?<![A-Z_])[GM](?:[ \t]|0[0-9])", re.IGNORECASE)
 _NUMBERED = re.compile(rb"[ \t]*N[-+ 0-9]", re.IGNORECASE)
 _SYSTEM_DATA = re.compile(rb"(?:N[0-9]+[ \t]*)?\$[A-Z]")
