@@ -23,6 +23,8 @@ FEW = 16
 """Modes of which every exponential is computed."""
 CELLS = 1 << 20
 """Exponentials that are computed at a time, of moments at frequencies: 16 MB."""
+SAMPLES = 1 << 16
+"""Moments of profiles that are worked out together."""
 AT_ONCE = 2048
 """Moves whose steps are worked out together: those of one do not depend on others."""
 GRID_TOLERANCE = 1e-6
@@ -110,22 +112,27 @@ def sample_profiles(profiles: Profiles, moments: Counts, interval: float) -> tup
     tuple of ndarray, shape (n, k)
         Position [-] and velocity [1/s]. The position is 1 exactly from the profile's end on.
     """
-    total = profiles.total
-    row = np.arange(len(profiles))[:, np.newaxis]
-    t = np.clip(moments * interval, 0.0, total[:, np.newaxis])
+    n, k = moments.shape
+    position, velocity = np.empty((n, k)), np.empty((n, k))
     # The segment of each moment: profiles one behind the other on a common clock.
-    clock = float(total.max(initial=0.0)) + 1.0
-    segment = (
-        np.searchsorted(profiles.owner * clock + profiles.begin, row * clock + t, side="right") - 1
-    )
-    segment = np.clip(segment, profiles.first[:-1, np.newaxis], profiles.first[1:, np.newaxis] - 1)
-    tau = t - profiles.begin[segment]
-    a, j = profiles.acceleration[segment], profiles.jerk[segment]
-    v = profiles.velocity[segment]
-    position = profiles.position[segment] + (v + (0.5 * a + j * tau / 6.0) * tau) * tau
-    velocity = v + (a + 0.5 * j * tau) * tau
-    arrived = t >= total[:, np.newaxis] - GRID_TOLERANCE * interval
-    return np.where(arrived, 1.0, np.minimum(position, 1.0)), np.where(arrived, 0.0, velocity)
+    totals = profiles.total
+    clock = float(totals.max(initial=0.0)) + 1.0
+    begins = profiles.owner * clock + profiles.begin
+    rows = max(1, SAMPLES // max(k, 1))
+    for begin in range(0, n, rows):
+        row = np.arange(begin, min(begin + rows, n))[:, np.newaxis]
+        total = totals[row]
+        t = np.clip(moments[row[:, 0]] * interval, 0.0, total)
+        segment = np.searchsorted(begins, row * clock + t, side="right") - 1
+        segment = np.clip(segment, profiles.first[row], profiles.first[row + 1] - 1)
+        tau = t - profiles.begin[segment]
+        a, j = profiles.acceleration[segment], profiles.jerk[segment]
+        v = profiles.velocity[segment]
+        s = profiles.position[segment] + (v + (0.5 * a + j * tau / 6.0) * tau) * tau
+        arrived = t >= total - GRID_TOLERANCE * interval
+        position[row[:, 0]] = np.where(arrived, 1.0, np.minimum(s, 1.0))
+        velocity[row[:, 0]] = np.where(arrived, 0.0, v + (a + 0.5 * j * tau) * tau)
+    return position, velocity
 
 
 def sampled_response(positions: Array, interval: float, poles: Complex) -> Complex:

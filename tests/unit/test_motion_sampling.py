@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from gcodejerk.motion import Grid, SymmetricProfiles, sample_profiles, steps_response
+from gcodejerk.motion import Grid, SymmetricProfiles, sample_profiles, sampling, steps_response
 from gcodejerk.motion.residual import mode_poles
 
 INTERVAL = 0.0005
@@ -95,6 +95,19 @@ def test_profiles_of_different_kinds_are_sampled_together_as_alone():
         alone = sample_profiles(law_of(name), moments[:1], INTERVAL)
         np.testing.assert_allclose(position[row], alone[0][0], atol=1e-14)
         np.testing.assert_allclose(velocity[row], alone[1][0], atol=1e-12)
+
+
+@pytest.mark.parametrize("at_once", [1, 100, 140, 10_000])
+def test_how_many_are_sampled_at_once_changes_no_bit(at_once, monkeypatch):
+    shapes = [*SHAPES.values()] * 3
+    profiles = SymmetricProfiles(
+        *(np.array(c) * INTERVAL for c in zip(*shapes, strict=True))
+    ).general()
+    moments = np.arange(len(shapes))[:, np.newaxis] + np.arange(0, 140, 2)
+    expected = sample_profiles(profiles, moments, INTERVAL)
+    monkeypatch.setattr(sampling, "SAMPLES", at_once)
+    for found, other in zip(sample_profiles(profiles, moments, INTERVAL), expected, strict=True):
+        assert found.tobytes() == other.tobytes()
 
 
 @pytest.mark.parametrize("stride", [1, 2, 3, 4, 7, 50])
