@@ -1,11 +1,11 @@
 r"""Which moves can be perfectly still, where that is easily shown, many moves at once.
 
 This module owns the quick answer to a question that `optimal` answers for one move by a programme:
-whether a profile within the limits leaves nothing at the modes' own frequencies. A smooth
-profile of the move's time is corrected by the least change of its acceleration that makes it arrive
-and leaves every mode still, and keeps the acceleration's limit: a few equations, nearly linear.
-Where the corrected one keeps the other limits, too, there is such a profile; where it does not,
-nothing is known.
+whether a profile within the limits leaves nothing at the modes' own frequencies. A smooth profile
+of the move's time is corrected by the least change of its acceleration that makes it arrive and
+leaves every mode still, and keeps the acceleration's limit: a few equations, nearly linear. Where
+the corrected one keeps the other limits, too, there is such a profile; where it does not, nothing
+is known.
 
 Rule: accelerations are given at the command's intervals and linear between them, as all jerk
 sequences on that grid are. With :math:`a_k` where k intervals h are left, the move arrives at rest
@@ -183,10 +183,8 @@ def _corrected(
     :math:`c_k` times multipliers :math:`\lambda`, or the most there may be. Newton's method finds
     the multipliers; an acceleration that is at its most does not answer to them.
     """
-    width = len(conditions)
-    pairs = (conditions[:, np.newaxis] * conditions).reshape(width * width, -1)
     found, met = start.copy(), np.zeros(len(start), dtype=bool)
-    multipliers = np.zeros((len(start), width))
+    multipliers = np.zeros((len(start), len(conditions)))
     going = np.arange(len(start))
     for _ in range(ROUNDS):
         wanted = start[going] + np.where(where[going], multipliers[going] @ conditions, 0.0)
@@ -199,7 +197,7 @@ def _corrected(
         going, missing, answers = going[on], missing[on], answers[on]
         if not len(going):
             break
-        slopes = (answers @ pairs.T).reshape(-1, width, width)
+        slopes = (answers[:, np.newaxis] * conditions) @ conditions.T
         inverse = np.linalg.pinv(slopes, hermitian=True)
         multipliers[going] += np.einsum("nij,nj->ni", inverse, missing)
     return found, met
