@@ -123,8 +123,8 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.CUTTER_COMPENSATION: Explanation(
         "G41 or G42 is, or may be, in force, or (Fanuc and kin) ends with the next move in its "
         "plane: the real path differs from the programmed one",
-        "put G40 in front of the rapid, on a Fanuc beside a feed move in the plane; where nobody "
-        "says G40 at all, into `program.startup`",
+        "put G40 (in Klartext R0) in front of the rapid, on a Fanuc beside a feed move in the "
+        "plane",
     ),
     Reason.ROTATION: Explanation(
         "an axis word is not the motion of that axis",

@@ -89,7 +89,7 @@ PLACES = {
 START = "G17 G21 G40 G49 G54 G80 G90 G94\n"
 KNOWN = START + "F500.\nG0 X3. Y3. Z3.\n"
 FRAMED = "G17 G710 G40 G54 G90 G94\nF500.\nG0 X3. Y3. Z3.\n"
-HEIDENHAIN = "%5 G71 *\nN10 G17 G90*\nN20 G0 X3. Y3. Z3.*\nN30 G0 X77.*\nN40 M2*\n"
+KLARTEXT = "BEGIN PGM P MM\nL X+3 Y+3 Z+3 R0 F900\nL X+9 RL\nL X+12{}\nL X+77 FMAX\nEND PGM P MM\n"
 MILL = KNOWN.replace("G49 ", "")
 BOTH = KNOWN + "G0 A10.\n"
 AT = "G0 X77.\nM2\n"
@@ -198,8 +198,8 @@ CASES = [
         KNOWN + "G41 D1 G1 X9. F100.\nX11.\nG40 X12. Y5.\nG0 Z77.\n",
     ),
     Case(
-        Reason.CUTTER_COMPENSATION, "startup", "heidenhain-iso", HEIDENHAIN,
-        machine={"controller": "csv"}, then=program(startup="G40") | {"controller": "csv"},
+        Reason.CUTTER_COMPENSATION, "R0", "klartext", KLARTEXT.format(""), KLARTEXT.format(" R0"),
+        machine={"controller": "csv"},
     ),
     Case(
         Reason.ROTATION, "G69", FANUC, KNOWN + "G68 X0. Y0. R30.\n" + AT,
