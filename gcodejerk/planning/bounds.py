@@ -139,7 +139,9 @@ def _joint_bounds(plans: Plans, task: Task, sets: list[list[int]]) -> Array:
     """The least that profiles which begin together leave at the last arrival, for each set [mm]."""
     modes, nothing = plans.modes, NOTHING if task.band else NULL
     until, weights = plans.counts[plans.move], plans.share @ modes.participation.T
-    still, questions = _still(task), []
+    members = np.fromiter(itertools.chain.from_iterable(sets), dtype=np.intp)
+    still, questions = np.zeros(len(task), dtype=bool), []
+    still[members] = _still(task.take(members))
     asked = [k for k, rows in enumerate(sets) if not still[rows].all()]
     for rows in (sets[k] for k in asked):
         # The measure of what is small: what today's profiles leave in the worst phase.

@@ -90,6 +90,7 @@ def keep_limits(
     -------
     ndarray of bool, shape (n,)
     """
+    # Whole columns: as profiles of a segment an interval they would be integrated step by step.
     V, A, J = limits
     steps = np.diff(found, axis=1)
     before, behind = found[:, :-1], found[:, 1:]

@@ -1,4 +1,4 @@
-"""Heidenhain iTNC 530, DIN/ISO (files ``.I``); Klartext is another language and is not read.
+"""Heidenhain iTNC 530, DIN/ISO (files ``.I``); Klartext is another language (dialect `klartext`).
 
 Sources: iTNC 530 ISO manual p. 211, and p. 183 (selecting a program, and calling one, cancel radius
 compensation). Much of the table is general knowledge that no source here confirmed; it is used to
