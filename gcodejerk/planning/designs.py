@@ -4,7 +4,7 @@ This module owns the table from a profile's name to its design. A design gets mo
 (their time, their limits, what they excite) and gives a profile for each, with what it leaves. When
 a design is used, and what happens where it finds nothing, the planner decides.
 
-Rule: a design changes no move's time, but for `shortest`, whose result the time is.
+Rule: a design changes no move's time; what does, as `shortest_time` and the planner, asks designs.
 """
 
 from __future__ import annotations
@@ -33,8 +33,6 @@ from gcodejerk.planning.optima import Question, answers
 from gcodejerk.planning.task import Task, worst_in_band
 from gcodejerk.spread import here
 
-ALLOWED = 0.97
-"""Share of the tolerance that a profile may use; rounding to the resolution needs some, too."""
 SEARCHED, FEWEST = 1.6, 1
 """What a search looks at of a band: the distance of frequencies, times T_SUM/2, at most [rad], and
 so many on each side at least."""
@@ -181,7 +179,7 @@ def optimal(task: Task) -> tuple[Profiles, Array]:
     today = worst_in_band(task, task.conventional)
     slack = slack_of(task, today)
     questions = [question_of(task, k, float(today[k]), slack=float(slack[k])) for k in rows]
-    profiles, worst = _answered(task, rows, answers(questions, task.progress), profiles, worst)
+    profiles, worst = answered(task, rows, answers(questions, task.progress), profiles, worst)
     found = np.isfinite(worst)
     worst[found] = worst_in_band(task.take(found), profiles.take(found))
     # Who leaves no more than the slack cannot be beaten by more than that.
@@ -215,59 +213,6 @@ def _guarding(task: Task, profiles: Profiles) -> NDArray[np.bool_]:
     return keeps_guard(profiles, task.conventional, poles, task.band, task.interval, task.guard)
 
 
-def shortest(task: Task, longest: NDArray[np.int64]) -> tuple[Profiles, Array, NDArray[np.int64]]:
-    """The least time in which no mode is left with more than the tolerance, over the band.
-
-    Parameters
-    ----------
-    task : Task
-        Its counts are the least that the limits allow.
-    longest : ndarray of int, shape (n,)
-        The most that is tried. [intervals]
-
-    Returns
-    -------
-    profiles, worst : Profiles and ndarray, shape (n,)
-        As of a `Design`.
-    counts : ndarray of int, shape (n,)
-        T_SUM of each. [intervals]
-
-    Notes
-    -----
-    A move that can rest for an interval and then begin can do in n + 1 intervals what it can in n:
-    so the time is found by bisection.
-    """
-    task = replace(task, tolerance=ALLOWED * task.tolerance)
-    low, high = task.counts - 1, longest.copy()
-    reference = task.objective.of(task.conventional)
-    possible = np.isfinite(_quiet(task.after(high), reference)[1])
-    while True:
-        rows = np.nonzero(possible & (high - low > 1))[0]
-        if not len(rows):
-            break
-        middle = (low[rows] + high[rows]) // 2
-        quiet = np.isfinite(_quiet(task.take(rows).after(middle), reference[rows])[1])
-        high[rows[quiet]] = middle[quiet]
-        low[rows[~quiet]] = middle[~quiet]
-    final = task.after(high)
-    profiles, worst = symmetric(final)
-    worst = np.where(worst <= final.tolerance, worst, np.inf)
-    # Within the tolerance all are equal: the smoothest is taken.
-    rows = np.nonzero(possible & task.objective.weights.any(axis=1))[0]
-    questions = [question_of(final, k, float(reference[k]), task.tolerance) for k in rows]
-    return *_answered(final, rows, answers(questions, task.progress), profiles, worst), high
-
-
-def _quiet(task: Task, reference: Array) -> tuple[Profiles, Array]:
-    """Profiles within the tolerance over the band, symmetric or optimal; else infinite."""
-    profiles, worst = symmetric(task)
-    worst = np.where(worst <= task.tolerance, worst, np.inf)
-    # Where nothing vibrates, there is nothing to ask.
-    rows = np.nonzero(~np.isfinite(worst) & task.objective.weights.any(axis=1))[0]
-    questions = [question_of(task, k, float(reference[k]), task.tolerance) for k in rows]
-    return _answered(task, rows, answers(questions, task.progress), profiles, worst)
-
-
 def question_of(
     task: Task, row: np.intp, reference: float, allowed: float = 0.0, slack: float = 0.0
 ) -> Question:
@@ -287,7 +232,7 @@ def move_of(task: Task, row: np.intp, guard: float = 0.0) -> Move:
     )  # fmt: skip
 
 
-def _answered(
+def answered(
     task: Task,
     rows: NDArray[np.intp],
     found: list[Optimum | None],

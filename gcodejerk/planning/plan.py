@@ -28,13 +28,14 @@ from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.motion.search.condition3 import TIE
 from gcodejerk.motion.shapers import SHAPERS, shaped_profile
 from gcodejerk.planning.conventional import least_time
-from gcodejerk.planning.designs import DESIGNS, shortest
+from gcodejerk.planning.designs import DESIGNS
 from gcodejerk.planning.independent_axes import in_the_middle
 from gcodejerk.planning.optima import Progress
 from gcodejerk.planning.plans import STANDSTILL, Modes, Plans, path_length
 from gcodejerk.planning.refusals import limit_error, time_error
 from gcodejerk.planning.settling import settled
 from gcodejerk.planning.sharing import joint_optima
+from gcodejerk.planning.shortest_time import shortest
 from gcodejerk.planning.task import Task, worst_at_arrival, worst_in_band
 from gcodejerk.reasons import CERTAIN, REASONS, Reason
 from gcodejerk.spread import Spread, here
@@ -292,14 +293,7 @@ class _Planner:
                 "the time of profile shortest is what it looks for",
                 "leave out --time, or choose profile optimal",
             )
-        fastest = conventional_profiles(*self.limits, self.interval).total
-        # What the controller's own move and two periods of every mode take is always enough...
-        slack = 2.0 * float((2.0 * np.pi / self.modes.poles.imag).sum())
-        longest = whole_intervals(
-            np.maximum(fastest, self.conventional.total) + slack, self.interval
-        )
-        task = self.task.after(whole_intervals(fastest, self.interval))
-        profiles, worst, counts = shortest(task, longest)
+        profiles, worst, counts = shortest(self.task)
         left = worst
         if self.machine.positioning != "linear":
             # Each axis is quiet enough by itself: together they may not be.

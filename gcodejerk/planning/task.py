@@ -170,16 +170,11 @@ class Task:
         numbers = np.column_stack(
             [self.counts, V * total, A * total**2, J * total**3, *today, weights]
         )
-        # Rounded: the same move computed in another order is of the same kind.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            digits = 10.0 ** (9.0 - np.ceil(np.log10(np.abs(numbers))))
-            rounded = np.where(np.isfinite(digits), np.rint(numbers * digits) / digits, numbers)
-        rounded += 0.0  # no -0
-        rows, first, same = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        rows, first, same = _kinds(numbers)
         objective = self.objective
         common = hashlib.blake2b(objective.poles.tobytes() + objective.group.tobytes())
         common.update(np.array([self.band, self.interval]).tobytes())
-        return [common.digest() + row.tobytes() for row in rows], first, same.reshape(-1)
+        return [common.digest() + row.tobytes() for row in rows], first, same
 
     def _outline(self) -> list[Array]:
         """What tells one profile of today from another, in units of T_SUM: its response."""
@@ -202,9 +197,38 @@ class Task:
         for index in np.split(order, bounds[1:]) if len(order) else ():
             yield index, self.interval * 2.0 ** (0.5 * float(duration[index[0]] + 1))
 
+    def proportional(self) -> tuple[NDArray[np.intp], Array]:
+        """Moves that differ in their length alone: of one axis, for instance.
+
+        Returns
+        -------
+        kind : ndarray of int, shape (n,)
+            The same for those that do.
+        length : ndarray, shape (n,)
+            Of each, in units that are the same within a kind.
+        """
+        V, A, J = self.limits
+        length = 1.0 / V
+        weights = self.objective.weights / length[:, np.newaxis]
+        _, _, kind = _kinds(np.column_stack([A * length, J * length, weights]))
+        return kind, length
+
     def after(self, counts: NDArray[np.int64]) -> Task:
         """The same moves in other times."""
         return replace(self, counts=counts)
+
+
+def _kinds(numbers: Array) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
+    """Rows that differ, one row of each, and which of them each row is.
+
+    They are rounded: the same move computed in another order is of the same kind.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        digits = 10.0 ** (9.0 - np.ceil(np.log10(np.abs(numbers))))
+        rounded = np.where(np.isfinite(digits), np.rint(numbers * digits) / digits, numbers)
+    rounded += 0.0  # no -0
+    rows, first, same = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    return rows, first, same.reshape(-1)
 
 
 def worst_in_band(task: Task, profiles: Profiles) -> Array:

@@ -36,6 +36,7 @@ def exchanged(
     active: Flags,
     allowed: float,
     rounds: int = ROUNDS,
+    only: bool = False,
 ) -> Kind | None:
     """The least residual, frequencies added until none between is worse.
 
@@ -50,6 +51,8 @@ def exchanged(
         Residual that costs nothing, over the measure. [-]
     rounds : int, optional
         Programmes at most.
+    only : bool, optional
+        Nothing that leaves more than is allowed is of any use.
 
     Returns
     -------
@@ -70,7 +73,10 @@ def exchanged(
             cost *= 0.02
             rounds += cost > CHEAPEST
         best = better(best, found)
-        most = max(WORSE * solution.worst, allowed, NULL)
+        if only and solution.worst > allowed:
+            # Other frequencies can only add to that.
+            break
+        most = allowed if only else max(WORSE * solution.worst, allowed, NULL)
         missing = found.looked_at.exceeded(found.left, np.where(source < 0, KEPT, most)) & ~active
         if not missing.any():
             break

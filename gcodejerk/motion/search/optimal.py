@@ -19,6 +19,8 @@ designed on.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gcodejerk.motion.search.blocks import Blocks
@@ -44,7 +46,9 @@ from gcodejerk.motion.search.unit_move import Move, Optimum
 
 NEARLY = 1.5
 """Where a whole move leaves no more than so many times what is allowed, its ramps may leave less:
-their blocks are shorter."""
+their blocks are shorter. So may cones, where they can have a block for each interval."""
+MATTERS = 0.5
+"""Share of what the worst frequency leaves, from which on others matter."""
 WORK = 1e7
 """Rows of cones times the square of blocks, up to which a programme takes a third of a second.
 Where as many blocks as there ought to be are more work, planes are cut."""
@@ -169,15 +173,21 @@ class _Search:
         """What is asked, by planes where frequencies are guarded or cones too many, or by cones.
 
         By both, where the least itself is asked for and cones can have their first blocks: where
-        they cannot, planes are a tenth to a fortieth of the work.
+        they cannot, planes are a tenth to a fortieth of the work. By planes first, where only what
+        is allowed is of use: they soon know that it can be had, or by far cannot.
         """
         move = self.move
         if move.count < FEWEST_INTERVALS:
             return None
         many = self._most_blocks < min(most_blocks(move), move.count)
-        found = self._by_planes(asked) if many or self._guarded or not self._few else None
+        planes = many or asked.only or self._guarded or not self._few
+        found = self._by_planes(asked) if planes else None
         exact = many and not (self._guarded or asked.allowed) and self._few
-        return better(found, self._by_cones(asked)) if exact or found is None else found
+        if exact or found is None:
+            return better(found, self._by_cones(asked))
+        if many or self._guarded or not asked.allowed < found.worst <= NEARLY * asked.allowed:
+            return found
+        return better(found, self._whole_by_cones(found, asked))
 
     def optimum(self, found: Found | None) -> Optimum | None:
         """What was found, in the units of the move."""
@@ -226,7 +236,7 @@ class _Search:
 
     def _by_cones(self, asked: Asked) -> Found | None:
         """The same by cones: the least residual, and then less jerk on the same blocks."""
-        found = self._least_by_cones(asked.allowed)
+        found = self._least_by_cones(asked)
         if found is None or not found.guards or found.worst <= asked.allowed or not asked.slack:
             return found
         allowed = found.worst + asked.given(found.worst)
@@ -235,9 +245,22 @@ class _Search:
         other = self._exchanged(found.looked_at, found.blocks, allowed, found)
         return other if other is not None and other.meets(allowed) else found
 
-    def _least_by_cones(self, allowed: float) -> Found | None:
+    def _whole_by_cones(self, found: Found, asked: Asked) -> Found | None:
+        """What planes have nearly found, with a block for each interval.
+
+        Cones begin with the frequencies that mattered.
+        """
+        looked_at = self._looked_at(self.move.count)
+        if found.looked_at is not looked_at:
+            return self._by_cones(asked)
+        matter = looked_at.peaks(found.left) & (found.left > MATTERS * found.worst)
+        every = self._whole(looked_at, np.arange(self.move.count + 1))
+        start = replace(found, active=matter)
+        return self._exchanged(looked_at, every, asked.allowed, start, asked.only)
+
+    def _least_by_cones(self, asked: Asked) -> Found | None:
         """The least residual above what is allowed; blocks are refined until that is met."""
-        move = self.move
+        move, allowed, only = self.move, asked.allowed, asked.only
         best: Found | None = None
         if self.ramp and allowed:
             # The phases of a short cruise can be made use of: what is found counts if it is enough.
@@ -248,7 +271,7 @@ class _Search:
                 return best
         looked_at = self._looked_at(move.count)
         knots = self._first_knots
-        first = self._exchanged(looked_at, self._whole(looked_at, knots), allowed)
+        first = self._exchanged(looked_at, self._whole(looked_at, knots), allowed, only=only)
         best = better(best, first)
         if len(knots) > move.count or (best is not None and best.meets(allowed)):
             return best
@@ -258,11 +281,11 @@ class _Search:
             if len(cut) == len(knots):
                 return best
             finer = self._whole(looked_at, cut)
-            return better(best, self._exchanged(looked_at, finer, allowed, first))
+            return better(best, self._exchanged(looked_at, finer, allowed, first, only))
         if move.count > self._most_blocks:
             return best
         every = self._whole(looked_at, np.arange(move.count + 1))
-        return better(best, self._exchanged(looked_at, every, allowed))
+        return better(best, self._exchanged(looked_at, every, allowed, only=only))
 
     @property
     def _first_knots(self) -> Index:
@@ -305,18 +328,20 @@ class _Search:
     ) -> Found | None:  # fmt: skip
         """The least residual for some blocks, frequencies added until none between is worse.
 
-        `start`: what was found before, of these blocks or of longer ones. `only`: if it is allowed.
+        `start`: what was found before, of these blocks or of longer ones. `only`: whatever leaves
+        more than is allowed is of no use.
         """
 
         def solved(active: Flags, cost: float) -> Found | None:
             problem = self._problem(looked_at, blocks, active)
             solution = solve(problem, USED * allowed, cost, self.curved)
             self.curved |= solution is not None and solution.curved
-            if solution is None or (only and solution.worst > allowed):
+            if solution is None:
                 return None
             return Found.of(looked_at, blocks, active, solution)
 
-        return exchanged(solved, looked_at.first if start is None else start.active, allowed)
+        active = looked_at.first if start is None else start.active
+        return exchanged(solved, active, allowed, only=only)
 
     def _ramps(self, looked_at: LookedAt, knots: Index) -> Blocks:
         """Blocks of the ramps of a move with a long cruise."""

@@ -85,6 +85,11 @@ class Asked:
     slack: float = 0.0
     today: float = 0.0
 
+    @property
+    def only(self) -> bool:
+        """Whether nothing that leaves more than is allowed is of any use."""
+        return self.allowed > 0.0 and not self.slack
+
     def given(self, least: float) -> float:
         """What may be left above the least, which is about `least`."""
         return max(min(self.slack, GIVEN * (self.today - least)), LEAST_GIVEN)
