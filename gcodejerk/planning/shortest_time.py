@@ -43,6 +43,9 @@ CLOSER = 4
 """Where it says that all can be saved, though not all can: such a part of what is in question."""
 BISECTED = 8
 """Times that a move is asked about before halves are taken, which always come to an end."""
+PARTS = 5
+"""Of what is to be done for a move, as a bar shows it: it is asked about four times, and has its
+own profile then."""
 
 
 def shortest(task: Task) -> tuple[Profiles, Array, NDArray[np.int64]]:
@@ -165,7 +168,15 @@ class _Search:
         questions = [
             question_of(task, k, float(self.reference[rows[k]]), task.tolerance) for k in asked
         ]
-        return answered(task, asked, answers(questions, task.progress), profiles, worst)
+        parts = np.where(self.open, np.minimum(self.asked, PARTS - 1), PARTS - 1)
+        before, most = parts.sum(), PARTS * len(self.task)
+        more = np.count_nonzero(~self.open[rows[asked]] | (parts[rows[asked]] < PARTS - 1))
+
+        def tell(done: int, total: int) -> None:
+            if task.progress is not None:
+                task.progress(int(before + done * more // total), most)
+
+        return answered(task, asked, answers(questions, tell), profiles, worst)
 
     def _share(self) -> None:
         """What is known of moves follows for others that differ in their length alone."""

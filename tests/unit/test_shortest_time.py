@@ -115,6 +115,19 @@ def test_few_programmes_are_asked(monkeypatch, tmp_path):
     assert sum(asked) <= 1.5 * len(near.counts)
 
 
+def test_a_bar_only_goes_forward(monkeypatch, tmp_path):
+    monkeypatch.setenv("GCODEJERK_CACHE", str(tmp_path))
+    told = []
+    moved = displacements(Z=[3.0, 9.0, 21.0], X=[5.0, 50.0])
+    plan_moves(moved, VMC, "shortest", progress=lambda done, total: told.append((done, total)))
+    done, total = np.array(told).T
+    assert len(done) > 10
+    assert (np.diff(done) >= 0).all()
+    assert (done <= total).all()
+    assert np.ptp(total) == 0
+    assert done[-1] > 0.75 * total[0]
+
+
 def test_where_the_programme_finds_nothing_a_move_is_left_alone(monkeypatch):
     monkeypatch.setattr(shortest_time, "answers", lambda questions, _: [None] * len(questions))
     hard = np.full(3, np.inf)
