@@ -45,7 +45,7 @@ CONTENDERS = ("conventional", "condition1", "condition2", *DESIGNED, *SHAPERS)
 """Everyone, in that order."""
 STEPS = {
     **dict.fromkeys(("conventional", "condition1", "condition2", *DESIGNED, "limits"), 1),
-    **{"optimal": 8, "shortest": 40, "judging": 10},
+    **{"optimal": 8, "shortest": 20, "judging": 10},
 }
 """What is done, and about how long it takes where a move is long and modes are many."""
 SOLVED = ("optimal", "shortest")
