@@ -14,7 +14,8 @@ and a programme for each of the others (`optima`), so the search asks as seldom 
 
 Rule 1: the time that is returned has been shown to do, and the interval before it not to: a move
 that can rest for an interval and then begin can do in n + 1 intervals what it can in n.
-Rule 2: no move's profile depends on the others: what is shared are times.
+Rule 2: no move's profile depends on the others, which only share what is known of times; but where
+the programme finds none in a time that a longer move's profile shows to do, that one is taken.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from gcodejerk.motion import Profiles, conventional_profiles, whole_intervals
 from gcodejerk.motion.profiles.profile import Array
 from gcodejerk.planning.designs import answered, question_of, symmetric
 from gcodejerk.planning.optima import answers
-from gcodejerk.planning.task import Task
+from gcodejerk.planning.task import Task, worst_in_band
 
 ALLOWED = 0.97
 """Share of the tolerance that a profile may use; rounding to the resolution needs some, too."""
@@ -109,6 +110,8 @@ class _Search:
         self.jerk = np.fmin(J, 2.0 * A / task.interval)
         self.ramp = A / (self.jerk * task.interval)
         kind, length = task.proportional()
+        # Where nothing vibrates, nothing dear is asked: each of them is found by itself.
+        kind = np.where(self.vibrates, kind, len(task) + np.arange(len(task)))
         order = np.lexsort((-length, kind))
         alike = np.split(order, np.flatnonzero(np.diff(kind[order])) + 1)
         self.families = [rows for rows in alike if len(rows) > 1]
@@ -152,11 +155,12 @@ class _Search:
 
         Within the tolerance all are equal: the smoothest is taken.
         """
-        possible = self.high <= self.longest
         others = self.source != np.arange(len(self.task))
-        profiles, worst = self.profiles.take(self.source), np.where(others, np.inf, self.worst)
+        profiles, worst = self.profiles.take(self.source), self.worst
+        worst[others] = worst_in_band(self.task.take(others), profiles.take(others))
+        possible, every = np.isfinite(worst), np.arange(len(self.task))
+        counts = np.where(possible, self.high, self.longest)
         rows = np.nonzero(possible & self.vibrates & (others | self.plain))[0]
-        every, counts = np.arange(len(self.task)), np.minimum(self.high, self.longest)
         profiles, worst = self._smoothest(self.task.after(counts), every, rows, profiles, worst)
         return profiles, worst, counts
 

@@ -8,6 +8,8 @@ from gcodejerk.axes import AXES
 from gcodejerk.machine import Machine, find_machine
 from gcodejerk.planning import shortest_time
 from gcodejerk.planning.plan import plan_moves
+from gcodejerk.planning.plans import Modes
+from gcodejerk.planning.task import Task, worst_in_band
 
 VMC = Machine.load(find_machine("vmc"))
 
@@ -19,6 +21,10 @@ def displacements(**lengths):
     for row, (axis, length) in zip(out, rows, strict=True):
         row[axis] = length
     return out
+
+
+def task_of(machine, moves):
+    return Task.of(machine, Modes.of(machine), moves)
 
 
 def drawn_machines(count):
@@ -85,6 +91,23 @@ def test_moves_are_planned_as_if_they_were_alone():
         np.testing.assert_allclose(own.jerk, alone.profiles.jerk, rtol=1e-9)
 
 
+def test_moves_that_excite_nothing_are_planned_as_if_they_were_alone():
+    machine = Machine.loads(
+        "interval: 0.001\npositioning: linear\naxes:\n"
+        "  Z:\n    rapid: {velocity: 600, acceleration: 5000, jerk: 5.0e+5}\n"
+        "  X:\n    rapid: {velocity: 600, acceleration: 5000}\n"
+        "    modes: [{frequency: 20, damping: 0.0, participation: 1.0}]\n"
+    )
+    together = displacements(Z=[3.01, 3.02, 3.03, 9.0], X=[9.0])
+    plans = plan_moves(together, machine, "shortest")
+    assert plans.planned.all()
+    assert plans.counts[0] == plans.counts[2]
+    for row, move in enumerate(together):
+        alone = plan_moves(move[np.newaxis], machine, "shortest")
+        own = plans.profiles.take(slice(row, row + 1))
+        np.testing.assert_allclose(own.duration, alone.profiles.duration, rtol=1e-12)
+
+
 def test_longer_moves_take_no_less_time():
     lengths = np.geomspace(0.2, 150.0, 23)
     counts = plan_moves(displacements(Z=lengths), VMC, "shortest").counts
@@ -136,6 +159,28 @@ def test_where_the_programme_finds_nothing_a_move_is_left_alone(monkeypatch):
     )
     plans = plan_moves(displacements(Z=[4.0, 5.0], X=[6.0]), VMC, "shortest")
     assert not plans.planned.any()
+
+
+def test_a_profile_of_a_longer_move_serves_where_the_programme_finds_none(monkeypatch, tmp_path):
+    monkeypatch.setenv("GCODEJERK_CACHE", str(tmp_path))
+    answers, lengths = shortest_time.answers, [20.0, 20.001]
+    plans = plan_moves(displacements(Z=lengths), VMC, "shortest")
+    short = task_of(VMC, displacements(Z=lengths)).limits[0][0]
+
+    def failing(questions, progress):
+        """Of the shorter move nothing is found."""
+        found = answers(questions, progress)
+        return [
+            None if question.move.velocity == short else own
+            for question, own in zip(questions, found, strict=True)
+        ]
+
+    monkeypatch.setattr(shortest_time, "answers", failing)
+    other = plan_moves(displacements(Z=lengths), VMC, "shortest")
+    assert other.planned.all()
+    assert (other.counts == plans.counts).all()
+    left = worst_in_band(task_of(VMC, displacements(Z=lengths)), other.profiles)
+    assert (left <= VMC.design.tolerance).all()
 
 
 def test_moves_of_a_kind_are_asked_by_turns():
