@@ -12,8 +12,8 @@ and a programme for each of the others (`optima`), so the search asks as seldom 
   for a longer one. They are asked by turns: the longest, then one in the middle, and so on;
 * what the first moves take above what the limits allow says where to begin with the others.
 
-Rule 1: the time that is returned has been shown to do, and the interval before it not to: a move
-that can rest for an interval and then begin can do in n + 1 intervals what it can in n.
+Rule 1: a profile is known for the time that is returned, and for the interval before it none was
+found. So there is none in less: a move can rest for an interval, and do the same in n + 1 as in n.
 Rule 2: no move's profile depends on the others, which only share what is known of times; but where
 the programme finds none in a time that a longer move's profile shows to do, that one is taken.
 """

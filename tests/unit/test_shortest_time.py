@@ -1,4 +1,4 @@
-"""The search for the shortest time: against a linear programme, against bisection, and its cost."""
+"""The search for the shortest time: against a linear programme, move by move, and its cost."""
 
 import numpy as np
 import pytest
