@@ -26,7 +26,7 @@ USUAL = 60
 LONG = 250
 """How many times more examples `--long` draws."""
 
-SHARE = 3
+SHARE = 8
 """One in how many repeats `--repeats-of` takes."""
 
 
