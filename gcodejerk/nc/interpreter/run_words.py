@@ -43,8 +43,14 @@ class History:
     behind: NDArray[np.intp]
 
     def which(self, summed: bool) -> NDArray[np.intp]:
-        """Words whose numbers matter: all where they are summed, else the last ones somewhere."""
-        matters = np.full(len(self.words.line) + 1, summed)
+        """Words whose numbers matter: all where they are summed, else the last ones somewhere.
+
+        Where the places are about as many as the words, picking takes longer than it saves.
+        """
+        count = len(self.words.line)
+        if summed or count < 2 * len(self.before):
+            return np.arange(count)
+        matters = np.zeros(count + 1, dtype=np.bool_)
         matters[self.before] = matters[self.behind] = matters[-1] = True
         return np.flatnonzero(matters[1:])
 

@@ -8,8 +8,7 @@ word without a use, no F in G93), the run ends in front of it and the careful wa
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,7 +212,7 @@ def run_plain(
     start, target, turned, feed = run.told(feeds, rapid)
     row = rapid + first
     said = letters.take(rapid)
-    columns: dict[str, Any] = asdict(ModeColumns.of(state))
+    columns = ModeColumns.of(state).columns()
     columns.update(
         line=row + place[0],
         begin=lines.begin.take(row) + place[1],
@@ -297,9 +296,9 @@ def reasons(
         return np.full(len(named), _INDEX[bar], dtype=np.uint8)
     unknown, moving = (np.zeros(len(named), dtype=np.uint16) for _ in range(2))
     for axis in axes_of(int(np.bitwise_or.reduce(named, initial=0))):
-        begin, end, bit = start[:, axis], target[:, axis], np.uint16(1 << axis)
-        unknown |= (np.isnan(begin) | np.isnan(end)) * bit
-        moving |= (begin != end) * bit
+        way, bit = target[:, axis] - start[:, axis], np.uint16(1 << axis)
+        unknown |= np.isnan(way) * bit
+        moving |= (way != 0.0) * bit
     unknown, moving = unknown & named != 0, moving & named
     moves = moving != 0
     reason = np.full(len(named), CERTAIN, dtype=np.uint8)

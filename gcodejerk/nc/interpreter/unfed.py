@@ -10,9 +10,6 @@ first line that is not sure, as one with an F is.
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,7 +103,7 @@ def run_unfed(
     start, target = _positions(state, lines, first, rapid, doubted, lost)
     named = (letters & AXIS_BITS).astype(np.uint16)[rapid]
     row = rapid + first
-    columns: dict[str, Any] = asdict(ModeColumns.of(state))
+    columns = ModeColumns.of(state).columns()
     columns.update(
         line=row + place[0],
         begin=lines.begin[row] + place[1],

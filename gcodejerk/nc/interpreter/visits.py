@@ -9,8 +9,8 @@ unknown in its row.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Self
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Self
 
 from gcodejerk.axes import AXES
 from gcodejerk.nc.dialects.gcodes import G91
@@ -72,6 +72,10 @@ class ModeColumns:
             feed_whole=bool(state.feed_whole),
             beam=state.spindle != 5,
         )
+
+    def columns(self) -> dict[str, Any]:
+        """Each by its name, and no copies of them."""
+        return {field.name: getattr(self, field.name) for field in fields(ModeColumns)}
 
 
 @dataclass(slots=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gcodejerk.nc.dialects.dialect import Dialect
 from gcodejerk.nc.text.gaps import closed_up
-from gcodejerk.nc.text.joints import BLANK, CR, END, LETTERS, OPEN, STAR, find_joints
+from gcodejerk.nc.text.joints import BLANK, CR, END, LETTERS, OPEN, OTHER, STAR, find_joints
 from gcodejerk.nc.text.numbers import AROUND, parse_numbers
 from gcodejerk.nc.text.respelling import respelled
 from gcodejerk.nc.text.words import BIT, COMMENT, DOT, SIGN, Joints, Lines
@@ -65,11 +65,12 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     # A line feed stands in front of the first line, and one behind the last.
     text = b"\n" * _PAD + data + (b"" if complete else b"\n") + b"\n" + b"0" * AROUND
     joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
-    if dialect.text.loose and _has_gaps(joint, kind):
+    width = _widths(joint)
+    if dialect.text.loose and _has_gaps(kind, width):
         text = closed_up(text)
         joint, kind, bad = find_joints(text, _PAD - 1, dialect.text)
+        width = _widths(joint)
     joints = Joints(np.frombuffer(text, dtype=np.uint8), joint, kind)
-    width = np.diff(joint, append=joint[-1])
     bad |= _misplaced(kind, width > 1)
     bad |= _doubtful_numbers(joints, width, dialect)
     if dialect.text.adjoining:
@@ -101,10 +102,16 @@ def read_lines(data: bytes, dialect: Dialect) -> Lines:
     return Lines(begin, end - crlf, terminator, careful, letters, joints)
 
 
-def _has_gaps(joint: Places, kind: NDArray[np.uint8]) -> bool:
+def _widths(joint: Places) -> Places:
+    """How far the next joint is; 0 of the last one."""
+    width = np.zeros_like(joint)
+    np.subtract(joint[1:], joint[:-1], out=width[:-1])
+    return width
+
+
+def _has_gaps(kind: NDArray[np.uint8], width: Places) -> bool:
     """Whether a blank may stand between a letter and its number, as in ``X 12.5``."""
-    blank = np.flatnonzero((kind[:-1] >= LETTERS) & (kind[1:] == BLANK))
-    return bool((joint.take(blank + 1) - joint.take(blank) == 1).any())
+    return bool(((kind[:-1] >= LETTERS) & (kind[1:] == BLANK) & (width[:-1] == 1)).any())
 
 
 def _next(flags: Flags, far: int = 1) -> Flags:
@@ -122,16 +129,29 @@ def _before(flags: Flags) -> Flags:
 
 
 def _misplaced(kind: NDArray[np.uint8], digits: Flags) -> Flags:
-    """Joints that are no letter with its number, nor a part of one, nor what may stand between."""
-    letter, dot, sign = kind >= LETTERS, kind == DOT, kind == SIGN
-    number = digits | (_next(dot) & _next(digits))
-    number |= _next(sign) & ~digits & _next(number)
-    bad: Flags = letter & ~number
-    bad |= sign & ~_before(letter & ~digits)
-    bad |= dot & ~_before(letter | sign)
-    bad |= (kind >= OPEN) & ~letter & ~((kind == STAR) & _next((kind == END) | (kind == CR)))
-    bad |= (kind >= BLANK) & ~letter & digits
-    bad |= (kind == CR) & ~_next(kind == END)
+    """Joints that are no letter with its number, nor a part of one, nor what may stand between.
+
+    `digits`: which have some right behind them.
+    """
+    # One joint of no class in front of all, two behind: neighbours are views, and no copies.
+    n = len(kind)
+    classes, wide = np.full(n + 3, COMMENT, dtype=np.uint8), np.zeros(n + 3, dtype=np.bool_)
+    classes[1:-2], wide[1:-2] = kind, digits
+    letters, dots, signs = classes >= LETTERS, classes == DOT, classes == SIGN
+    numbers = wide.copy()
+    numbers[:-1] |= dots[1:] & wide[1:]
+    number = numbers[1:-2] | (signs[2:-1] & ~digits & numbers[2:-1])
+    bad: Flags = letters[1:-2] & ~number
+    bad |= signs[1:-2] & ~(letters[:-3] & ~wide[:-3])
+    bad |= dots[1:-2] & ~(letters[:-3] | signs[:-3])
+    bad |= (kind - np.uint8(BLANK) <= OTHER - BLANK) & digits
+    odd = np.flatnonzero(kind - np.uint8(OPEN) <= OTHER - OPEN)
+    if len(odd):
+        following = classes.take(odd + 2)
+        closes = (kind.take(odd) == STAR) & ((following == END) | (following == CR))
+        bad[odd[~closes]] = True
+    returns = np.flatnonzero(kind == CR)
+    bad[returns[classes.take(returns + 2) != END]] = True
     return bad
 
 

@@ -22,7 +22,8 @@ PLAIN_LETTERS = AXES + "NGFSIJKRE"
 
 BIT = {letter: 1 << k for k, letter in enumerate(PLAIN_LETTERS)}
 COMMENT, DOT, SIGN = range(3)
-"""Classes of the joints that may stand in front of digits without being letters (`joints`)."""
+"""Classes of the joints that may stand in front of digits without being letters (`joints`); the
+first is 0, which is what a class multiplied by False becomes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
