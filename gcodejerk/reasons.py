@@ -110,8 +110,9 @@ EXPLAINED: dict[Reason, Explanation] = {
     Reason.FRAME_CHANGE: Explanation(
         "G53, G28, G30, G92, G52, G10, or G43/G49/G54.. with axis words",
         "with `program.offsets` and `program.home`, G54.. may stand beside a rapid, and what "
-        "follows the others is certain; retract with a plain G0 instead of G28, G30 and G53; give "
-        "G43 a block of its own on LinuxCNC and Mach (elsewhere it may move the machine: leave it)",
+        "follows the others is certain; let a plain G0 go most of the way, in front of G28, G30 "
+        "and G53, and behind a G43 that ends high up (LinuxCNC, Mach: give G43 a block of its "
+        "own; elsewhere that may move the machine)",
     ),
     Reason.NOT_FOLLOWED: Explanation(
         "what runs there may have changed every mode, and since then nobody has said G40; or it is "

@@ -50,6 +50,7 @@ STARTUP = {
     "haas": "G90 G17 G20 G40 G49 G80 G94",
     "fanuc-lathe-a": "G99 G21 G40 G18",
     "fanuc-lathe-b": "G90 G95 G21 G40 G18",
+    "haas-lathe": "G99 G20 G40 G18",
     "klartext": "",
     "heidenhain-iso": "",
 }
@@ -63,13 +64,13 @@ NOTHING_MOVES = Reason.NO_MOTION, Reason.AFTER_END
 """Reasons that are no loss."""
 
 
-def start_for(name):
-    """What the shop of a dialect would state."""
-    turns = "lathe" in name
+def start_for(folder):
+    """What the shop of a dialect would state, by the folder's name."""
+    turns = "lathe" in folder
     return Start(
         offsets=WORK,
         tool_lengths={int(key[1:]): value for key, value in LENGTHS.items()},
-        startup=STARTUP.get(name, "G90 G17 G21 G40 G49 G80 G94"),
+        startup=STARTUP.get(folder, "G90 G17 G21 G40 G49 G80 G94"),
         diameter=turns,
         decimal_point="calculator",
         resume="same",
@@ -154,7 +155,7 @@ def written_out(path, data, name, start):
 def row(folder, files, given):
     """Read all programs of a dialect."""
     name = READ_AS.get(folder, folder)
-    start = start_of(given.machine, name) if given.machine else start_for(name)
+    start = start_of(given.machine, name) if given.machine else start_for(folder)
     start = replace(start, positions=dict.fromkeys(AXES, 0.0)) if given.start else start
     total = Counter()
     left, worst, detected = Counter(), defaultdict(Counter), Counter()

@@ -189,6 +189,23 @@ def test_whether_f_beside_it_is_a_feed_nobody_says(beside):
     assert read(text.encode(), "fanuc")[-1] == Reason.FEED_UNKNOWN
 
 
+TURNED = "G99 G21 G40 G18\nG0 X90. Z9.\nG0 X50. Z2.\n{}\nN10 G0 X30.\nG1 Z-9.\nN20 X52.\nG1 X60.\n"
+
+
+@pytest.mark.parametrize("cycle", ["G71", "G72", "G73"])
+def test_what_cuts_a_contour_runs_at_its_own_f(cycle):
+    """So the rapid in front of it need not put one back, which nobody has said there."""
+    by_f, without = f"{cycle} P10 Q20 U.2 W.1 F.2", f"{cycle} P10 Q20 U.2 W.1"
+    assert read(TURNED.format(by_f).encode(), "fanuc-lathe-a", b"")[1] is None
+    assert read(TURNED.format(without).encode(), "fanuc-lathe-a", b"")[1] == Reason.FEED_UNKNOWN
+
+
+@pytest.mark.parametrize("cycle", ["G70 P10 Q20 F.2", "G76 X40. Z-9. P900 Q300 F1.5"])
+def test_whether_other_cycles_of_a_lathe_run_at_theirs_nobody_says(cycle):
+    found = read(TURNED.format(cycle).encode(), "fanuc-lathe-a", b"")
+    assert found[1] == Reason.FEED_UNKNOWN
+
+
 # What replaces a rapid is a feed move: where overrides and feed hold are off, nobody can slow it.
 OFF = {
     "tapping mode": ("fanuc", "G63\nG0 X5.\n"),

@@ -165,6 +165,18 @@ CASES = [
         KNOWN + "G53 G0 Z0. (77)\nM2\n", KNOWN + "G0 Z77.\nM2\n",
     ),
     Case(
+        Reason.FRAME_CHANGE, "a plain G0 in front of G53", HAAS,
+        KNOWN + "G53 G0 Z0. M9 (77)\nM2\n", KNOWN + "G0 Z77.\nG53 G0 Z0. M9\nM2\n",
+    ),
+    Case(
+        Reason.FRAME_CHANGE, "a plain G0 in front of G28", FANUC,
+        KNOWN + "G91 G28 Z0. (77)\nM2\n", KNOWN + "G0 Z77.\nG91 G28 Z0.\nM2\n",
+    ),
+    Case(
+        Reason.FRAME_CHANGE, "a plain G0 behind G43", HAAS,
+        KNOWN + "G0 G43 H1 Z77. M8\nM2\n", KNOWN + "G0 G43 H1 Z99. M8\nG0 Z77.\nM2\n",
+    ),
+    Case(
         Reason.FRAME_CHANGE, "G43 in a block of its own", LINUXCNC,
         KNOWN + "G43 H1 G0 Z77.\nM2\n", KNOWN + "G43 H1\nG0 X9. Y9. Z9.\nG0 Z77.\nM2\n",
     ),

@@ -25,7 +25,7 @@ from gcodejerk.nc.interpreter.flow_words import known_behind
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.moves import plane_axes
 from gcodejerk.nc.interpreter.named_cycles import certain_call, come_back
-from gcodejerk.nc.interpreter.rapids import USES_FEED
+from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED
 from gcodejerk.nc.interpreter.variables import converted, fills, named_assignment
 from gcodejerk.nc.text.block import Name
 from gcodejerk.nc.text.careful import CHECKSUM
@@ -128,7 +128,9 @@ class Effects:
             self._leave(step)
             self._modal_cycle(begins=True)  # G67, which ends it, is among the transforms
         elif effect == "cycle":
-            step.feed_event = USES_FEED
+            # What cuts a contour (G71) runs at the F of its own block, if that has one.
+            if code not in self.dialect.contours or step.feed_event != GIVES_FEED:
+                step.feed_event = USES_FEED
             state.forget_positions()
             state.put("motion", None)
             state.put("feed", NAN)
