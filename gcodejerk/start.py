@@ -77,6 +77,8 @@ class CycleSettings:
     """How far above R G83 clears the chips: Haas setting 52. [mm]"""
     boring_out: str | None = None
     """``feed``: G85 and G89 come out to R with the feed in force, at 100 %."""
+    without_xy: str | None = None
+    """``drills``: a block that states a cycle and names neither X nor Y (Haas setting 28)."""
 
 
 @dataclass(frozen=True, slots=True)

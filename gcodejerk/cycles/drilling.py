@@ -97,8 +97,9 @@ class DrillingRules:
     """What lets a feed move end in a standstill, in front of it; empty where a path mode does."""
     exact_pecks: bool = False
     """Pecks are counted in least increments, not in binary fractions."""
-    needs_position: bool = False
-    """A block without an axis of the plane may make a hole or none."""
+    needs_position: Literal["no", "unless stated", "yes"] = "no"
+    """Which blocks without an axis of the plane may make a hole or none: no block; those that do
+    not state their cycle; all."""
     pecks_dwell: bool = False
     """A dwell that another cycle of the series states also holds for those that peck."""
     dwell_form: Literal["any", "whole", "point"] = "any"
@@ -177,7 +178,7 @@ HAAS = replace(
     FANUC,
     repeats="L",
     lift=UNSAID,
-    needs_position=True,
+    needs_position="yes",
     pecks_dwell=True,
     dwell_form="point",
 )
@@ -226,12 +227,14 @@ def rules_for(name: str, start: Start) -> DrillingRules:
     rules, settings = DRILLING[name], start.cycles
     if not rules.own_group:
         return rules
+    drills = settings.without_xy == "drills" and rules.needs_position == "yes"
     return replace(
         rules,
         clearance=_distance(settings.peck_clearance),
         break_back=_distance(settings.chip_retract),
         lift=_distance(settings.clear_above_r) if rules.lift is UNSAID else rules.lift,
         feed_out=settings.boring_out == "feed",
+        needs_position="unless stated" if drills else rules.needs_position,
         whole=_WHOLE.get(start.decimal_point, "unknown"),
     )
 

@@ -238,8 +238,12 @@ def _beside_motion(
     state, cycle = moment.state, rules.cycles[moment.cycle or 0]
     yield state.motion not in (G0, G1), "whether G0 or G1 is in force behind it is not known"
     yield state.path not in (61, 64), str(Reason.PATH_UNKNOWN)
-    named = any(word.letter in PLANES[G17][:2] for word in block.words)
-    yield rules.needs_position and not named, "a setting decides whether it drills without X and Y"
+    silent = not any(word.letter in PLANES[G17][:2] for word in block.words)
+    told = "a setting decides whether it drills without X and Y (program.cycles.without_xy)"
+    yield silent and rules.needs_position == "yes", told
+    silent = silent and moment.cycle not in g_codes(block)
+    told = "whether it drills without X, Y and its cycle's code is not known"
+    yield silent and rules.needs_position == "unless stated", told
     yield cycle.dwells and state.feed_mode != 94, "a dwell may count revolutions in G95"
     lent = rules.pecks_dwell and series.dwells and not cycle.dwells
     yield lent and cycle.pecks is not Pecks.NONE, "the dwell of an earlier cycle holds in it"

@@ -87,6 +87,18 @@ def test_a_cycle_goes_as_the_manual_tells(dialect, series):
     assert not found.findings
 
 
+def test_a_haas_drills_where_the_tool_stands_if_setting_28_is_on():
+    series = b"G99 G83 Z-3. R2. Q4.\nX5.\nG83 Z-4. R2. Q9.\n"
+    lines, found = lines_of(series, "haas", WITHOUT_XY)
+    pecks = "G9 G1 Z-2.|G0 Z3.|G0 Z-1.6|G9 G1 Z-3.|G0 Z2."
+    assert not found.findings
+    assert "|".join(lines) == f"G99|G0 Z2.|{pecks}|G0 X5.|{pecks}|G9 G1 Z-4.|G0 Z2."
+    program = HEAD + series + END
+    text, _ = written(program, "haas", WITHOUT_XY)
+    assert check(program, text, "haas", WITHOUT_XY).ok
+    assert not check(program, text, "haas").ok
+
+
 def test_g1_is_in_force_again_behind_each_hole():
     lines, _ = lines_of(b"G1 Y1.\nG99 G81 X5. Z-3. R2.\nX6.\nG80\nX9.\n")
     assert lines[1:] == [
@@ -106,6 +118,7 @@ def test_inches_take_settings_that_are_whole_increments():
 
 
 UNSAID = replace(START, cycles=CycleSettings())
+WITHOUT_XY = replace(START, cycles=replace(SETTINGS, without_xy="drills"))
 CYCLE = b"G99 G81 X1. Y1. Z-5. R2.\n"
 PECKS = b"G99 G83 X1. Z-5. R2. Q2.\n"
 LEFT = {
@@ -125,6 +138,7 @@ LEFT = {
     "other pecks": ("haas", b"G83 X1. Z-5. R2. I3. J1. K1.\n", "order", START),
     "L of a Fanuc": ("fanuc", b"G81 X1. Z-5. R2. L2\n", "order", START),
     "setting 28": ("haas", b"G81 Z-5. R2.\n", "a setting decides", START),
+    "Z alone": ("haas", CYCLE + b"Z-6.\n", "its cycle's code", WITHOUT_XY),
     "high R": ("fanuc", b"G81 X1. Z-5. R30.\n", None, START),
     "higher R": ("fanuc", CYCLE + b"X2. R5.\n", "R is above", START),
     "whole Q": ("fanuc", PECKS.replace(b"Q2.", b"Q2000"), "decimal point",
@@ -347,7 +361,7 @@ def test_the_proof_does_not_guess_a_setting(field):
 
 
 DOUBTLESS = (
-    *("seconds", "revolutions", "a dwell that stays", "setting 28", "no motion"),
+    *("seconds", "revolutions", "a dwell that stays", "setting 28", "Z alone", "no motion"),
     *(
         "a stop",
         "a stop in the block",
@@ -463,10 +477,11 @@ positioning: linear
 controller: haas
 axes: {Z: {rapid: {velocity: 600, acceleration: 5000}}}
 units: inch
-program: {cycles: {chip_retract: 0.02, clear_above_r: 0, boring_out: feed}}
+program: {cycles: {chip_retract: 0.02, clear_above_r: 0, boring_out: feed, without_xy: drills}}
 """
     machine = Machine.loads(text)
     said = machine.program_start().cycles
     assert said.chip_retract == pytest.approx(0.508)
     assert (said.peck_clearance, said.clear_above_r, said.boring_out) == (None, 0.0, "feed")
+    assert said.without_xy == "drills"
     assert Machine.loads(machine_yaml(machine)).program.cycles == machine.program.cycles

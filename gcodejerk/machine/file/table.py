@@ -278,6 +278,10 @@ _CYCLES = Section(
             "How G85 and G89 come out of the hole: feed, with the feed in force at 100 % (Fanuc: "
             "parameters 5104#1 and 5149 change that). Left out: unknown, and they are not written "
             "out.", example="feed"),
+        Key("without_xy", Choice(("drills",)),
+            "What a Haas does in a block that states a cycle without X and Y: drills, where the "
+            "tool stands (setting 28 is on). Left out: unknown, and such blocks are not written "
+            "out.", example="drills"),
     )
 )  # fmt: skip
 

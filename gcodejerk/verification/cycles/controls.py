@@ -52,6 +52,8 @@ class Control:
     """A dwell counts as in G4 with a decimal point, without one; None: either way."""
     xy: bool = False
     """Only a block that names X or Y drills for certain."""
+    stated: bool = False
+    """One that states its cycle, too."""
     carries: bool = False
     """A dwell holds for whatever cycle follows it in a series."""
     leaves: frozenset[str] = frozenset()
@@ -136,6 +138,7 @@ def control_of(dialect: Dialect, start: Start) -> Control:
         watched=False,
         point=haas,
         xy=haas,
+        stated=said.without_xy == "drills",
         carries=haas,
         leaves=frozenset() if said.boring_out == "feed" else frozenset("r"),
         lent=frozenset(),

@@ -181,7 +181,8 @@ def _said(series: Series, block: Block, state: State, code: int) -> dict[str, Fr
             said[word.letter] = number
         if word.letter == "P" and control.point not in (None, b"." in word.text):
             return Doubt("its dwell may be another one in G4")
-    if control.xy and not set(plane[:2]) & said.keys():
+    stated = any(w.letter == "G" and round((w.value or 0.0) * 10) == code for w in block.words)
+    if control.xy and not set(plane[:2]) & said.keys() and not (control.stated and stated):
         return Doubt("it names neither X nor Y")
     return said
 
