@@ -40,8 +40,16 @@ def _weights() -> NDArray[np.int64]:
     return table
 
 
+def _ones(bits: int) -> NDArray[np.uint8]:
+    """How many bits are set, of every number of so many."""
+    counts = np.zeros(1, dtype=np.uint8)
+    for _ in range(bits):
+        counts = np.concatenate([counts, counts + np.uint8(1)])
+    return counts
+
+
 _WEIGHT = _weights()
-_ONES = np.array([bin(n).count("1") for n in range(1 << _BITS)], dtype=np.uint8)
+_ONES = _ones(_BITS)
 
 
 def read_lines(data: bytes, dialect: Dialect) -> Lines:
