@@ -198,6 +198,10 @@ def test_what_cuts_a_contour_runs_at_its_own_f(cycle):
     by_f, without = f"{cycle} P10 Q20 U.2 W.1 F.2", f"{cycle} P10 Q20 U.2 W.1"
     assert read(TURNED.format(by_f).encode(), "fanuc-lathe-a", b"")[1] is None
     assert read(TURNED.format(without).encode(), "fanuc-lathe-a", b"")[1] == Reason.FEED_UNKNOWN
+    # In two blocks the first one moves nothing.
+    for second, reason in ((by_f, None), (without, Reason.FEED_UNKNOWN)):
+        in_two = TURNED.format(f"{cycle} U2. R.5\n{second}").encode()
+        assert read(in_two, "fanuc-lathe-a", b"")[1] == reason
 
 
 @pytest.mark.parametrize("cycle", ["G70 P10 Q20 F.2", "G76 X40. Z-9. P900 Q300 F1.5"])

@@ -55,6 +55,15 @@ CONTINUOUS = 64
 """Path mode in which blocks blend."""
 
 
+def _runs_at_its_own(values: dict[str, float], feed_event: int) -> bool:
+    """Whether what cuts a contour (G71) needs no F from in front of its block.
+
+    It runs at the F of the block that says which contour. The first of two, ``G71 U2. R.5``, says
+    how deep to cut, and moves nothing.
+    """
+    return feed_event == GIVES_FEED or not {"P", "Q"} & values.keys()
+
+
 class Effects:
     """Does to a state what codes and names do besides the motion."""
 
@@ -128,8 +137,7 @@ class Effects:
             self._leave(step)
             self._modal_cycle(begins=True)  # G67, which ends it, is among the transforms
         elif effect == "cycle":
-            # What cuts a contour (G71) runs at the F of its own block, if that has one.
-            if code not in self.dialect.contours or step.feed_event != GIVES_FEED:
+            if code not in self.dialect.contours or not _runs_at_its_own(values, step.feed_event):
                 step.feed_event = USES_FEED
             state.forget_positions()
             state.put("motion", None)
