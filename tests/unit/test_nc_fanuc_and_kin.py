@@ -21,6 +21,24 @@ KIN = ("mitsubishi", "syntec", "mazatrol-eia", "iso-mill")
 
 # What stands in front of the last rapid, the reason for which that one is left alone, and facts.
 NOT_CERTAIN = {
+    "behind a contour with a dwell": (
+        "fanuc-lathe-a",
+        "G71 P10 Q20 U.2 W.1 F.2\nN10 G0 X30. F.1\nG4 P1000\nG1 Z-9.\nN20 X52.\nG0 X60. Z5.\n",
+        START,
+        {},
+    ),
+    "in a contour with a dwell": (
+        "fanuc-lathe-a",
+        "G73 P10 Q20 U.2 W.1 F.2\nN10 G0 X30. F.1\nG4 P1000\nG0 X31. Z5.\nX33.\n",
+        Reason.CANNED_CYCLE,
+        {},
+    ),
+    "the unit that a contour has said": (
+        "fanuc-lathe-a",
+        "G71 P10 Q20 U.2 W.1 F.2\nN10 G0 X3.\nG20\nG1 Z-9.\nN20 X52.\nG0 X60. Z5.\n",
+        Reason.UNITS_UNKNOWN,
+        {},
+    ),
     "a cycle that may come back to R": ("fanuc", "G81 X1. Z-5. R2.\nG80\nG0 Z9.\n", START, {}),
     "the axes of a mirror are no move": ("fanuc", MIRRORED + "G50.1 X0. Y0.\nG0 X5.\n", START, {}),
     "nor those of Haas": ("haas", "G101 X0.\nG100 X0.\nG0 X5.\n", START, {}),
@@ -149,6 +167,11 @@ STILL_CERTAIN = {
     "drilled in one system": ("fanuc", DRILLED + "G54 X5.\nG80\nG0 Z9.\n", {}),
     "a dwell within a cycle": ("fanuc", DRILLED + "G4 X1.\nX5.\nG80\nG0 Z9.\n", {}),
     "a dwell of X": ("fanuc", "G4 X1.\nG0 X9.\n", {}),
+    "behind a contour that ends what it began": (
+        "fanuc-lathe-a",
+        "G72 P10 Q20 U.2 W.1 F.2\nN10 G42 G0 X30.\nG1 Z-9.\nN20 G40 X52.\nG0 X60. Z5.\nX70. Z9.\n",
+        {},
+    ),
     "a dwell of U": ("fanuc-lathe-a", "G4 U1.\nG0 X9.\n", {}),
     "G99 in another system": (
         "fanuc", "G99 " + DRILLED[4:] + "G55 X5.\nG80\nG0 Z9.\n", {}
@@ -187,27 +210,6 @@ def test_whether_f_beside_it_is_a_feed_nobody_says(beside):
     """A stream puts the F back that is in force behind it."""
     text = f"{beside} F90.\nG50.1 X0.\nG0 X5. Y5.\nX6.\nG1 Y6.\n"
     assert read(text.encode(), "fanuc")[-1] == Reason.FEED_UNKNOWN
-
-
-TURNED = "G99 G21 G40 G18\nG0 X90. Z9.\nG0 X50. Z2.\n{}\nN10 G0 X30.\nG1 Z-9.\nN20 X52.\nG1 X60.\n"
-
-
-@pytest.mark.parametrize("cycle", ["G71", "G72", "G73"])
-def test_what_cuts_a_contour_runs_at_its_own_f(cycle):
-    """So the rapid in front of it need not put one back, which nobody has said there."""
-    by_f, without = f"{cycle} P10 Q20 U.2 W.1 F.2", f"{cycle} P10 Q20 U.2 W.1"
-    assert read(TURNED.format(by_f).encode(), "fanuc-lathe-a", b"")[1] is None
-    assert read(TURNED.format(without).encode(), "fanuc-lathe-a", b"")[1] == Reason.FEED_UNKNOWN
-    # In two blocks the first one moves nothing.
-    for second, reason in ((by_f, None), (without, Reason.FEED_UNKNOWN)):
-        in_two = TURNED.format(f"{cycle} U2. R.5\n{second}").encode()
-        assert read(in_two, "fanuc-lathe-a", b"")[1] == reason
-
-
-@pytest.mark.parametrize("cycle", ["G70 P10 Q20 F.2", "G76 X40. Z-9. P900 Q300 F1.5"])
-def test_whether_other_cycles_of_a_lathe_run_at_theirs_nobody_says(cycle):
-    found = read(TURNED.format(cycle).encode(), "fanuc-lathe-a", b"")
-    assert found[1] == Reason.FEED_UNKNOWN
 
 
 # What replaces a rapid is a feed move: where overrides and feed hold are off, nobody can slow it.

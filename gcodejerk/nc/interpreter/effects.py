@@ -25,7 +25,7 @@ from gcodejerk.nc.interpreter.flow_words import known_behind
 from gcodejerk.nc.interpreter.modal import NAN, State
 from gcodejerk.nc.interpreter.moves import plane_axes
 from gcodejerk.nc.interpreter.named_cycles import certain_call, come_back
-from gcodejerk.nc.interpreter.rapids import GIVES_FEED, USES_FEED
+from gcodejerk.nc.interpreter.rapids import USES_FEED
 from gcodejerk.nc.interpreter.variables import converted, fills, named_assignment
 from gcodejerk.nc.text.block import Name
 from gcodejerk.nc.text.careful import CHECKSUM
@@ -53,15 +53,6 @@ MODAL_MACRO = "modal macro"
 """Name, among the transforms, of a cycle or macro that runs at every position."""
 CONTINUOUS = 64
 """Path mode in which blocks blend."""
-
-
-def _runs_at_its_own(values: dict[str, float], feed_event: int) -> bool:
-    """Whether what cuts a contour (G71) needs no F from in front of its block.
-
-    It runs at the F of the block that says which contour. The first of two, ``G71 U2. R.5``, says
-    how deep to cut, and moves nothing.
-    """
-    return feed_event == GIVES_FEED or not {"P", "Q"} & values.keys()
 
 
 class Effects:
@@ -137,8 +128,7 @@ class Effects:
             self._leave(step)
             self._modal_cycle(begins=True)  # G67, which ends it, is among the transforms
         elif effect == "cycle":
-            if code not in self.dialect.contours or not _runs_at_its_own(values, step.feed_event):
-                step.feed_event = USES_FEED
+            step.feed_event = USES_FEED
             state.forget_positions()
             state.put("motion", None)
             state.put("feed", NAN)

@@ -42,6 +42,8 @@ class Executor(Phases):
         self.decimal_point = start.decimal_point
         self.told_unfed = False
         """A feed move without F was named; there may be many."""
+        self._before_contour: State | None = None
+        """What was in force where a contour began."""
         self.calls_followed = False
         """Whoever runs the blocks runs what they call (`Step.call`)."""
 
@@ -63,8 +65,9 @@ class Executor(Phases):
         if reads_feed(block, self.dialect.arithmetic):
             step.feed_event = USES_FEED
         contour = self._contour is not None
-        if contour:
+        if contour or self._before_contour is not None:
             self._leave_contour(block)
+            state = self.state
         step.end = step.end or state.position.copy()
         if step.fault or codes.unknown:
             step.rapid = step.rapid or looks_rapid(block, codes, step, before, self.dialect)
@@ -139,12 +142,20 @@ class Executor(Phases):
             step.feed_event = USES_FEED
 
     def _leave_contour(self, block: Block) -> None:
-        """Forget what a block of a contour said: it did not run here."""
+        """Forget what a block of a contour said: it did not run here.
+
+        Which of its modes hold behind the cycle, no source tells: at its end those are known that
+        are as they were in front of it.
+        """
         self.state.forget_positions()
         self.state.put("motion", None)
         self.state.put("feed", NAN)
-        if any(word.letter == "N" and word.value == self._contour for word in block.words):
-            self._contour = None
+        if self._before_contour is None:
+            self._before_contour = self.state.copy()
+        ends = any(word.letter == "N" and word.value == self._contour for word in block.words)
+        if ends or self._contour is None:
+            self.state = join(self._before_contour, self.state)
+            self._contour = self._before_contour = None
 
     def _doubt(self, block: Block, codes: Codes, step: Step) -> None:
         """Forget what a block that is not understood may have changed."""

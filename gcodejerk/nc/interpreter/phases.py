@@ -247,8 +247,9 @@ class Phases(Effects):
             # X alone is a time; whether an axis moves beside the dwell, nobody says
             time = set() if "P" in codes.values or "motion" in g else {"X"}
             self.state.forget_positions(AXES.index(axis) for axis in codes.moved() - time)
-        contour = g.get("non-modal") in dialect.contours
-        self._contour = codes.values.get("Q") if contour else None
+        else:  # a dwell may stand within a contour
+            contour = g.get("non-modal") in dialect.contours
+            self._contour = codes.values.get("Q") if contour else None
         if dialect.one_command and not g and step.words and not codes.m:
             # Words without a command: a build may take them for one.
             self.state.forget_positions()
