@@ -19,6 +19,8 @@ DRILLED = "G98 G81 X1. Z-5. R2. F9.\n"
 COMPENSATED = "G41 D1 G1 X5. Y5.\nX9.\n"
 KIN = ("mitsubishi", "syntec", "mazatrol-eia", "iso-mill")
 
+FINISHED = "G71 P10 Q20 U.2 W.1 F.2\nN10 {}G0 X30.\nG1 Z-9.\nN20 X52.\n"
+
 # What stands in front of the last rapid, the reason for which that one is left alone, and facts.
 NOT_CERTAIN = {
     "behind a contour with a dwell": (
@@ -37,6 +39,18 @@ NOT_CERTAIN = {
         "fanuc-lathe-a",
         "G71 P10 Q20 U.2 W.1 F.2\nN10 G0 X3.\nG20\nG1 Z-9.\nN20 X52.\nG0 X60. Z5.\n",
         Reason.UNITS_UNKNOWN,
+        {},
+    ),
+    "compensation that a contour begins, once more": (
+        "fanuc-lathe-a",
+        FINISHED.format("G42 ") + "G40 G1 X60. F.1\nG70 P10 Q20\nG0 X60. Z5.\nX70. Z9.\n",
+        COMPENSATION,
+        {},
+    ),
+    "a contour that nobody has seen": (
+        "fanuc-lathe-a",
+        "G70 P10 Q20\nG0 X60. Z5.\nX70. Z9.\n",
+        Reason.NOT_FOLLOWED,
         {},
     ),
     "a cycle that may come back to R": ("fanuc", "G81 X1. Z-5. R2.\nG80\nG0 Z9.\n", START, {}),
@@ -170,6 +184,16 @@ STILL_CERTAIN = {
     "behind a contour that ends what it began": (
         "fanuc-lathe-a",
         "G72 P10 Q20 U.2 W.1 F.2\nN10 G42 G0 X30.\nG1 Z-9.\nN20 G40 X52.\nG0 X60. Z5.\nX70. Z9.\n",
+        {},
+    ),
+    "a contour once more": (
+        "fanuc-lathe-a",
+        FINISHED.format("") + "G1 X60. F.1\nG70 P10 Q20\nG0 X60. Z5.\nX70. Z9.\n",
+        {},
+    ),
+    "compensation that ends behind it": (
+        "fanuc-lathe-a",
+        FINISHED.format("G42 ") + "G70 P10 Q20\nG40 G1 X60. F.1\nG0 X60. Z5.\nX70. Z9.\n",
         {},
     ),
     "a dwell of U": ("fanuc-lathe-a", "G4 U1.\nG0 X9.\n", {}),

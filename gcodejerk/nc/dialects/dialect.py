@@ -279,6 +279,8 @@ class Dialect:
     and that may end in G90 and with the tool length cancelled, as those for tool changes do."""
     contours: frozenset[int] = frozenset()
     """Codes whose P and Q name a contour's first and last block: those blocks do not run."""
+    finishing: frozenset[int] = frozenset()
+    """Codes that run such blocks once more, wherever they stand."""
     redrawn: frozenset[int] = frozenset()
     """Motions whose end is not what their words say."""
     drilling: Drilling = field(default_factory=Drilling)

@@ -291,6 +291,7 @@ _LATHE = replace(
     diameter_fixed=True,  # parameter 1006#3, which G10.9 alone changes
     tool_frame=frozenset("T"),
     contours=frozenset({710, 720, 730}),
+    finishing=frozenset({700}),
     drilling=Drilling(),
     length_moves=False,
     spindle_turns="ABC",

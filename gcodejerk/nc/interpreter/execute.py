@@ -16,6 +16,7 @@ from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.arcs import in_doubt, lacks_feed
 from gcodejerk.nc.interpreter.beams import inline_power
 from gcodejerk.nc.interpreter.codes import Codes, sort_words
+from gcodejerk.nc.interpreter.contours import Contours
 from gcodejerk.nc.interpreter.eligibility import Call, Step, looks_rapid, why_left_alone
 from gcodejerk.nc.interpreter.left_on import left_by
 from gcodejerk.nc.interpreter.limits import LIMIT, set_by_setting
@@ -42,8 +43,7 @@ class Executor(Phases):
         self.decimal_point = start.decimal_point
         self.told_unfed = False
         """A feed move without F was named; there may be many."""
-        self._before_contour: State | None = None
-        """What was in force where a contour began."""
+        self.contours = Contours()
         self.calls_followed = False
         """Whoever runs the blocks runs what they call (`Step.call`)."""
 
@@ -64,10 +64,8 @@ class Executor(Phases):
         step.habit |= block.problem is not None and inline_power(codes, block.rest)
         if reads_feed(block, self.dialect.arithmetic):
             step.feed_event = USES_FEED
-        contour = self._contour is not None
-        if contour or self._before_contour is not None:
-            self._leave_contour(block)
-            state = self.state
+        contour = self._follow_contour(block, codes)
+        state = self.state
         step.end = step.end or state.position.copy()
         if step.fault or codes.unknown:
             step.rapid = step.rapid or looks_rapid(block, codes, step, before, self.dialect)
@@ -141,21 +139,18 @@ class Executor(Phases):
         if step.feed_event:
             step.feed_event = USES_FEED
 
-    def _leave_contour(self, block: Block) -> None:
-        """Forget what a block of a contour said: it did not run here.
-
-        Which of its modes hold behind the cycle, no source tells: at its end those are known that
-        are as they were in front of it.
-        """
-        self.state.forget_positions()
-        self.state.put("motion", None)
-        self.state.put("feed", NAN)
-        if self._before_contour is None:
-            self._before_contour = self.state.copy()
-        ends = any(word.letter == "N" and word.value == self._contour for word in block.words)
-        if ends or self._contour is None:
-            self.state = join(self._before_contour, self.state)
-            self._contour = self._before_contour = None
+    def _follow_contour(self, block: Block, codes: Codes) -> bool:
+        """Whether a block is part of a contour, or begins one: it does not run where it stands."""
+        end = self._contour
+        if end is None and not self.contours.open:
+            if codes.g.get("non-modal") in self.dialect.finishing:
+                self.state = self.contours.finish(self.state, codes.values.get("Q", NAN))
+            return False
+        last = end is None or any(w.letter == "N" and w.value == end for w in block.words)
+        self.state = self.contours.take(self.state, (NAN if end is None else end) if last else None)
+        if last:
+            self._contour = None
+        return end is not None
 
     def _doubt(self, block: Block, codes: Codes, step: Step) -> None:
         """Forget what a block that is not understood may have changed."""

@@ -381,7 +381,7 @@ def same(a: object, b: object) -> bool:
     return a == b or (a != a and b != b)
 
 
-def _equal(field: Field, a: Any, b: Any) -> bool:
+def alike(field: Field, a: Any, b: Any) -> bool:
     """Whether two states know the same of a field."""
     if field.kind == "axes":
         return all(map(same, a, b))
@@ -397,7 +397,7 @@ def _equal(field: Field, a: Any, b: Any) -> bool:
 def agree(a: State, b: State) -> bool:
     """Whether two states know the same."""
     return all(
-        _equal(field, getattr(a, field.name), getattr(b, field.name))
+        alike(field, getattr(a, field.name), getattr(b, field.name))
         for field in FIELDS
         if field.name != "touched" and field.kind != "note"
     )
@@ -409,7 +409,7 @@ def join(before: State, after: State) -> State:
     joined.touched = after.touched
     for field in FIELDS:
         a, b = getattr(before, field.name), getattr(after, field.name)
-        if field.kind not in ("constant", "note") and not _equal(field, a, b):
+        if field.kind not in ("constant", "note") and not alike(field, a, b):
             _join(joined, field, a, b)
     losses = [(n, loss) for s in (after, before) for n, loss in s.lost.items() if s.unknown(n)]
     joined.lost = dict(losses)

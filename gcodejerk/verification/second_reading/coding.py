@@ -267,6 +267,14 @@ class Codes(Known):
             self.p = values.get("P", NAN) if g["path"] == G64 else NAN
             self.q = values.get("Q", NAN) if g["path"] == G64 else NAN
 
+    def run_contours(self) -> None:
+        """Doubt what contours say: it may have come to hold, or not."""
+        other = self.copy()
+        other.modes(self.says, {})
+        if "feed mode" in self.says:
+            other.feed_mode = other.mode_of(self.says["feed mode"])
+        self.join(other)
+
     def _transform(self, name: str, on: bool, by_axis: bool, values: dict[str, float]) -> None:
         """Turn, scale or mirror what follows, or no longer."""
         if by_axis:
@@ -340,6 +348,10 @@ class Codes(Known):
         elif effect == "cycle":
             self.lose()
             self.g["motion"], self.feed = None, NAN
+            if code in self.dialect.finishing and values.get("Q") in self.contours:
+                self.run_contours()
+            elif code in self.dialect.finishing:
+                self.forget()
         elif effect == "home":
             self.lose()
         elif effect == "measure":

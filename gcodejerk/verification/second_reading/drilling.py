@@ -82,8 +82,16 @@ class Drilling(Codes):
         """A line of a contour, which a cycle runs as it sees fit."""
         self.lose()
         self.g["motion"], self.feed = None, NAN
-        if any(letter == "N" and number == self.contour for letter, number, _ in line.words):
+        for letter, number, _ in line.words:
+            code = round(number * 10) if letter == "G" else -1
+            group = self.dialect.groups.get(code, "motion")
+            if group not in ("motion", "non-modal"):
+                self.says[group] = code
+        ends = [n for letter, n, _ in line.words if letter == "N" and n == self.contour]
+        if ends:
+            self.contours += ends
             self.contour = None
+            self.run_contours()
 
     def drill_by_name(self, line: Line) -> bool:
         """CYCLE81(..) and its kin, at once or by MCALL, or the end of MCALL; whether it is sure."""

@@ -36,6 +36,7 @@ KINDS = {
     **dict.fromkeys(("dialect", "facts", "fixed", "dark", "burns"), "given"),
     # where in the file the reading is; a line that may be skipped changes none of these for good
     **dict.fromkeys(("ended", "opened", "begun", "started", "depth", "contour"), "place"),
+    **dict.fromkeys(("contours", "says"), "place"),
 }
 """Every field of `Known`, and how two states of it are joined."""
 
@@ -148,17 +149,16 @@ class Known:
         """Axes whose frame was shifted since an absolute word, where that matters."""
         self.added: bool | None = False
         """ATRANS has added to the program's shift."""
-        self.ended = False
-        self.opened = False
-        """A ``%`` began the program."""
-        self.begun = False
-        """A block has been read."""
-        self.started = False
-        """So has a line that is not blank."""
+        self.ended = self.opened = False
+        """The program has; a ``%`` began it."""
+        self.begun = self.started = False
+        """A block has been read; so has a line that is not blank."""
         self.depth = 0
         self.doubt = False
         """Nothing can be confirmed any more: subprograms, jumps."""
         self.contour: float | None = None
+        self.contours, self.says = list[float](), dict[str, int]()
+        """The N that contours end with, and the last codes that their blocks have, by group."""
         self.variables: dict[str, float] = {}
         """Those that the program has set, on every way that leads here."""
         self.strayed = False
