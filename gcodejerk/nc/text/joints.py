@@ -76,6 +76,7 @@ def find_joints(
 
     Examples
     --------
+    >>> from gcodejerk.nc.text.words import COMMENT
     >>> joint, kind, wrong = find_joints(b"\nX5(1 a)\nY2.(\n", 0, Text())
     >>> joint.tolist(), (kind == COMMENT).nonzero()[0].tolist(), wrong.nonzero()[0].tolist()
     ([0, 1, 3, 5, 6, 7, 8, 9, 11, 12, 13], [2, 3, 4], [9])
