@@ -47,6 +47,18 @@ NOT_CERTAIN = {
         COMPENSATION,
         {},
     ),
+    "any code in a contour": (
+        "fanuc-lathe-a",
+        "G71 P10 Q20 U.2 W.1 F.2\nN10 G0 X30.\nG#1 X5.\nN20 X52.\nG0 X60. Z5.\nX70. Z9.\n",
+        Reason.NOT_UNDERSTOOD,
+        {},
+    ),
+    "a cycle within an open contour": (
+        "fanuc-lathe-a",
+        "G71 P10 Q20 U.2 W.1 F.2\nN10 G0 X30. F.1\nG70 P10 Q20\nG0 X60. Z5.\nX70. Z9.\n",
+        Reason.CANNED_CYCLE,
+        {},
+    ),
     "a contour that nobody has seen": (
         "fanuc-lathe-a",
         "G70 P10 Q20\nG0 X60. Z5.\nX70. Z9.\n",

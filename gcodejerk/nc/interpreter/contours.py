@@ -8,8 +8,10 @@ same either way.
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
 
 from gcodejerk.nc.interpreter.modal import FIELDS, NAN, State, alike, join
+from gcodejerk.nc.text.block import Block
 from gcodejerk.reasons import Reason
 
 
@@ -17,25 +19,27 @@ class Contours:
     """The contours of a program, as far as it was read."""
 
     def __init__(self) -> None:
+        self.end: float | None = None
+        """N of the last block of the one that is being read."""
         self._before: State | None = None
-        """What was in force in front of the one that is being read."""
+        """What was in force in front of it."""
         self._seen: dict[float, list[tuple[State, State]]] = defaultdict(list)
         """By the N of its last block: what was in force in front of a contour, and at its end."""
 
-    @property
-    def open(self) -> bool:
-        """Whether one has begun, and not ended."""
-        return self._before is not None
+    def begin(self, values: Mapping[str, float]) -> None:
+        """Begin one, where a block names its ends; within another, nothing begins."""
+        if self.end is None:
+            self.end = values.get("Q")
 
-    def take(self, state: State, end: float | None) -> State:
-        """Take a block of a contour, and the state that it would leave.
+    def take(self, state: State, block: Block) -> State:
+        """Take a block of a contour, or the one that begins it.
 
         Parameters
         ----------
         state : State
             What the modes would be if blocks of contours ran where they stand; changed.
-        end : float or None
-            N of the last block, if this is that one; else None.
+        block : Block
+            The last one ends the contour.
 
         Returns
         -------
@@ -47,11 +51,13 @@ class Contours:
         state.put("feed", NAN)
         if self._before is None:
             self._before = state.copy()
-        if end is None:
+        end = self.end
+        if end is None or not any(w.letter == "N" and w.value == end for w in block.words):
             return state
-        before, self._before = self._before, None
-        self._seen[end].append((before, state))
-        return join(before, state)
+        both = self._before, state
+        self._seen[end].append(both)
+        self.end = self._before = None
+        return join(*both)
 
     def finish(self, state: State, end: float) -> State:
         """Run a contour once more (G70); one that was not seen may leave any mode."""

@@ -16,7 +16,6 @@ from gcodejerk.nc.interpreter import frames
 from gcodejerk.nc.interpreter.arcs import in_doubt, lacks_feed
 from gcodejerk.nc.interpreter.beams import inline_power
 from gcodejerk.nc.interpreter.codes import Codes, sort_words
-from gcodejerk.nc.interpreter.contours import Contours
 from gcodejerk.nc.interpreter.eligibility import Call, Step, looks_rapid, why_left_alone
 from gcodejerk.nc.interpreter.left_on import left_by
 from gcodejerk.nc.interpreter.limits import LIMIT, set_by_setting
@@ -43,7 +42,6 @@ class Executor(Phases):
         self.decimal_point = start.decimal_point
         self.told_unfed = False
         """A feed move without F was named; there may be many."""
-        self.contours = Contours()
         self.calls_followed = False
         """Whoever runs the blocks runs what they call (`Step.call`)."""
 
@@ -64,7 +62,11 @@ class Executor(Phases):
         step.habit |= block.problem is not None and inline_power(codes, block.rest)
         if reads_feed(block, self.dialect.arithmetic):
             step.feed_event = USES_FEED
-        contour = self._follow_contour(block, codes)
+        contour = self.contours.end is not None
+        if contour:
+            self.state = self.contours.take(self.state, block)
+        elif codes.g.get("non-modal") in self.dialect.finishing:
+            self.state = self.contours.finish(self.state, codes.values.get("Q", NAN))
         state = self.state
         step.end = step.end or state.position.copy()
         if step.fault or codes.unknown:
@@ -138,19 +140,6 @@ class Executor(Phases):
         step.fault, step.refused = True, code
         if step.feed_event:
             step.feed_event = USES_FEED
-
-    def _follow_contour(self, block: Block, codes: Codes) -> bool:
-        """Whether a block is part of a contour, or begins one: it does not run where it stands."""
-        end = self._contour
-        if end is None and not self.contours.open:
-            if codes.g.get("non-modal") in self.dialect.finishing:
-                self.state = self.contours.finish(self.state, codes.values.get("Q", NAN))
-            return False
-        last = end is None or any(w.letter == "N" and w.value == end for w in block.words)
-        self.state = self.contours.take(self.state, (NAN if end is None else end) if last else None)
-        if last:
-            self._contour = None
-        return end is not None
 
     def _doubt(self, block: Block, codes: Codes, step: Step) -> None:
         """Forget what a block that is not understood may have changed."""

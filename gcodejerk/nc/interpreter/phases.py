@@ -20,6 +20,7 @@ from gcodejerk.nc.dialects.gcodes import G1, G4, G40, G64, G80
 from gcodejerk.nc.interpreter import frames, limits
 from gcodejerk.nc.interpreter.beams import shows_habits, uses_outputs
 from gcodejerk.nc.interpreter.codes import Codes
+from gcodejerk.nc.interpreter.contours import Contours
 from gcodejerk.nc.interpreter.cycles import begin_cycle, run_cycle
 from gcodejerk.nc.interpreter.effects import Effects
 from gcodejerk.nc.interpreter.eligibility import Step
@@ -70,8 +71,7 @@ class Phases(Effects):
         self._tool_change = start.tool_change
         self.rapid_feed = start.rapid_feed
         """Feed moves that count as rapids."""
-        self._contour: float | None = None
-        """N of the block that ends a contour, which a cycle runs by itself."""
+        self.contours = Contours()
 
     def act(self, codes: Codes, step: Step) -> None:
         """Execute the words of a block, in the fixed order."""
@@ -247,9 +247,8 @@ class Phases(Effects):
             # X alone is a time; whether an axis moves beside the dwell, nobody says
             time = set() if "P" in codes.values or "motion" in g else {"X"}
             self.state.forget_positions(AXES.index(axis) for axis in codes.moved() - time)
-        else:  # a dwell may stand within a contour
-            contour = g.get("non-modal") in dialect.contours
-            self._contour = codes.values.get("Q") if contour else None
+        elif g.get("non-modal") in dialect.contours:
+            self.contours.begin(codes.values)
         if dialect.one_command and not g and step.words and not codes.m:
             # Words without a command: a build may take them for one.
             self.state.forget_positions()

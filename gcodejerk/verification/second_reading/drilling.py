@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from gcodejerk.axes import AXES
@@ -82,9 +83,10 @@ class Drilling(Codes):
         """A line of a contour, which a cycle runs as it sees fit."""
         self.lose()
         self.g["motion"], self.feed = None, NAN
-        for letter, number, _ in line.words:
-            code = round(number * 10) if letter == "G" else -1
-            group = self.dialect.groups.get(code, "motion")
+        codes = [number * 10 for letter, number, _ in line.words if letter == "G"]
+        self.doubt = self.doubt or not all(map(math.isfinite, codes))  # G#1 is any of them
+        for code in map(round, filter(math.isfinite, codes)):
+            group = self.dialect.groups.get(code, "non-modal")
             if group not in ("motion", "non-modal"):
                 self.says[group] = code
         ends = [n for letter, n, _ in line.words if letter == "N" and n == self.contour]
